@@ -1,7 +1,7 @@
-"""The least a viser app can do with a gizmo: the floor that drag_to_frame.py compares with.
+"""A minimal viser app with a gizmo, with which drag_to_frame.py compares the app.
 
-The gizmo is built as the app builds it, from three controls: arrows, a pitch ring and a roll
-ring. Each callback moves one node and flushes, nothing more.
+The gizmo is built as in the app, from three controls: arrows, a pitch ring and a roll ring. Each
+callback only moves one node and flushes.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ GIZMO_SCALE = 0.2
 def add_gizmo(server: viser.ViserServer) -> None:
     """Show a box at the gizmo and keep it there while any of the three controls is dragged."""
     scene = server.scene
-    # Flat, so that a turn of the box can be seen, and small enough to hide no handle.
+    # Flat, so that a turn of the box is visible, and small enough to hide no handle.
     box = scene.add_box("/arm/box", color=(225, 140, 40), dimensions=(0.05, 0.03, 0.015))
     move = scene.add_transform_controls("/target/move", GIZMO_SCALE, disable_rotations=True)
-    # A ring is drawn where both axes that span it are active: z and x give the one about y.
+    # A ring is drawn if both axes of its plane are active: z and x give the ring about y.
     pitch = scene.add_transform_controls(
         "/target/move/pitch",
         GIZMO_SCALE,
@@ -76,7 +76,7 @@ def add_slider(server: viser.ViserServer) -> None:
 
 
 def main() -> None:
-    """Serve until interrupted, on the port asked for or not at all."""
+    """Serve until interrupted, on the given port only."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, required=True)
     port = parser.parse_args().port
@@ -87,7 +87,7 @@ def main() -> None:
     add_gizmo(server)
     add_slider(server)
     print(f"bare viser app is ready: http://127.0.0.1:{port}", flush=True)
-    # Python leaves Ctrl-C ignored where it was started so, in the background of a shell.
+    # Processes in the background of a shell start with Ctrl-C ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     with contextlib.suppress(KeyboardInterrupt):
         threading.Event().wait()

@@ -1,10 +1,10 @@
-"""What collision costs: the nearest pair beside plainer ways to find it, and one control tick.
+"""Cost of collision checks: the nearest pair beside simpler methods, and one control tick.
 
     python -m benchmarks.collision
 
-Every way measures the same random postures by turns, each posture several times over, and its
-quickest time counts; the tables give the median and the 95th percentile over the postures. Times
-are the thread's own on the processor, so that a busy machine counts little. FCL, which measures
+Every method measures the same random postures in turn, each posture several times, and its minimum
+time counts. The tables give the median and the 95th percentile over the postures. Times are
+processor times of the thread, so that other load on the machine hardly counts. FCL, which measures
 where coal has no wheel, is compared with coal in the same run.
 """
 
@@ -44,17 +44,17 @@ DRIVES: dict[str, tuple[Sequence[float], Sequence[float]]] = {
     "low over the table": ((0.0, -37.3, 97.0, -2.0, 0.0), (120.0, -37.3, 97.0, -2.0, 0.0)),
     "folding up": (READY_POSTURE_DEG, (0.0, -124.0, 127.0, 107.0, 0.0)),
 }
-"""Start and goal of each, joint angles [deg]."""
+"""Start and goal of each drive, joint angles [deg]."""
 
 
 def approach(x: FloatArray, end: FloatArray, speed: FloatArray, dt: float) -> FloatArray:
-    """``x`` (k,) a step of ``dt`` [s] on, straight towards ``end`` at the greatest speed."""
+    """Return ``x`` (k,) after ``dt`` [s] of motion straight towards ``end`` at maximum speed."""
     needed = float(np.max(np.abs(end - x) / speed))
     return end if needed <= dt else np.asarray(x + (end - x) * (dt / needed))
 
 
 class Row(NamedTuple):
-    """One line of a table: microseconds, and what there is to say."""
+    """One line of a table: times in microseconds, and a remark."""
 
     name: str
     median: float
@@ -72,7 +72,7 @@ def without_coal() -> Iterator[None]:
 
 
 def world_on_table(robot: Robot) -> CollisionWorld:
-    """The arm's bodies above the table."""
+    """Return the arm's bodies above the table."""
     world, _ = world_of(robot)
     if world is None:
         raise SystemExit("The robot description has no collision shapes.")
@@ -80,7 +80,7 @@ def world_on_table(robot: Robot) -> CollisionWorld:
 
 
 class RawMeshes:
-    """The visible triangles of each link, without hulls, for the pairs of a world but the table."""
+    """The visible triangles of each link, without hulls, for all pairs of a world without table."""
 
     def __init__(self, robot: Robot, world: CollisionWorld) -> None:
         self._world = world
@@ -94,7 +94,7 @@ class RawMeshes:
         self._request = coal.DistanceRequest()
 
     def nearest(self, x: FloatArray) -> float:
-        """How near the links are to each other [m]."""
+        """Return the minimum distance of two links [m]."""
         poses = self._world.linkage.poses(x)
         placed = {}
         for number in self._meshes:
@@ -130,7 +130,7 @@ def _bvh(meshes: Sequence[Any]) -> Any:
 
 
 def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
-    """The least of several times [us]."""
+    """Return the minimum of several times [us]."""
     best = float("inf")
     for _ in range(turns):
         start = time.thread_time()
@@ -142,19 +142,19 @@ def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
 def nearest_rows(
     robot: Robot, world: CollisionWorld, by_fcl: CollisionWorld, postures: FloatArray
 ) -> list[Row]:
-    """The ways to find the nearest pair."""
+    """Return the rows of the methods that find the nearest pair."""
     every = np.arange(len(world.first))
     raw = RawMeshes(robot, world)
-    ways: dict[str, tuple[Callable[[FloatArray], object], int]] = {
+    methods: dict[str, tuple[Callable[[FloatArray], object], int]] = {
         "katana450 `nearest`": (world.nearest, TURNS),
         "katana450 `nearest`, by FCL": (by_fcl.nearest, TURNS),
         "coal, the same hulls, every pair": (lambda x: world.at(x).distances(every).min(), TURNS),
         "coal, the visible meshes, without the table": (raw.nearest, 1),
     }
-    times: dict[str, list[float]] = {name: [] for name in ways}
+    times: dict[str, list[float]] = {name: [] for name in methods}
     for x in postures:
-        for name, (way, turns) in ways.items():
-            times[name].append(quickest(lambda way=way, x=x: way(x), turns))  # type: ignore[misc]
+        for name, (method, turns) in methods.items():
+            times[name].append(quickest(lambda method=method, x=x: method(x), turns))  # type: ignore[misc]
     ours, fcl = (np.array(times[name]) for name in list(times)[:2])
     remarks = (
         f"{len(world.part_of)} bodies, {len(world.first)} pairs",
@@ -169,7 +169,7 @@ def nearest_rows(
 
 
 def tick_rows(arm: MountedArm, world: CollisionWorld) -> list[Row]:
-    """What one tick of each drive takes."""
+    """Return the rows with the time of one tick of each drive."""
     rows = []
     speed = np.append(arm.chain.speed, arm.gripper.speed)
     for name, ends in DRIVES.items():
@@ -193,7 +193,7 @@ def tick_rows(arm: MountedArm, world: CollisionWorld) -> list[Row]:
 
 
 def table(heading: str, rows: Sequence[Row]) -> str:
-    """The rows in Markdown."""
+    """Return the rows in Markdown."""
     lines = [f"| {heading} | median, µs | 95 %, µs | |", "|---|--:|--:|---|"]
     lines += [f"| {r.name} | {r.median:.0f} | {r.most:.0f} | {r.remark} |" for r in rows]
     return "\n".join(lines)

@@ -1,10 +1,10 @@
-"""What watchers cost whoever drives: from mouse event to drawn frame, alone and in a crowd.
+"""Effect of watchers on the driver: time from mouse event to drawn frame, alone and in a crowd.
 
     python -m benchmarks.crowd
 
-One person drags the gizmo in a real Chromium, by turns with nobody else there and with 31 watchers
-who take in every picture and say so 30 times a second, on one server and in one run. The watchers
-are a process of their own on the same machine. Times as in `benchmarks.drag_to_frame`.
+One person drags the gizmo in a real Chromium, alternately alone and with 31 watchers, on one server
+and in one run. The watchers receive every picture and acknowledge it 30 times a second. They run in
+a separate process on the same machine. Times as in `benchmarks.drag_to_frame`.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from tests.browser.server import APP
 
 WATCHERS = 31
 SETTLE = 6.0
-"""[s] In which the watchers take in the scene."""
+"""[s] Time in which the watchers receive the scene."""
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 async def gather(url: str, count: int) -> None:
-    """Watch until told to end by the end of standard input; then print pictures a second."""
+    """Watch until standard input ends; then print the pictures per second of each watcher."""
     pictures = [0]
     tasks = [asyncio.create_task(watch(url, pictures)) for _ in range(count)]
     await asyncio.sleep(SETTLE)
@@ -47,14 +47,14 @@ async def gather(url: str, count: int) -> None:
 
 
 def block(side: Side, moves: int) -> dict[str, list[float]]:
-    """Times [ms] of so many moves, after one that does not count."""
+    """Return the times [ms] of ``moves`` moves, after one that does not count."""
     side.move()
     timed = [side.move() for _ in range(moves)]
     return {span: [each[span] for each in timed] for span in SPANS}
 
 
 def crowded(side: Side, url: str, moves: int) -> tuple[dict[str, list[float]], float]:
-    """Likewise among the watchers; and how many pictures a second each of them saw."""
+    """Return the same times in a crowd, and the pictures per second that each watcher received."""
     command = [sys.executable, "-m", "benchmarks.crowd", "--url", url]
     with subprocess.Popen(
         command, cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -62,14 +62,14 @@ def crowded(side: Side, url: str, moves: int) -> tuple[dict[str, list[float]], f
         assert crowd.stdin is not None
         assert crowd.stdout is not None
         if crowd.stdout.readline().strip() != "watching":
-            raise SystemExit("the watchers did not come")
+            raise SystemExit("the watchers did not connect")
         times = block(side, moves)
         crowd.stdin.close()
         return times, float(crowd.stdout.readline())
 
 
 def main() -> None:
-    """Measure by turns and print."""
+    """Measure in turns and print."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     parser.add_argument("--moves", type=int, default=20, help="a turn (default: 20)")
     parser.add_argument("--turns", type=int, default=3, help="of each kind (default: 3)")

@@ -1,13 +1,13 @@
-// Times one mouse move at a time: the event, the message it brings back, the frame that shows it.
+// Measures one mouse move at a time: the event, the message it causes, the frame that shows it.
 (() => {
   "use strict";
   const MOVE_LIMIT = 10000; // ms
-  const SAME = 1e-9; // m and rotation entries: less is not a new pose
+  const SAME = 1e-9; // m, and rotation entries: a smaller change is not a new pose
 
   let prefixes = [];
   let lastChange = 0;
-  let mark = null; // {event, drawn} of the move under way, ms of performance.now()
-  const seen = new Map(); // name of a watched node: its matrix in the last frame
+  let mark = null; // {event, drawn} of the current move, ms of performance.now()
+  const seen = new Map(); // matrix of each watched node in the last frame, by name
 
   const isWatched = (name) =>
     prefixes.some((prefix) => name === prefix || name.startsWith(`${prefix}/`));
@@ -41,7 +41,7 @@
     });
   }
 
-  // Watches nodes below the prefixes; returns how many are shown now.
+  // Watches nodes below the prefixes; returns the number of nodes shown now.
   harness.watch = (below) => {
     prefixes = below;
     const { scene } = window.__viserMutable;
@@ -60,14 +60,14 @@
     return seen.size;
   };
 
-  // Waits until no watched node has moved for `quiet` ms, then times the next mouse move.
+  // Waits until no watched node has moved for `quiet` ms, then measures the next mouse move.
   harness.arm = async (quiet) => {
     const still = () => performance.now() - lastChange > quiet;
     await later(still, `the watched nodes do not come to rest: no ${quiet} ms without a new pose`);
     mark = {};
   };
 
-  // First message since a time (s) that gives a watched node another pose than it had.
+  // Returns the first message since a time (s) that changes the pose of a watched node.
   function firstNewPose(since) {
     const last = new Map();
     return harness.received.find(({ time, type, body }) => {
@@ -80,7 +80,7 @@
     });
   }
 
-  // ms from the mouse event to the message with a new pose of a watched node and to its frame.
+  // Returns ms from the mouse event to the message with a new pose of a watched node and its frame.
   harness.timed = async () => {
     await later(() => mark.drawn, "no watched node moved after the mouse did");
     const since = (performance.timeOrigin + mark.event) / 1000;

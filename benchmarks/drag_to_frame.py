@@ -1,10 +1,10 @@
-"""From the browser's mouse event to the drawn frame: the app beside a bare viser app.
+"""Time from the browser's mouse event to the drawn frame: the app beside a bare viser app.
 
-A real Chromium drags the gizmo of both by turns, in one run, so that both meet the same machine.
-Two times are taken for each move, from the time stamp that the browser gave the mouse event: to
-the decoded message that brings a new pose of a watched node, and to the end of the first frame
-that shows a watched node in a new pose. WebGL's draw calls are left out, because without a
-graphics card they take longer than all the rest; the scene graph is updated as ever.
+A real Chromium drags the gizmos of both in turn, in one run, so that both meet the same conditions.
+Two times are measured for each move, from the time stamp of the browser's mouse event. The first
+ends at the decoded message with a new pose of a watched node. The second ends with the first frame
+that shows a watched node in a new pose. WebGL's draw calls are left out, because without a graphics
+card they take longer than all the rest; the scene graph is updated as usual.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SPANS = {"message": "event → message", "drawn": "event → frame"}
 
 @dataclass
 class Side:
-    """One of the two apps under the mouse, and its times in milliseconds."""
+    """One of the two apps, and its times in milliseconds."""
 
     page: ViserPage
     grip: Grip
@@ -47,7 +47,7 @@ class Side:
     def move(self) -> dict[str, float]:
         """Move the gizmo once and return the milliseconds of each span."""
         self.page.frame.evaluate("(quiet) => harness.arm(quiet)", QUIET_MILLISECONDS)
-        # Else every move would meet the server's clocks at the same moment.
+        # Otherwise all moves would have the same phase relative to the server's clocks.
         self.page.page.wait_for_timeout(random.uniform(0.0, 50.0))
         self.moves += 1
         self.grip.to(STRIDE * (self.moves % 2))
@@ -58,7 +58,7 @@ class Side:
 def open_side(
     stack: ExitStack, browser: Browser, command: Sequence[str], prefixes: list[str], axis: Axis
 ) -> Side:
-    """Start an app, open a window on it and take its gizmo by an arrow."""
+    """Start an app, open a window on it and grip an arrow of its gizmo."""
     server = stack.enter_context(AppServer(command))
     page = stack.enter_context(closing(ViserPage.open(browser, server.url, nodes=[GIZMO])))
     page.frame.evaluate(SCRIPT.read_text(encoding="utf-8"))
@@ -69,7 +69,7 @@ def open_side(
 
 
 def measure(sides: Sequence[Side], moves: int) -> None:
-    """Fill in the times of each side, moving them by turns in random order."""
+    """Add the times of each side; the sides move in turn, in random order."""
     for number in range(WARM_UP + moves):
         for side in random.sample(sides, len(sides)):
             timed = side.move()
@@ -79,7 +79,7 @@ def measure(sides: Sequence[Side], moves: int) -> None:
 
 
 def summary(app: Side, bare: Side) -> dict[str, Any]:
-    """Quantiles in milliseconds and their ratios, app to bare app, by span."""
+    """Return quantiles in milliseconds and their ratios, app to bare app, by span."""
     result: dict[str, Any] = {}
     for span in SPANS:
         quantiles = {
@@ -103,7 +103,7 @@ def print_table(result: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    """Measure, print the table and write JSON where asked."""
+    """Measure, print the table, and write JSON if requested."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,10 +1,10 @@
-"""What the way through the gateway costs: each frame's delay and the processor's time.
+"""Cost of the path through the gateway: the delay of each frame, and processor time.
 
     python -m benchmarks.gateway
 
-A viser server turns seven links sixty times a second, in one atomic block as the app does. Clients
-take in everything, straight from viser and through the gateway by turns, and say what they have
-seen as our page does. A frame carries the time at which it was made, on the same clock.
+A viser server turns seven links sixty times a second, in one atomic block like the app. Clients
+receive everything, alternately from viser directly and through the gateway, and acknowledge it like
+the page. A frame carries the time of its creation, on the same clock.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class _Stamp(msgspec.Struct):
 
 
 def serve() -> None:
-    """The server's half: print both ports and turn the links until killed."""
+    """Run the server's half: print both ports and turn the links until killed."""
     server = open_server(KEY)
     frames = [server.scene.add_frame(f"/link{i}", show_axes=False) for i in range(LINKS)]
     address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
@@ -81,9 +81,9 @@ def serve() -> None:
 
 
 @asynccontextmanager
-async def client(ports: dict[str, int], way: str) -> AsyncIterator[ClientConnection]:
-    """A connection to viser's stream, straight or through the gateway."""
-    if way == "viser":
+async def client(ports: dict[str, int], route: str) -> AsyncIterator[ClientConnection]:
+    """Connect to viser's stream, directly or through the gateway."""
+    if route == "viser":
         direct = connect(
             f"ws://127.0.0.1:{ports['viser']}",
             subprotocols=[SUBPROTOCOL],
@@ -100,19 +100,19 @@ async def client(ports: dict[str, int], way: str) -> AsyncIterator[ClientConnect
         yield socket
 
 
-async def measure(ports: dict[str, int], way: str, size: int, seconds: float) -> list[float]:
-    """Delays [s] of the frames at ``size`` clients."""
+async def measure(ports: dict[str, int], route: str, size: int, seconds: float) -> list[float]:
+    """Return the delays [s] of the frames at ``size`` clients."""
     delays: list[float] = []
 
     async def watch(socket: ClientConnection) -> None:
         unpack = zstandard.ZstdDecompressor()
-        started, told, count = time.perf_counter(), 0.0, 0
+        started, acknowledged, count = time.perf_counter(), 0.0, 0
         async for frame in socket:
             now = time.perf_counter()
             count += 1
             assert isinstance(frame, bytes)
-            if way == "gateway" and now - told > 0.05:
-                told = now
+            if route == "gateway" and now - acknowledged > 0.05:
+                acknowledged = now
                 await socket.send(msgspec.msgpack.encode({"type": "Seen", "count": count}))
             if now - started > WARM_UP:
                 body = unpack.decompress(frame[16 : 16 + int.from_bytes(frame[8:16], "little")])
@@ -121,7 +121,7 @@ async def measure(ports: dict[str, int], way: str, size: int, seconds: float) ->
                 return
 
     async with AsyncExitStack() as stack:
-        sockets = [await stack.enter_async_context(client(ports, way)) for _ in range(size)]
+        sockets = [await stack.enter_async_context(client(ports, route)) for _ in range(size)]
         await asyncio.gather(*(watch(socket) for socket in sockets))
     return delays
 
@@ -132,7 +132,7 @@ def main() -> None:
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--clients", type=int, nargs="+", default=[1, 8])
     parser.add_argument("--seconds", type=float, default=6.0, help="of each turn (default: 6)")
-    parser.add_argument("--turns", type=int, default=3, help="of each way (default: 3)")
+    parser.add_argument("--turns", type=int, default=3, help="of each route (default: 3)")
     options = parser.parse_args()
     if options.serve:
         serve()
@@ -146,17 +146,17 @@ def main() -> None:
                 costs: dict[str, list[float]] = {"viser": [], "gateway": []}
                 delays: dict[str, list[float]] = {"viser": [], "gateway": []}
                 for _ in range(options.turns):
-                    for way, cost in costs.items():
+                    for route, cost in costs.items():
                         before, started = cpu_seconds([server.pid]), time.perf_counter()
-                        delays[way] += asyncio.run(measure(ports, way, size, options.seconds))
+                        delays[route] += asyncio.run(measure(ports, route, size, options.seconds))
                         took = time.perf_counter() - started
                         cost.append((cpu_seconds([server.pid]) - before) / took)
-                for way, cost in costs.items():
-                    p50, p95 = np.percentile(delays[way], (50, 95))
+                for route, cost in costs.items():
+                    p50, p95 = np.percentile(delays[route], (50, 95))
                     print(
-                        f"{size:2} clients, {way:7}: {1e3 * p50:6.2f} ms p50, {1e3 * p95:6.2f} ms "
-                        f"p95, {100 * statistics.median(cost):5.1f} % of a core, "
-                        f"{len(delays[way])} frames"
+                        f"{size:2} clients, {route:7}: {1e3 * p50:6.2f} ms p50, "
+                        f"{1e3 * p95:6.2f} ms p95, {100 * statistics.median(cost):5.1f} % of a "
+                        f"core, {len(delays[route])} frames"
                     )
         finally:
             server.kill()

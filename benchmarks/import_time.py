@@ -1,9 +1,9 @@
-"""How long ``import katana450`` takes, and its first call, beside ``import numpy``.
+"""Time of ``import katana450`` and of a first call, beside ``import numpy``.
 
     python -m benchmarks.import_time
 
-Every import is in a fresh process that times itself; the processes take turns, and each time is
-divided by that of numpy in the same round. The start of Python is not counted.
+Every import runs in a fresh process that measures itself. The processes take turns, and each time
+is divided by that of numpy in the same round. The start of Python is not counted.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ REFERENCE = "`import numpy`"
 ROUNDS = 9
 
 
-def seconds(words: str) -> float:
-    """Return the time that ``words`` take in a fresh process [s]."""
-    timed = f"import time; t = time.perf_counter(); {words}; print(time.perf_counter() - t)"
+def seconds(statement: str) -> float:
+    """Return the time that ``statement`` take in a fresh process [s]."""
+    timed = f"import time; t = time.perf_counter(); {statement}; print(time.perf_counter() - t)"
     done = subprocess.run(
         [sys.executable, "-c", timed], capture_output=True, text=True, check=True, timeout=120
     )
@@ -42,15 +42,15 @@ def measured(rounds: int, cases: Mapping[str, str] = CASES) -> dict[str, list[fl
     """Return the times of each case [s], round by round; a first round warms the files."""
     times: dict[str, list[float]] = {name: [] for name in cases}
     for number in range(rounds + 1):
-        for name, words in cases.items():
-            time = seconds(words)
+        for name, statement in cases.items():
+            time = seconds(statement)
             if number:
                 times[name].append(time)
     return times
 
 
 def rows(times: dict[str, list[float]]) -> list[str]:
-    """Return the table as it stands in docs/benchmarks.md."""
+    """Return the lines of the table in docs/benchmarks.md."""
     lines = ["| | s, median | s, least | × numpy |", "|---|--:|--:|--:|"]
     for name, each in times.items():
         ratios = [a / b for a, b in zip(each, times[REFERENCE], strict=True)]

@@ -1,9 +1,9 @@
 """Inverse kinematics of the Katana450: the app beside other libraries, and beside plain C.
 
-Every solver gets the same seeded poses, the tool's at random joint angles inside the limits. Each
-runs in a process of its own, and the peers in environments of their own. Block by block all of them
-solve the same poses, one solver at a time in random order, so that all meet the same machine; a
-block is repeated for a while and its quickest pass counts. Ratios are taken within blocks.
+Every solver gets the same seeded poses, those of the tool at random joint angles inside the limits.
+Each runs in a separate process, and the peers in separate environments. All solve the same poses
+block by block, one solver at a time in random order, so that all meet the same conditions. A block
+is repeated for a while, and its quickest pass counts. Ratios are computed within blocks.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ FLOOR = "floor"
 
 @dataclass(frozen=True)
 class Entry:
-    """A solver of the benchmark: its name, what a reader calls it, the peer that it needs."""
+    """A solver of the benchmark: its name, its title for readers, and the peer that it needs."""
 
     name: str
     title: str
@@ -69,7 +69,7 @@ BATCH = (
 
 
 def seeded_task(poses: int, seed: int) -> tuple[Chain, Task]:
-    """The arm of the URDF with its default tool, and `poses` poses it can reach."""
+    """Return the arm of the URDF with its default tool, and a task of `poses` reachable poses."""
     chain = load().require_arm().chain
     q = np.random.default_rng(seed).uniform(chain.lower, chain.upper, (poses, chain.n))
     points = np.array([screws.point_on(S) for S in chain.S.T] + [chain.M[:3, 3]])
@@ -84,7 +84,7 @@ def seeded_task(poses: int, seed: int) -> tuple[Chain, Task]:
 
 
 class Bench:
-    """All solvers that start, and the reasons of those that do not."""
+    """All running solvers, and the reasons of those that failed."""
 
     def __init__(self, stack: ExitStack, entries: Sequence[Entry], task_file: Path, peers: Path):
         self.failed: dict[str, str] = {}
@@ -108,7 +108,7 @@ class Bench:
                 self.running[entry.name] = stack.enter_context(process)
 
     def seconds(self, entry: Entry, block: tuple[int, int] | None) -> float:
-        """Of one block, or of all poses in one call; NaN once the solver has failed."""
+        """Return the time [s] of one block, or of all poses in one call; NaN after a failure."""
         process = self.running.get(entry.name)
         if process is None:
             return float("nan")
@@ -122,7 +122,7 @@ class Bench:
     def rounds(
         self, entries: Sequence[Entry], blocks: Sequence[tuple[int, int] | None], poses: int
     ) -> dict[str, FloatArray]:
-        """Microseconds a pose of each entry in each block."""
+        """Return the microseconds per pose of each entry in each block."""
         taken: dict[str, list[float]] = {entry.name: [] for entry in entries}
         for number, block in enumerate(blocks, start=1):
             print(f"Round {number} of {len(blocks)} ...", file=sys.stderr)
@@ -139,7 +139,7 @@ class Bench:
         chain: Chain,
         task: Task,
     ) -> list[Row]:
-        """A row for each entry, those that failed with the reason."""
+        """Return a row for each entry; failed ones have the reason."""
         rows = []
         reference = times.get(against, np.array(np.nan))
         for entry in entries:
@@ -160,7 +160,7 @@ class Bench:
 
 
 def measure(poses: int, blocks: int, seed: int, peers: Path, names: Sequence[str]) -> Tables:
-    """Run everything."""
+    """Run all solvers and return the tables."""
     chain, task = seeded_task(poses, seed)
     single = [entry for entry in ONE_BY_ONE if entry.name in names]
     batch = [entry for entry in BATCH if entry.name in names]
@@ -187,7 +187,7 @@ def measure(poses: int, blocks: int, seed: int, peers: Path, names: Sequence[str
 
 
 def main() -> None:
-    """Measure, print the tables, and write them where asked."""
+    """Measure, print the tables, and write them to files if requested."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,8 +1,8 @@
-/* The closed form of app/katana450/maths/kinematics in plain C, as the floor of what the arithmetic costs.
+/* The closed form of app/katana450/maths/kinematics in plain C, as a lower bound of the cost.
  *
  * theta1 from the tool point, theta3 from the wrist's distance, theta2 from its direction, theta4
- * and theta5 from the tool's orientation; every angle an atan2, both shoulders and both elbows,
- * each angle in the turn that fits the limits. Lengths in m, angles in rad.
+ * and theta5 from the tool's orientation. Every angle is an atan2, for both shoulders and both
+ * elbows, in the turn that fits the limits. Lengths in m, angles in rad.
  */
 
 #include <math.h>
@@ -64,11 +64,11 @@ void inverse_batch(const double *l, const double *lower, const double *upper, do
         const double folded2 = positive((rho - near) * (rho + near));
         const double product = sqrt(stretched2 * folded2);
         const double bend = 2.0 * atan2(sqrt(stretched2), sqrt(folded2));
-        /* cos and sin of bend, both times stretched2 + folded2. */
+        /* bearing uses cos and sin of bend, both times stretched2 + folded2. */
         const double bearing = atan2(2.0 * l2 * product,
                                      l1 * (folded2 + stretched2) + l2 * (folded2 - stretched2));
 
-        /* With the back to the pose c and s change sign, which mirrors three of the angles. */
+        /* With the shoulder to the back c and s change sign, which mirrors three of the angles. */
         const double wrist0 = atan2(v, u);
         const double phi0 = atan2(-r31, c0 * r11 + s0 * r21);
         const double roll0 = atan2(s0 * r13 - c0 * r23, c0 * r22 - s0 * r12);

@@ -1,4 +1,4 @@
-"""The app's own inverse kinematics under the benchmark, and the same closed form in C."""
+"""Solvers for the benchmark: the app's own inverse kinematics, and the same closed form in C."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FLOOR_FLAGS = ("-O3", "-shared", "-fPIC")
 
 
 def chain_of(task: Task) -> Chain:
-    """The task's arm as the app sees it."""
+    """Return the task's arm as a chain of the app."""
     points = np.cumsum(task.offsets, axis=0)
     M = np.eye(4)
     M[:3, 3] = points[-1]
@@ -50,15 +50,19 @@ class Katana450:
         self._chain = chain_of(task)
 
     def solve(self, T: FloatArray) -> Any:
+        """Return all solutions for the pose ``T`` (4, 4)."""
         return inverse(self._chain, T)
 
     def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, 5) [rad] of ``found``."""
         return np.array([solution.q for solution in found]).reshape(-1, 5)
 
     def solve_batch(self, T: FloatArray) -> Any:
+        """Return all solutions for the poses ``T`` (N, 4, 4)."""
         return inverse_batch(self._chain, T)
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
+        """Return the joint angles (k, 5) [rad] of each pose in ``found``."""
         return list(found.q)
 
 
@@ -71,9 +75,11 @@ class Bare:
         self._solve = Solver.of(chain_of(task)).solve
 
     def solve(self, T: FloatArray) -> Any:
+        """Return all solutions for the pose ``T`` (4, 4)."""
         return self._solve(T.tolist())
 
     def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, 5) [rad] of ``found``."""
         return np.array(found)
 
 
@@ -94,16 +100,18 @@ class Floor:
         self._function.restype = None
 
     def solve_batch(self, T: FloatArray) -> Any:
+        """Return all solutions (N, 4, 5) for the poses ``T`` (N, 4, 4)."""
         q, inside = np.empty((len(T), 4, 5)), np.empty((len(T), 4), dtype=np.uint8)
         self._function(*self._arm, tolerances.LIMIT_SLACK, T, len(T), q, inside)
         return q
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
+        """Return the joint angles (4, 5) [rad] of each pose in ``found``."""
         return list(found)
 
 
 def compiler() -> str:
-    """The C compiler of this machine; RuntimeError when there is none."""
+    """Return the path of the C compiler of this machine. Raises RuntimeError if there is none."""
     found = shutil.which("cc")
     if found is None:
         raise RuntimeError("there is no C compiler `cc` on this machine")
@@ -111,6 +119,7 @@ def compiler() -> str:
 
 
 def compiler_version() -> str:
+    """Return the version of the C compiler."""
     done = subprocess.run([compiler(), "--version"], capture_output=True, text=True, check=True)
     return done.stdout.splitlines()[0]
 

@@ -1,7 +1,7 @@
-"""Other inverse kinematics, each as its own manual has it used, set to reach the task's accuracy.
+"""Other inverse kinematics, each used as in its manual, set to reach the accuracy of the task.
 
-The iterative ones start in the middle of the joints' range, and anew at random inside the limits
-where that leads nowhere. What they cost on the way is counted.
+The iterative ones start in the middle of the joints' range. If this fails, they start again at
+random angles inside the limits. The cost of failed starts is counted.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import numpy as np
 
 from benchmarks.kinematics_task import SOLVED_POSITION, SOLVED_ROTATION, FloatArray, Task
 
-# An iteration stops an order below what counts as solved.
+# An iteration stops an order of magnitude below the error of a solved pose.
 _CLOSE_POSITION = 0.1 * SOLVED_POSITION
 _CLOSE_ROTATION = 0.1 * SOLVED_ROTATION
 
 
 class Eaik:
-    """Subproblem decomposition in C++; all branches, limits left to the caller."""
+    """Subproblem decomposition in C++; it returns all branches and ignores limits."""
 
     package = "EAIK"
 
@@ -32,16 +32,20 @@ class Eaik:
             raise RuntimeError("EAIK has no decomposition for this arm")
 
     def solve(self, T: FloatArray) -> Any:
+        """Return all solutions for the pose ``T`` (4, 4)."""
         return self._robot.IK(T)
 
     def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, 5) [rad] of the exact solutions in ``found``."""
         exact = [q for q, rough in zip(found.Q, found.is_LS, strict=True) if not rough]
         return np.array(exact, dtype=np.float64).reshape(-1, 5)
 
     def solve_batch(self, T: FloatArray) -> Any:
+        """Return all solutions for the poses ``T`` (N, 4, 4)."""
         return self._robot.IK_batched(T, self._workers)
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
+        """Return the joint angles (k, 5) [rad] of each pose in ``found``."""
         return [self.joints(each) for each in found]
 
 
@@ -73,18 +77,20 @@ class RoboticsToolbox:
                 yield move(float(length))
 
     def solve(self, T: FloatArray) -> Any:
-        # Its tolerance is on half the squared error: 1e-13 is 0.4 um. Of its damping methods and
-        # gains this is the quickest on this arm that solves every pose.
+        """Return the solution for the pose ``T`` (4, 4)."""
+        # The tolerance applies to half the squared error: 1e-13 is 0.4 um. This damping method and
+        # gain are the quickest on this arm that solve every pose.
         return self._chain.ik_LM(
             T, q0=self._start, tol=1e-13, method="chan", k=0.1, joint_limits=self._limits
         )
 
     def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (1, 5) [rad] of ``found``."""
         return np.array(found.q, dtype=np.float64).reshape(1, 5)
 
 
 class Pinocchio:
-    """The damped Gauss-Newton loop of its inverse kinematics example, steps in C++."""
+    """The damped Gauss-Newton loop of its inverse kinematics example, with steps in C++."""
 
     package = "pin"
     _STARTS, _STEPS, _DAMPING = 20, 60, 1e-8
@@ -105,6 +111,7 @@ class Pinocchio:
         self._starts = task.starts(self._STARTS)
 
     def solve(self, T: FloatArray) -> Any:
+        """Return joint angles (5,) [rad] for the pose ``T`` (4, 4)."""
         pin, model, data, tool = self._pin, self._model, self._data, self._tool
         goal = pin.SE3(T)
         q = self._starts[0]
@@ -124,11 +131,12 @@ class Pinocchio:
         return q
 
     def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (1, 5) [rad] of ``found``."""
         return np.array(found, dtype=np.float64).reshape(1, 5)
 
 
 class Mink:
-    """Differential kinematics as a quadratic program on MuJoCo, repeated until it is there."""
+    """Differential kinematics as a quadratic program on MuJoCo, repeated until it converges."""
 
     package = "mink"
     _STARTS, _STEPS = 40, 12
@@ -143,6 +151,7 @@ class Mink:
         self._starts = task.starts(self._STARTS)
 
     def solve(self, T: FloatArray) -> Any:
+        """Return joint angles (5,) [rad] for the pose ``T`` (4, 4)."""
         mink, arm = self._mink, self._arm
         self._task.set_target(mink.SE3.from_matrix(T))
         for start in self._starts:
@@ -160,6 +169,7 @@ class Mink:
         return arm.q.copy()
 
     def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (1, 5) [rad] of ``found``."""
         return np.array(found, dtype=np.float64).reshape(1, 5)
 
 
@@ -170,7 +180,7 @@ class Ikpy:
     _STARTS = 5
 
     def __init__(self, task: Task) -> None:
-        # It warns that its first and last link, which do not move, are marked as such.
+        # ikpy warns that its fixed first and last links are marked as fixed.
         warnings.simplefilter("ignore")
         link = import_module("ikpy.link")
         limits = zip(task.lower, task.upper, strict=True)
@@ -199,6 +209,7 @@ class Ikpy:
         self._starts = [np.array([0.0, *q, 0.0]) for q in task.starts(self._STARTS)]
 
     def solve(self, T: FloatArray) -> Any:
+        """Return the angles of all links, fixed ones included, for the pose ``T`` (4, 4)."""
         q = self._starts[0]
         for start in self._starts:
             q = self._chain.inverse_kinematics_frame(
@@ -209,17 +220,18 @@ class Ikpy:
         return q
 
     def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (1, 5) [rad] of ``found``."""
         return np.array(found[1:-1], dtype=np.float64).reshape(1, 5)
 
 
 def _is_close(error: FloatArray) -> bool:
-    """Whether an error (6,), linear part first, is small enough to stop at."""
+    """Return whether an error (6,), linear part first, is small enough to stop."""
     linear, angular = error[:3], error[3:]
     return bool(linear @ linear < _CLOSE_POSITION**2 and angular @ angular < _CLOSE_ROTATION**2)
 
 
 def _mjcf(task: Task) -> str:
-    """The arm as MuJoCo reads it; masses count for nothing here, but it wants some."""
+    """Return the arm as MuJoCo XML; MuJoCo requires masses, although they have no effect here."""
 
     def text(values: FloatArray) -> str:
         return " ".join(repr(float(value)) for value in values)

@@ -1,4 +1,4 @@
-"""The benchmark's end of the pipe to a solver in a process of its own."""
+"""The benchmark's end of the pipe to a solver in a separate process."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ import numpy as np
 
 from benchmarks.kinematics_task import FloatArray
 
-PATIENCE = 300.0  # s for one answer; the slowest solver takes a few seconds a block
+ANSWER_TIMEOUT = 300.0  # s; the slowest solver takes a few seconds per block
 
 
 class SolverError(Exception):
-    """A solver could not be started, or stopped answering; says why."""
+    """A solver could not be started or stopped answering; the message says why."""
 
 
 class SolverProcess:
-    """A running solver. One thread each in numerical libraries: a solve is no work for more."""
+    """A running solver. Numerical libraries get one thread: a solve is too short for more."""
 
     def __init__(self, python: Path, name: str, task_file: Path, root: Path) -> None:
         threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
-        # The process ends with its stdin, so it is closed in __exit__ and not here.
+        # Closing stdin ends the process, so __exit__ closes it.
         self._process = subprocess.Popen(
             [str(python), "-m", "benchmarks.kinematics_worker", name, str(task_file)],
             stdin=subprocess.PIPE,
@@ -55,15 +55,15 @@ class SolverProcess:
         self._end()
 
     def solve(self, first: int, last: int) -> float:
-        """Seconds to solve these poses one by one."""
+        """Return the seconds to solve the poses from ``first`` to before ``last`` one by one."""
         return float(self._ask({"solve": [first, last]})["seconds"])
 
     def batch(self) -> float:
-        """Seconds to solve all poses in one call."""
+        """Return the seconds to solve all poses in one call."""
         return float(self._ask({"batch": True})["seconds"])
 
     def answers(self) -> list[FloatArray]:
-        """(k, 5) for each pose, as last solved [rad]."""
+        """Return the last answers (k, 5) [rad] for each pose."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "answers.npz"
             self._ask({"save": str(path)})
@@ -81,9 +81,9 @@ class SolverProcess:
 
     def _answer(self) -> dict[str, Any]:
         assert self._process.stdout is not None
-        ready, _, _ = select.select([self._process.stdout], [], [], PATIENCE)
+        ready, _, _ = select.select([self._process.stdout], [], [], ANSWER_TIMEOUT)
         if not ready:
-            raise SolverError(f"no answer within {PATIENCE:.0f} s")
+            raise SolverError(f"no answer within {ANSWER_TIMEOUT:.0f} s")
         line = self._process.stdout.readline()
         if not line:
             raise SolverError(f"its process ended with status {self._process.wait()}")

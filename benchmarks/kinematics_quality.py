@@ -1,4 +1,4 @@
-"""How right the answers of a solver are, measured alike for all by the app's forward kinematics."""
+"""Accuracy of the answers of a solver, always measured by the app's forward kinematics."""
 
 from __future__ import annotations
 
@@ -18,11 +18,14 @@ _SAME_ANGLES = 1e-6  # rad; answers nearer than this in every joint are one bran
 
 @dataclass(frozen=True)
 class Quality:
-    """Over all poses.
+    """The accuracy over all poses.
 
-    solved: fraction of poses with an answer that is right. worst: greatest position error of any
-    answer given as exact [m]. branches, inside: distinct right answers a pose, and how many of them
-    lie inside the limits. usable: fraction of poses with one that does.
+    Attributes:
+        solved: fraction of poses with a correct answer.
+        worst: maximum position error of all answers given as exact [m].
+        branches: number of distinct correct answers per pose.
+        inside: number of those inside the limits.
+        usable: fraction of poses with a correct answer inside the limits.
     """
 
     solved: float
@@ -33,16 +36,16 @@ class Quality:
 
 
 def quality(chain: Chain, T: FloatArray, answers: Sequence[FloatArray]) -> Quality:
-    """Of `answers`, (k, 5) [rad] for each pose of `T` (N, 4, 4)."""
-    # Within one turn of it every angle inside the limits is nearest to their middle.
+    """Return the quality of `answers`, (k, 5) [rad] for each pose of `T` (N, 4, 4)."""
+    # An angle inside the limits is the one nearest to their middle among its whole turns.
     middle = 0.5 * (chain.lower + chain.upper)
     worst, branches, inside = 0.0, [], []
-    for asked, candidates in zip(T, answers, strict=True):
+    for target, candidates in zip(T, answers, strict=True):
         right: list[FloatArray] = []
         for q in candidates:
             reached = forward(chain, q)
-            position = math.dist(reached[:3, 3], asked[:3, 3])
-            rotation = so3.angle(reached[:3, :3], asked[:3, :3])
+            position = math.dist(reached[:3, 3], target[:3, 3])
+            rotation = so3.angle(reached[:3, :3], target[:3, :3])
             worst = max(worst, position)
             if position <= SOLVED_POSITION and rotation <= SOLVED_ROTATION:
                 turned = q - math.tau * np.rint((q - middle) / math.tau)

@@ -1,4 +1,4 @@
-"""The benchmark's figures as tables for people and as a record for programs."""
+"""The results of the benchmark as tables for people and as a record for programs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ END = "<!-- kinematics: end -->"
 
 @dataclass(frozen=True)
 class Machine:
-    """Where the figures were taken. load: 1-minute load average before and after."""
+    """The machine of the measurement. load: 1-minute load average before and after."""
 
     processor: str
     cores: int
@@ -31,7 +31,10 @@ class Machine:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One solver: microseconds a pose and their ratio to the reference, by block; or why none."""
+    """The results of one solver by block: microseconds per pose and their ratio to the reference.
+
+    ``failed``: the reason if there are no results.
+    """
 
     title: str
     version: str = ""
@@ -43,7 +46,7 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """Everything that one run found."""
+    """All results of one run."""
 
     poses: int
     blocks: int
@@ -94,7 +97,7 @@ def _found(row: Row) -> Quality:
 
 
 def _fraction(value: float) -> str:
-    # Rounded down: 100 % is said only of all.
+    # Rounded down, so that 100 % always means all.
     return "100 %" if value == 1.0 else f"{np.floor(1e4 * value) / 1e2:.2f} %"
 
 
@@ -118,7 +121,7 @@ def _table(
 
 
 def markdown(tables: Tables) -> str:
-    """Both tables, with what they were measured on."""
+    """Return both tables with the conditions of the measurement."""
     machine = tables.machine
     before, after = machine.load
     conditions = (
@@ -143,7 +146,7 @@ def markdown(tables: Tables) -> str:
 
 
 def text(tables: Tables) -> str:
-    """The same with aligned columns, for a terminal."""
+    """Return the same with aligned columns, for a terminal."""
     lines = []
     block: list[list[str]] = []
     for line in [*markdown(tables).splitlines(), ""]:
@@ -159,7 +162,7 @@ def text(tables: Tables) -> str:
 
 
 def _aligned(block: list[list[str]]) -> list[str]:
-    # A reason may be long; it takes the place of the figures and sets no width.
+    # A reason can be long. It stands in place of the figures and sets no width.
     full = [cells for cells in block if cells[-1]]
     widths = [max(map(len, column)) for column in zip(*full, strict=True)]
     return [
@@ -172,7 +175,7 @@ def _aligned(block: list[list[str]]) -> list[str]:
 
 
 def record(tables: Tables) -> dict[str, Any]:
-    """All figures and every single time as plain JSON values."""
+    """Return all figures and all single times as plain JSON values."""
 
     def plain(row: Row) -> dict[str, Any]:
         if row.failed:
@@ -198,7 +201,7 @@ def record(tables: Tables) -> dict[str, Any]:
 
 
 def write_into(path: Path, tables: Tables) -> None:
-    """Put the tables between the marks in a document; ValueError when it has none."""
+    """Write the tables between the marks in a document. Raises ValueError if it has no marks."""
     document = path.read_text(encoding="utf-8")
     if document.count(BEGIN) != 1 or document.count(END) != 1:
         raise ValueError(f"{path} must hold the lines {BEGIN} and {END} once each")
@@ -208,7 +211,7 @@ def write_into(path: Path, tables: Tables) -> None:
 
 
 def processor() -> str:
-    """The processor's name as the system gives it."""
+    """Return the processor's name as the system gives it."""
     info = Path("/proc/cpuinfo")
     if info.exists():
         for line in info.read_text(encoding="utf-8").splitlines():

@@ -1,4 +1,4 @@
-"""What every solver of the benchmark is given: one arm and the same poses, handed over by file.
+"""Input of all solvers of the benchmark: one arm and the same poses, passed by file.
 
 Nothing here imports the app, so that a solver can run in an environment without it.
 """
@@ -22,9 +22,12 @@ SOLVED_ROTATION = 1e-5  # rad
 class Task:
     """The arm, and the poses to solve for.
 
-    axes: (5, 3) unit joint directions at q = 0. offsets: (6, 3) from the frame's origin to axis 1,
-    from each axis to the next, from axis 5 to the tool point [m]. lower, upper: (5,) limits [rad].
-    T: (N, 4, 4) poses of the tool, which is parallel to the frame at q = 0 [m].
+    Attributes:
+        axes: (5, 3) unit joint directions at q = 0.
+        offsets: (6, 3) from the frame's origin to axis 1, from each axis to the next, from axis 5
+            to the tool point [m].
+        lower, upper: (5,) limits [rad].
+        T: (N, 4, 4) poses of the tool, which is parallel to the frame at q = 0 [m].
     """
 
     axes: FloatArray
@@ -34,21 +37,26 @@ class Task:
     T: FloatArray
 
     def save(self, path: Path) -> None:
+        """Write the task to ``path``."""
         np.savez(path, **vars(self))
 
     @staticmethod
     def load(path: Path) -> Task:
+        """Read a task that ``save`` wrote."""
         with np.load(path) as arrays:
             return Task(**{name: arrays[name] for name in arrays.files})
 
     @property
     def middle(self) -> FloatArray:
-        """(5,) the middle of the joints' range, where iterative solvers start."""
+        """(5,) middle of the joints' range [rad], where iterative solvers start."""
         return 0.5 * (self.lower + self.upper)
 
     @property
     def letters(self) -> str:
-        """The axes as letters, such as zyyyx; ValueError for one along no axis of the frame."""
+        """The axes as letters, such as zyyyx.
+
+        Raises ValueError if one is along no axis of the frame.
+        """
         letters = ["xyz"[int(np.argmax(axis))] for axis in self.axes]
         if any(
             axis["xyz".index(name)] != 1.0 for axis, name in zip(self.axes, letters, strict=True)
@@ -57,18 +65,20 @@ class Task:
         return "".join(letters)
 
     def starts(self, count: int, seed: int = 0) -> list[FloatArray]:
-        """Where an iterative solver starts and starts again: the middle, then `count` at random."""
+        """Return the starts of an iterative solver: the middle, then `count` at random."""
         rng = np.random.default_rng(seed)
         return [self.middle, *rng.uniform(self.lower, self.upper, (count, 5))]
 
 
 class Solver(Protocol):
-    """One solver. Only `solve` is timed; it returns whatever the library returns."""
+    """One solver. Only `solve` is timed; it returns the value of the library unchanged."""
 
     package: str
 
-    def solve(self, T: FloatArray) -> Any: ...
+    def solve(self, T: FloatArray) -> Any:
+        """Return the library's answer for the pose ``T`` (4, 4)."""
+        ...
 
     def joints(self, found: Any) -> FloatArray:
-        """(k, 5) every exact answer in what `solve` returned [rad]; k may be 0."""
+        """Return every exact answer (k, 5) [rad] in the result of `solve`; k may be 0."""
         ...

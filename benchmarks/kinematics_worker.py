@@ -1,7 +1,8 @@
-"""One solver of the benchmark in a process of its own, at the other end of a pipe.
+"""One solver of the benchmark in a separate process, at the other end of a pipe.
 
-A line in: `{"solve": [first, last]}` or `{"batch": true}`; a line out: what it took. In the end
-`{"save": path}` writes the answers. Each line is JSON. What a library prints goes to stderr.
+A line `{"solve": [first, last]}` or `{"batch": true}` is answered by a line with the time it took.
+At the end `{"save": path}` writes the answers. Each line is JSON. Output of libraries goes to
+stderr.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ import numpy as np
 
 from benchmarks.kinematics_task import FloatArray, Task
 
-# One block is solved again until this much time has gone by, and the quickest pass counts.
-LEAST_TIME = 0.02  # s
+# One block is solved repeatedly for at least this time, and the quickest pass counts.
+MIN_TIME = 0.02  # s
 
 
 def _own(name: str) -> Callable[[Task], Any]:
-    # The app is imported only where it is there.
+    # Imported here, because the environments of the peers do not have the app.
     from benchmarks import kinematics_own
 
     solver: Callable[[Task], Any] = getattr(kinematics_own, name)
@@ -59,39 +60,39 @@ class Bench:
 
     def __init__(self, solver: Any, task: Task) -> None:
         self._solver = solver
-        # Each pose as the contiguous array a caller would have.
+        # Each pose is a contiguous array, as a caller would have it.
         self._poses = [np.ascontiguousarray(T) for T in task.T]
         self._batch = np.ascontiguousarray(task.T)
         self._answers: list[FloatArray] = [np.empty((0, 5))] * len(self._poses)
 
     def solve(self, first: int, last: int) -> float:
-        """Seconds for one pass over the poses from `first` to before `last`."""
+        """Return the seconds of the quickest pass over the poses from `first` to before `last`."""
         solve, poses = self._solver.solve, self._poses[first:last]
         quickest, found = _quickest(lambda: [solve(T) for T in poses])
         self._answers[first:last] = [self._solver.joints(each) for each in found]
         return quickest
 
     def solve_batch(self) -> float:
-        """Seconds for all poses in one call."""
+        """Return the seconds for all poses in one call."""
         quickest, found = _quickest(lambda: self._solver.solve_batch(self._batch))
         self._answers = self._solver.joints_batch(found)
         return quickest
 
     def save(self, path: Path) -> None:
-        """Every answer as one array q (K, 5), and how many belong to each pose."""
+        """Write all answers as one array q (K, 5), with the number of answers of each pose."""
         counts = np.array([len(q) for q in self._answers])
         np.savez(path, q=np.concatenate(self._answers), counts=counts)
 
 
 def _quickest(run: Callable[[], Any]) -> tuple[float, Any]:
-    """The least seconds of one run, of as many as fit in a little while, and its first result."""
+    """Return the minimum seconds of several runs within MIN_TIME, and the first result."""
     gc.collect()
     gc.disable()
     try:
         start = perf_counter()
         result = run()
         quickest = spent = perf_counter() - start
-        while spent < LEAST_TIME:
+        while spent < MIN_TIME:
             start = perf_counter()
             run()
             once = perf_counter() - start
@@ -114,7 +115,7 @@ def _version(package: str) -> str:
 
 def main(name: str, task_file: str) -> int:
     """Answer requests until stdin ends."""
-    # The pipe is for answers alone: libraries that print must not break a line of it.
+    # Only answers may go to the pipe, so the output of libraries goes to stderr.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 

@@ -1,14 +1,14 @@
-"""What the control loop and STOP feel of a crowd: watchers, floods, slow readers, hostile messages.
+"""Effect of a crowd on the control loop and STOP: watchers, floods, slow readers, hostile messages.
 
     python -m benchmarks.load
 
-A program swings the arm all the time. In turn there are: nobody else; 32 watchers who say 30 times
-a second what they have seen; senders who flood the server; readers who read nothing; senders of
-messages no page can have sent; connections that say nothing; thirty programs of one person that
-together ask for the branches twelve thousand times a second. Of each turn are printed how late the
-control loop's ticks came (the server's own count) and how long a STOP takes: until the first tick
-known to brake, which includes the way to the server, and until the program that said it knows. Both
-processes read one clock. A connection that is lost is printed as such, and the next turn follows.
+A program swings the arm all the time. The turns are: no other clients; 32 watchers who acknowledge
+pictures 30 times a second; senders that flood the server; readers that read nothing; senders of
+messages that no page can send; silent connections; thirty programs of one person that together ask
+for the branches twelve thousand times a second. Each turn prints how late the control loop's ticks
+were (the server's own count) and how long a STOP takes: until the first tick known to brake, which
+includes the path to the server, and until the sender knows it. Both processes read one clock. A
+lost connection is printed, and the next turn follows.
 """
 
 from __future__ import annotations
@@ -37,31 +37,31 @@ from tests.gateway.client import SUBPROTOCOL, Peer, enter, page_name, websocket
 
 WATCHERS = 32
 PICTURES = 30.0
-"""A second, of which each watcher says that it has seen them."""
+"""Pictures per second that each watcher acknowledges."""
 
 FLOODS, SLOW, HOSTILE = 2, 4, 2
 
 SILENT = 1100
-"""Connections that say nothing; each that is closed comes again."""
+"""Connections that send nothing; each that is closed is opened again."""
 
 ASKING, ASKED = 30, 390.0
-"""Programs that ask for the branches, and how many times a second each."""
+"""Programs that ask for the branches, and requests per second of each."""
 
 RECOVERY = MAX_DEBT / IDENTITY_BUDGET + 1.0
-"""[s] Between two turns."""
+"""[s] Pause between two turns."""
 
 TURN_SECONDS = 120.0
-"""[s] A turn that takes longer is given up."""
+"""[s] Timeout of a turn."""
 
 SWING = np.array((0.3, 0.15, 0.15, 0.2, 0.6))
-"""[rad] Of each joint about the ready posture."""
+"""[rad] Amplitude of each joint about the ready posture."""
 
 PERIOD = 4.0
-"""[s] Of the swing."""
+"""[s] Period of the swing."""
 
 
 async def swing(arm: AsyncClient) -> None:
-    """Move the arm for ever; after a STOP, go on."""
+    """Move the arm until cancelled; continue after a STOP."""
     ready = np.array((await arm.query(answers.Arm)).ready)
     await arm.ask(requests.Take() if await _held(arm) else requests.Acquire())
     while True:
@@ -77,19 +77,19 @@ async def _held(arm: AsyncClient) -> bool:
 
 
 async def watch(url: str, pictures: list[int]) -> None:
-    """See the scene as a browser does that draws ``PICTURES`` times a second, until cancelled."""
+    """Receive the scene like a browser that draws ``PICTURES`` times a second, until cancelled."""
     cookie = enter(url)
     path = f"/viser?page={page_name()}"
     count = 0
     async with websocket(url, path, cookie, subprotocols=[SUBPROTOCOL]) as socket:
 
         async def draw() -> None:
-            told = 0
+            acknowledged = 0
             while True:
                 await asyncio.sleep(1.0 / PICTURES)
-                if count > told:
-                    told = count
-                    await socket.send(msgspec.msgpack.encode({"type": "Seen", "count": told}))
+                if count > acknowledged:
+                    acknowledged = count
+                    await socket.send(msgspec.msgpack.encode({"type": "Seen", "count": count}))
 
         drawing = asyncio.create_task(draw())
         try:
@@ -101,33 +101,33 @@ async def watch(url: str, pictures: list[int]) -> None:
 
 
 async def flood(url: str) -> None:
-    """Say far too much, be sent away, come again."""
+    """Send far too many requests; connect again after each disconnection."""
     while not _ended():
-        # Whoever is sent away takes a moment to come again.
+        # A disconnected client waits a moment before it connects again.
         await asyncio.sleep(0.1)
         with suppress(ConnectionClosed, OSError):
             async with websocket(url, "/api/v1/socket?name=Flood", max_queue=None) as socket:
                 while True:
                     await socket.send('{"do": "query"}')
-                    # So that this process has time for the others it plays.
+                    # Let the other clients in this process run.
                     await asyncio.sleep(0.0)
 
 
 def _ended() -> bool:
-    # A connection that was about to fail can turn a cancellation into a TimeoutError.
+    # A failing connection can turn a cancellation into a TimeoutError.
     task = asyncio.current_task()
     return task is not None and task.cancelling() > 0
 
 
 async def crawl(url: str) -> None:
-    """Ask for all there is and read nothing."""
+    """Request all states and read nothing."""
     async with websocket(url, "/api/v1/socket?name=Slow", max_queue=1) as socket:
         await socket.send('{"do":"watch","hz":100}')
         await asyncio.sleep(math.inf)
 
 
 async def poison(url: str) -> None:
-    """Send viser what no page can have sent."""
+    """Send messages to viser that no page can send."""
     while not _ended():
         with suppress(ConnectionClosed, OSError):
             path = f"/viser?page={page_name()}"
@@ -140,7 +140,7 @@ async def poison(url: str) -> None:
 
 
 async def keep_silent(url: str) -> None:
-    """Hold SILENT connections open, and open those anew that the server closes."""
+    """Hold SILENT connections open, and open each again that the server closes."""
     address = (url.rpartition("/")[2].partition(":")[0], int(url.rpartition(":")[2]))
     writers: list[asyncio.StreamWriter] = []
     try:
@@ -156,7 +156,7 @@ async def keep_silent(url: str) -> None:
 
 
 async def inquire(url: str) -> None:
-    """Ask for the branches ASKED times a second; when sent away, come again."""
+    """Ask for the branches ASKED times a second; connect again after each disconnection."""
     while not _ended():
         await asyncio.sleep(0.2)
         with suppress(ConnectionClosed, OSError):
@@ -169,17 +169,17 @@ async def inquire(url: str) -> None:
 
 
 async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
-    """[s] from saying STOP until a tick brakes, and until a state tells so, each time."""
+    """Return [s] from sending STOP until a tick brakes, and until a state shows it, each time."""
     found: list[tuple[float, float]] = []
     states = arm.states(100.0)
     for _ in range(times):
         await arm.ask(requests.ClearStop())
         await asyncio.sleep(0.4)
-        said = time.perf_counter()
+        sent = time.perf_counter()
         await arm.tell(requests.Stop())
         async for state in states:
             if state.status == "stopped":
-                found.append((state.t - said, time.perf_counter() - said))
+                found.append((state.t - sent, time.perf_counter() - sent))
                 break
     await arm.ask(requests.ClearStop())
     return found
@@ -188,8 +188,8 @@ async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
 async def turn(
     url: str, name: str, others: list[Callable[[], Awaitable[None]]], stops: int
 ) -> None:
-    """One turn: print how late the ticks came, and how long a STOP took; or what was lost."""
-    # Without links all programs here share a budget, which a turn may have used up.
+    """Run one turn; print how late ticks were and how long a STOP took, or the error."""
+    # Without access links all programs here share one budget, which a turn can use up.
     await asyncio.sleep(RECOVERY)
     try:
         async with asyncio.timeout(TURN_SECONDS):
@@ -228,14 +228,14 @@ async def _alone(work: Awaitable[None]) -> None:
 
 
 async def crowd(url: str, stops: int) -> None:
-    """All turns."""
+    """Run all turns."""
     pictures = [0]
     watchers = [lambda: watch(url, pictures)] * WATCHERS
     await turn(url, "nobody else", [], stops)
-    # A turn begins with a pause in which nobody watches.
-    begun = time.monotonic() + RECOVERY
+    # A turn begins with a pause without watchers.
+    started = time.monotonic() + RECOVERY
     await turn(url, f"{WATCHERS} watchers", [*watchers], stops)
-    rate = pictures[0] / WATCHERS / (time.monotonic() - begun)
+    rate = pictures[0] / WATCHERS / (time.monotonic() - started)
     print(f"{'':20} {rate:.1f} pictures a second to each watcher")
     await turn(url, f"{FLOODS} who flood", [lambda: flood(url)] * FLOODS, stops)
     await turn(url, f"{SLOW} who read nothing", [lambda: crawl(url)] * SLOW, stops)
@@ -245,7 +245,7 @@ async def crowd(url: str, stops: int) -> None:
 
 
 def main() -> None:
-    """Start a server, load it, print."""
+    """Start a server, run all turns, print."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     parser.add_argument("--stops", type=int, default=40, help="of each turn (default: 40)")
     parser.add_argument("--url", help=argparse.SUPPRESS)
@@ -255,10 +255,10 @@ def main() -> None:
         return
     with AppServer(ATTENTIVE_APP) as server:
         root = Path(__file__).resolve().parents[1]
-        # Clients in a process of their own, so that they do not slow the server's threads.
+        # The clients run in a separate process, so that they do not slow the server's threads.
         command = [sys.executable, "-m", "benchmarks.load", "--url", server.url]
         stops = ("--stops", str(options.stops))
-        # One turn more than there are, for what the turns themselves do not bound.
+        # One turn more than there are, for time outside the turns.
         subprocess.run([*command, *stops], cwd=root, check=True, timeout=8.0 * TURN_SECONDS)
 
 

@@ -1,4 +1,4 @@
-"""An environment for each peer of a benchmark, so that none decides what another may need."""
+"""A separate environment for each peer of a benchmark, so that requirements cannot conflict."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ _LINES_OF_REASON = 3
 
 
 def prepare(folder: Path, peer: str) -> Path | str:
-    """The Python that has `peer`, installed under `folder` when missing; else why there is none."""
+    """Return the Python of an environment with `peer`; else the reason why there is none.
+
+    The environment is installed under `folder` if it is missing.
+    """
     home = folder / peer
     python = home / "bin" / "python"
     uv = [sys.executable, "-m", "uv"]
@@ -24,8 +27,8 @@ def prepare(folder: Path, peer: str) -> Path | str:
     for command in commands:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            said = done.stderr.strip().splitlines()[-_LINES_OF_REASON:]
-            return " ".join(" ".join(said).split()) or f"exit status {done.returncode}"
+            output = done.stderr.strip().splitlines()[-_LINES_OF_REASON:]
+            return " ".join(" ".join(output).split()) or f"exit status {done.returncode}"
     return python
 
 

@@ -1,10 +1,10 @@
-"""Pictures by katana450's own renderer beside the same pictures by VTK.
+"""Pictures of katana450's own renderer beside the same pictures of VTK.
 
     python -m benchmarks.pictures
 
-Both draw the same triangles, by day and by night: the arm at home, its table, and a cup of water.
-They take turns, each picture in a fresh process, and VTK has an environment of its own under
-``.venv-bench``. The pictures are kept, since the looks are for people to judge.
+Both draw the same triangles, in the light and the dark theme: the arm at home, its table, and a cup
+of water. They take turns, each picture in a fresh process. VTK has a separate environment under
+``.venv-bench``. The pictures are kept, so that people can compare them.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ from katana450.settings import Settings
 ROOT = Path(__file__).resolve().parents[1]
 OWN, VTK = "katana450", "VTK"
 FILLING = 2e-4
-"""[m3] Water in the cup."""
+"""[m3] Volume of the water in the cup."""
 
 TIMEOUT = 600.0
-"""[s] For one process."""
+"""[s] Timeout of one process."""
 
 
 def scenes(size: tuple[int, int]) -> dict[str, PictureScene]:
@@ -75,7 +75,7 @@ def scenes(size: tuple[int, int]) -> dict[str, PictureScene]:
 
 
 def renderers(peers: Path) -> dict[str, list[str]]:
-    """Return the command of each renderer that is there, without its arguments."""
+    """Return the command of each installed renderer, without its arguments."""
     found = {OWN: [sys.executable, "-m", "benchmarks.pictures_own"]}
     python = prepare(peers, "vtk")
     if isinstance(python, str):
@@ -86,7 +86,7 @@ def renderers(peers: Path) -> dict[str, list[str]]:
 
 
 def drawn(command: list[str], scene: Path, out: Path) -> dict[str, Any]:
-    """Have ``scene`` drawn into ``out`` and return what was measured; see `measured`."""
+    """Draw ``scene`` into the file ``out`` and return the measurements; see `measured`."""
     done = subprocess.run(
         [*command, str(scene), str(out), "1"],
         capture_output=True,
@@ -102,7 +102,7 @@ def drawn(command: list[str], scene: Path, out: Path) -> dict[str, Any]:
 
 
 def rows(results: Mapping[tuple[str, str], list[dict[str, Any]]]) -> list[str]:
-    """Return the table as it stands in docs/benchmarks.md."""
+    """Return the lines of the table in docs/benchmarks.md."""
     lines = [
         "| renderer | theme | s, median | s, least | s to load | same bytes | MB on disk |",
         "|---|---|--:|--:|--:|---|--:|",

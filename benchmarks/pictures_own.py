@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-begun = time.perf_counter()
+started = time.perf_counter()
 import numpy as np  # noqa: E402
 
 from benchmarks.pictures_scene import PictureScene, measured  # noqa: E402
@@ -21,7 +21,7 @@ from katana450.extensions.media.picture import Picture, Translucent, picture  # 
 from katana450.extensions.media.scene import Item  # noqa: E402
 from katana450.server.viser_bridge.themes import Theme  # noqa: E402
 
-IMPORT_SECONDS = time.perf_counter() - begun
+IMPORT_SECONDS = time.perf_counter() - started
 
 
 def drawn(scene: PictureScene) -> Picture:
@@ -53,13 +53,13 @@ def _colours(scene: PictureScene) -> list[tuple[int, int, int]]:
 
 
 def main() -> None:
-    """Draw the picture as often as asked, each time from the triangles on."""
+    """Draw the picture as often as requested, each time from the triangles."""
     scene = PictureScene.load(Path(sys.argv[1]))
-    said = measured(
+    measurements = measured(
         lambda: drawn(scene).pixels, int(sys.argv[3]), IMPORT_SECONDS, ["embreex", "pillow"]
     )
     Path(sys.argv[2]).write_bytes(drawn(scene).png)
-    print(said)
+    print(measurements)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A scene of the picture benchmark as one file, so that every renderer draws the same triangles."""
+"""A scene of the picture benchmark as one file, so that all renderers draw the same triangles."""
 
 from __future__ import annotations
 
@@ -24,11 +24,14 @@ class PictureScene:
         vertices, normals: (v, 3) of all items, in the base frame [m].
         faces: (f, 3) indices into ``vertices``.
         item: (f,) index of the item of each face.
-        colour, metallic, rough, opacity: (i, 3) sRGB from 0 to 1, and (i,) glTF's factors; an
-            opacity below 1 marks water.
-        camera: (2, 3) position and target [m], z up. fov: between top and bottom [rad], (1,).
+        colour: (i, 3) sRGB from 0 to 1.
+        metallic, rough: (i,) glTF's factors.
+        opacity: (i,) an opacity below 1 marks water.
+        camera: (2, 3) position and target [m], z up.
+        fov: (1,) vertical field of view [rad].
         size: (2,) width and height [px].
-        room: (4, 3) sRGB of 255: floor, sky, fine lines, coarse lines. shadow: (1,) its strength.
+        room: (4, 3) sRGB of 255: floor, sky, fine lines, coarse lines.
+        shadow: (1,) strength of shadows.
         floor: (1,) height of the floor [m].
         lamps: (l, 2, 3) direction towards each lamp, and its linear colour; the first one casts
             shadows.
@@ -56,7 +59,7 @@ class PictureScene:
 
     @classmethod
     def load(cls, path: Path) -> PictureScene:
-        """Read what ``save`` wrote."""
+        """Read a scene that ``save`` wrote."""
         with np.load(path) as stored:
             return cls(**{each.name: stored[each.name] for each in fields(cls)})
 
@@ -69,8 +72,11 @@ def measured(
 ) -> str:
     """Return a JSON object with the times, digests and sizes of a renderer.
 
-    ``draw`` returns the pixels of the picture and is called ``count`` times. ``load`` is the time
-    of the imports [s]. ``packages`` are the distributions the renderer consists of.
+    Args:
+        draw: returns the pixels of the picture.
+        count: number of calls of ``draw``.
+        load: time of the imports [s].
+        packages: distributions that the renderer consists of.
     """
     seconds, cpu, digests = [], [], []
     for _ in range(count):

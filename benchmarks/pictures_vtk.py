@@ -1,4 +1,4 @@
-"""The scenes of the picture benchmark drawn by VTK; needs numpy and vtk, and nothing of katana450.
+"""The scenes of the picture benchmark drawn by VTK; needs only numpy and vtk, not katana450.
 
     python -m benchmarks.pictures_vtk SCENE OUT.png COUNT
 
@@ -13,17 +13,17 @@ import time
 from pathlib import Path
 from typing import Any
 
-begun = time.perf_counter()
+started = time.perf_counter()
 import numpy as np  # noqa: E402
 import vtk  # noqa: E402
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy  # noqa: E402
 
 from benchmarks.pictures_scene import PictureScene, measured  # noqa: E402
 
-IMPORT_SECONDS = time.perf_counter() - begun
+IMPORT_SECONDS = time.perf_counter() - started
 
 FLOOR_EXTENT = 3.0
-"""[m] Half the side of the floor and its lines."""
+"""[m] Half the side of the floor and length of its lines."""
 
 LINES = ((0.05, 0.0008), (0.25, 0.0014))
 """[m] Distance and width of the fine and the coarse lines of the floor."""
@@ -67,7 +67,7 @@ def window(scene: PictureScene) -> Any:
 
 
 def _passes() -> Any:
-    """Return shadows, then translucent surfaces by depth peeling, at four samples a pixel."""
+    """Return shadows, then translucent surfaces by depth peeling, at four samples per pixel."""
     baker, opaque = vtk.vtkShadowMapBakerPass(), vtk.vtkShadowMapPass()
     baker.SetResolution(SHADOW_MAP)
     opaque.SetShadowMapBakerPass(baker)
@@ -89,7 +89,7 @@ def _lamp(towards: Any, colour: Any, *, casts: bool) -> Any:
     light.SetPosition(*(3.0 * towards))
     light.SetFocalPoint(0.0, 0.0, 0.0)
     light.SetColor(*colour)
-    # VTK draws shadows of spot lights.
+    # VTK draws shadows only of spot lights.
     light.SetPositional(casts)
     if casts:
         light.SetConeAngle(22.0)
@@ -138,7 +138,7 @@ def _floor(scene: PictureScene) -> list[Any]:
         low, high, end = at - 0.5 * wide, at + 0.5 * wide, np.full(len(at), far)
         along = np.stack((low, -end, high, end), axis=1)
         across = along[:, (1, 0, 3, 2)]
-        # Ribbons, as VTK's shader for lines cannot be compiled together with shadows.
+        # Ribbons, because VTK's shader for lines does not compile together with shadows.
         level = height + 2e-4 * (1 + number)
         found.append(_rectangles(np.concatenate((along, across)), level, scene.room[2 + number]))
     return found
@@ -157,7 +157,7 @@ def _rectangles(sides: Any, height: float, rgb: Any) -> Any:
 
 
 def _environment(sky: Any, floor: Any) -> Any:
-    """Return a panorama from the floor's colour below to the sky's above, that surfaces mirror."""
+    """Return a panorama from the floor's colour below to the sky's above, for reflections."""
     fraction = np.linspace(0.0, 1.0, 64)[:, None, None]
     picture = np.tile(floor + fraction * (sky - floor), (1, 128, 1))
     pixels = numpy_to_vtk((255.0 * picture).astype(np.uint8).reshape(-1, 3), deep=True)
@@ -184,7 +184,7 @@ def pixels_of(shown: Any) -> Any:
 
 
 def main() -> None:
-    """Draw the picture as often as asked, each time from the triangles on."""
+    """Draw the picture as often as requested, each time from the triangles."""
     scene = PictureScene.load(Path(sys.argv[1]))
 
     def draw() -> Any:
@@ -192,7 +192,7 @@ def main() -> None:
         shown.Render()
         return np.ascontiguousarray(pixels_of(shown))
 
-    said = measured(draw, int(sys.argv[3]), IMPORT_SECONDS, ["vtk"])
+    measurements = measured(draw, int(sys.argv[3]), IMPORT_SECONDS, ["vtk"])
     pixels = draw()
     height, width, _ = pixels.shape
     image = vtk.vtkImageData()
@@ -202,7 +202,7 @@ def main() -> None:
     writer.SetFileName(sys.argv[2])
     writer.SetInputData(image)
     writer.Write()
-    print(said)
+    print(measurements)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""How soon after the command the page is usable, and what the server costs while nobody moves.
+"""Time from the command to a usable page, and the cost of the server while no client moves the arm.
 
     python -m benchmarks.start_and_idle
 
-The app and the bare viser app take turns. The browser is open before the command is given, as a
-person's is, and goes to the address as soon as the port is open; a second window then loads the
-page of the server that runs. CPU time is that of the server's processes, over the wall time of the
-rest, so a busy machine does not count. Of the app is told what a page takes over the wire.
+The app and the bare viser app take turns. The browser is open before the command starts, like that
+of a person, and opens the address as soon as the port is open. A second window then loads the page
+of the running server. CPU time is that of the server's processes, divided by the wall time at rest,
+so a busy machine does not count. For the app the bytes of a page over the wire are printed too.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from tests.gateway.client import SUBPROTOCOL, ask, enter, page_name, websocket
 
 SETTLE_SECONDS = 3.0
 SCENE_SECONDS = 1.0
-"""Of silence, after which a scene is all there: of an arm at rest nothing more comes."""
+"""[s] Silence after which a scene is complete: at rest no more messages come."""
 OPEN_SECONDS = 30.0
 APPS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
     "app": (APP, ("/arm", "/target/move")),
@@ -44,8 +44,12 @@ APPS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
 
 
 class Times(NamedTuple):
-    """Seconds from the command to the open port, and to a page that can be used; and that a page
-    takes to load once the server runs.
+    """Times in seconds.
+
+    Attributes:
+        port: from the command to the open port.
+        usable: from the command to a usable page.
+        load: of a page load when the server runs.
     """
 
     port: float
@@ -54,7 +58,7 @@ class Times(NamedTuple):
 
 
 def cpu_seconds(pids: Sequence[int]) -> float:
-    """CPU time that processes and their threads have used [s]; Linux only."""
+    """Return the CPU time that processes and their threads have used [s]; Linux only."""
     ticks = 0
     for pid in pids:
         fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
@@ -63,7 +67,7 @@ def cpu_seconds(pids: Sequence[int]) -> float:
 
 
 def over_the_wire(url: str) -> dict[str, int]:
-    """Bytes of our page and its files, of viser's page, and of the scene up to its last message."""
+    """Return the bytes of our page and its files, of viser's page, and of the whole scene."""
     cookie = enter(url)
     index = ask(f"{url}/")[2].decode()
     files = ["/", *(f"/{name}" for name in re.findall(r'(?:src|href)="(static/[^"]+)"', index))]
@@ -75,16 +79,16 @@ def over_the_wire(url: str) -> dict[str, int]:
 
 
 def compressed(url: str, cookie: str) -> int:
-    """Bytes of the answer to a browser, which takes gzip."""
-    wanted = {"Cookie": cookie, "Accept-Encoding": "gzip"}
+    """Return the bytes of the answer to a browser that accepts gzip."""
+    headers = {"Cookie": cookie, "Accept-Encoding": "gzip"}
     with urllib.request.urlopen(
-        urllib.request.Request(url, headers=wanted), timeout=SCENE_SECONDS
+        urllib.request.Request(url, headers=headers), timeout=SCENE_SECONDS
     ) as answer:
         return len(answer.read())
 
 
 async def scene_bytes(url: str, cookie: str) -> int:
-    """What a browser is sent until it has all there is."""
+    """Return the bytes that a browser receives until the scene is complete."""
     path, taken = f"/viser?page={page_name()}", 0
     async with websocket(url, path, cookie, subprotocols=[SUBPROTOCOL]) as socket:
         with suppress(TimeoutError):
@@ -94,21 +98,24 @@ async def scene_bytes(url: str, cookie: str) -> int:
 
 
 def wait_for_port(port: int) -> None:
-    """Return when somebody listens on the port of this machine, and goes on to."""
+    """Wait until a server listens steadily on the port of this machine."""
     deadline = time.monotonic() + OPEN_SECONDS
     while time.monotonic() < deadline:
         with suppress(OSError):
-            # viser tries a port before it serves there, and so is heard twice.
+            # viser probes a port before it serves there, so two connections must succeed.
             for _ in range(2):
                 socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
                 time.sleep(0.02)
             return
         time.sleep(0.01)
-    raise TimeoutError(f"nobody listened on port {port} for {OPEN_SECONDS:g} s")
+    raise TimeoutError(f"no server listened on port {port} for {OPEN_SECONDS:g} s")
 
 
 def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | None]:
-    """The times of one start, and the fraction of a core used at rest if ``idle`` [s] is not 0."""
+    """Return the times of one start, and the fraction of a core used at rest for ``idle`` [s].
+
+    The fraction is None if ``idle`` is 0.
+    """
     command, nodes = APPS[app]
     server = AppServer(command)
     with ThreadPoolExecutor(1) as starter, closing(server):
@@ -155,7 +162,7 @@ def main() -> None:
                 times[app].append(taken)
                 print(
                     f"{app:5} port {taken.port:.2f} s  usable {taken.usable:.2f} s  "
-                    f"loaded anew {taken.load:.2f} s",
+                    f"loaded again {taken.load:.2f} s",
                     flush=True,
                 )
     for app, all_taken in times.items():
@@ -163,7 +170,7 @@ def main() -> None:
         usable = statistics.median(each.usable for each in all_taken)
         load = statistics.median(each.load for each in all_taken)
         print(f"{app:5} median: port {port:.2f} s, usable page {usable:.2f} s", end="")
-        print(f", loaded anew {load:.2f} s", end="")
+        print(f", loaded again {load:.2f} s", end="")
         print(f", at rest {100.0 * (fractions[app] or 0.0):.1f} % of a core")
 
 

@@ -1,17 +1,18 @@
-"""How closely streams of joint angles are followed, beside two peers fed the same samples.
+"""Accuracy with which streams of joint angles are followed, beside two peers with the same samples.
 
     python -m benchmarks.streams
 
-One joint of the arm (axis 1) and its limits. Peers: ruckig, which plans each tick anew a way to the
-newest sample, extrapolated at its rate; and a first-order smoothing filter, like that in front of
-many servo controllers, with the limits of speed, acceleration and jerk behind it. Each gets the
-same samples at the same times. Of each stream are printed:
+One joint of the arm (axis 1) and its limits. Peers: ruckig, which plans a path to the newest
+sample, extrapolated at its rate, in each tick; and a first-order smoothing filter, like that in
+front of many servo controllers, followed by limits of speed, acceleration and jerk. Each gets the
+same samples at the same times. The columns of each stream are:
 
-* used: of the acceleration limit, what the stream itself needs (above 1 nobody can follow it).
-* beyond: how far the setpoint got beyond the extremes of the stream, of its amplitude.
-* amplitude: the greatest distance of the setpoint from the middle once it has settled, of the
-  stream's; and the lag [ms] that explains the setpoint best, with the error that is left.
-* ratio: the error left, of each peer over ours.
+* used: fraction of the acceleration limit that the stream itself needs (above 1 it cannot be
+  followed).
+* beyond: maximum distance of the setpoint beyond the extremes of the stream, of its amplitude.
+* amplitude: maximum distance of the setpoint from the middle after settling, of the stream's; and
+  the lag [ms] that explains the setpoint best, with the remaining error.
+* ratio: the remaining error of each peer, divided by ours.
 """
 
 from __future__ import annotations
@@ -33,10 +34,10 @@ from katana450.maths.motion.stream import Stream
 TICK = 0.01
 
 TRANSPORT = 0.004
-"""[s] From the sender to the arm, in the best case."""
+"""[s] Minimum delay from the sender to the arm."""
 
 SMOOTHING = 0.06
-"""[s] Time constant of the peer that smooths."""
+"""[s] Time constant of the smoothing peer."""
 
 Signal = Callable[[float], float]
 
@@ -47,8 +48,14 @@ Follower = Callable[[Limiter, "Feed"], FloatArray]
 class Case:
     """A stream: its value [rad] at any time.
 
-    settled: [s] from when on amplitude and lag are judged. hz: samples a second. rates: whether
-    they say how fast they change. jitter: [s] mean of what each is late by, beyond TRANSPORT.
+    Attributes:
+        name: name in the table.
+        signal: the value [rad] at a time [s].
+        settled: time from which amplitude and lag are measured [s].
+        duration: [s].
+        hz: samples per second.
+        rates: whether samples include their rate.
+        jitter: mean delay of a sample beyond TRANSPORT [s].
     """
 
     name: str
@@ -60,12 +67,12 @@ class Case:
     jitter: float = 0.0
 
     def rate(self, t: float) -> float:
-        """[rad/s] of the signal."""
+        """Return the rate of the signal [rad/s]."""
         return (self.signal(t + 1e-5) - self.signal(t - 1e-5)) / 2e-5
 
     @property
     def used(self) -> float:
-        """[rad/s^2] the most that the signal itself accelerates with, away from its corners."""
+        """[rad/s^2] Maximum acceleration of the signal itself, away from its corners."""
         t, h = np.linspace(0.01, self.duration - 0.01, 4000), 1e-3
         q = np.array([[self.signal(x + d) for x in t] for d in (-h, 0.0, h)])
         return float(np.quantile(np.abs(q[0] - 2.0 * q[1] + q[2]) / h**2, 0.995))
@@ -73,13 +80,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Feed:
-    """What a follower gets: times of arrival, samples, and rates or None, by tick."""
+    """The input of a follower by tick: times of arrival, samples, and rates or None."""
 
     ticks: list[list[tuple[float, float, float | None]]]
 
     @staticmethod
     def of(case: Case, seed: int = 450) -> Feed:
-        """The samples of ``case`` by the tick that takes them."""
+        """Return the samples of ``case`` by the tick that uses them."""
         rng = np.random.default_rng(seed)
         sent = np.arange(0.0, case.duration, 1.0 / case.hz)
         late = rng.exponential(case.jitter, len(sent)) if case.jitter else np.zeros(len(sent))
@@ -95,7 +102,7 @@ class Feed:
 
 
 def ours(limiter: Limiter, feed: Feed) -> FloatArray:
-    """The app's own follower: (ticks, 3) q, qd, qdd."""
+    """Follow with the app's own follower; return (ticks, 3) q, qd, qdd."""
     now, stream, found = JointMotion.rest(np.zeros(1)), None, []
     for number, samples in enumerate(feed.ticks):
         for t, q, qd in samples:
@@ -112,7 +119,7 @@ def ours(limiter: Limiter, feed: Feed) -> FloatArray:
 
 
 def ruckigs(limiter: Limiter, feed: Feed) -> FloatArray:
-    """Ruckig towards the newest sample and its rate, told or by difference, each tick anew."""
+    """Follow the newest sample with ruckig; the rate is given or by difference."""
     planner, plan, trajectory = Ruckig(1), InputParameter(1), Trajectory(1)
     limits = limiter.limits
     plan.max_velocity, plan.max_acceleration, plan.max_jerk = (
@@ -125,8 +132,8 @@ def ruckigs(limiter: Limiter, feed: Feed) -> FloatArray:
             last = t, q, seen if qd is None else qd
         if last is not None:
             t, q, rate = last
-            most = 0.99 * float(limits.speed[0])
-            rate = min(max(rate, -most), most)
+            maximum = 0.99 * float(limits.speed[0])
+            rate = min(max(rate, -maximum), maximum)
             plan.current_position, plan.current_velocity, plan.current_acceleration = (
                 [each] for each in now
             )
@@ -140,7 +147,7 @@ def ruckigs(limiter: Limiter, feed: Feed) -> FloatArray:
 
 
 def smoothed(limiter: Limiter, feed: Feed) -> FloatArray:
-    """A first-order filter of the samples, and the limits behind it."""
+    """Follow with a first-order filter of the samples and the limits behind it."""
     now, goal, low, found = JointMotion.rest(np.zeros(1)), None, np.zeros(1), []
     for samples in feed.ticks:
         for _, q, _ in samples:
@@ -154,7 +161,14 @@ def smoothed(limiter: Limiter, feed: Feed) -> FloatArray:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a stream was followed; see the top of this file. peak: [1] amplitude; left: [rad]."""
+    """The quality of following a stream, as described at the top of this file.
+
+    Attributes:
+        beyond: fraction of the amplitude.
+        peak: fraction of the amplitude.
+        lag: [s].
+        left: remaining error [rad].
+    """
 
     beyond: float
     peak: float
@@ -163,12 +177,12 @@ class Outcome:
 
 
 def judged(case: Case, motion: FloatArray) -> Outcome:
-    """What ``motion`` (ticks, 3) made of ``case``."""
+    """Return the quality of ``motion`` (ticks, 3) for the stream ``case``."""
     t = TICK * np.arange(len(motion))
     q = motion[:, 0]
-    asked = np.array([case.signal(x) for x in np.arange(0.0, case.duration, TICK / 4)])
+    target = np.array([case.signal(x) for x in np.arange(0.0, case.duration, TICK / 4)])
     beyond = max(
-        float(q.max() - max(asked.max(), 0.0)), float(min(asked.min(), 0.0) - q.min()), 0.0
+        float(q.max() - max(target.max(), 0.0)), float(min(target.min(), 0.0) - q.min()), 0.0
     )
     late = t > case.settled
     best, left = 0.0, math.inf
@@ -176,34 +190,34 @@ def judged(case: Case, motion: FloatArray) -> Outcome:
         off = q[late] - np.array([case.signal(x - lag) for x in t[late]])
         if np.abs(off).max() < left:
             best, left = lag, float(np.abs(off).max())
-    settled = asked[np.arange(0.0, case.duration, TICK / 4) > case.settled]
+    settled = target[np.arange(0.0, case.duration, TICK / 4) > case.settled]
     middle, half = 0.5 * (settled.max() + settled.min()), 0.5 * float(np.ptp(settled))
     return Outcome(beyond / half, float(np.abs(q[late] - middle).max()) / half, best, left)
 
 
 def sine(amplitude: float, period: float) -> Signal:
-    """From the middle on."""
+    """Return a sine that starts in the middle."""
     return lambda t: amplitude * math.sin(math.tau * t / period)
 
 
 def chirp(amplitude: float, first: float, last: float, duration: float) -> Signal:
-    """A sine whose period goes from ``first`` to ``last`` [s]."""
+    """Return a sine whose period changes from ``first`` to ``last`` [s]."""
     f0, f1 = 1.0 / first, 1.0 / last
     return lambda t: amplitude * math.sin(math.tau * (f0 * t + 0.5 * (f1 - f0) * t * t / duration))
 
 
 def steps(size: float, every: float) -> Signal:
-    """To and fro between 0 and ``size``."""
+    """Return steps between 0 and ``size``."""
     return lambda t: size * (int(t / every) % 2)
 
 
 def hand(t: float) -> float:
-    """[rad] A hand about its work: strokes of several lengths and rests between them."""
+    """Return the motion [rad] of a hand at work: strokes of several lengths with rests between."""
     return 0.5 * math.sin(0.9 * t) * math.sin(0.37 * t) + 0.1 * math.sin(2.1 * t) ** 3
 
 
 def cases() -> Iterator[Case]:
-    """All streams of the table."""
+    """Yield all streams of the table."""
     for hz in (50.0, 100.0):
         for rates in (False, True):
             for jitter in (0.0, 0.003):
@@ -226,7 +240,7 @@ PEERS: dict[str, Follower] = {"ours": ours, "ruckig": ruckigs, "smoothed": smoot
 
 
 def axis_1() -> Limiter:
-    """A limiter of the Katana's first axis alone."""
+    """Return a limiter of the Katana's first axis alone."""
     limits = load().require_arm().limits
     return Limiter(
         Limits(limits.lower[:1], limits.upper[:1], limits.speed[:1],
@@ -235,7 +249,7 @@ def axis_1() -> Limiter:
 
 
 def main() -> None:
-    """Print the table as it stands in docs/benchmarks.md."""
+    """Print the table of docs/benchmarks.md."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hz", type=float, help="only streams of so many samples a second")
     only = parser.parse_args().hz

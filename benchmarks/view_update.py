@@ -1,11 +1,11 @@
-"""What one update of the view costs the server while the arm moves, beside writing poses alone.
+"""Cost of one update of the view for the server while the arm moves, beside writing poses alone.
 
     python -m benchmarks.view_update
 
-By turns, for each frame of a drive at its real pace: the app's whole update (arm, conduit, ghost,
-handle, read-out, branches), and, on a bare viser server, the turns of as many nodes as the arm has,
-each by viser's own setter. Wall-clock times of the calling thread, in which viser packs no message:
-that is done by a thread of its own.
+For each frame of a drive at its real pace two updates alternate. The first is the app's whole
+update (arm, conduit, ghost, handle, read-out, branches). The second turns as many nodes as the arm
+has on a bare viser server, each with viser's own setter. Times are wall-clock times of the calling
+thread, in which viser packs no message, because another thread does that.
 """
 
 from __future__ import annotations
@@ -39,28 +39,32 @@ from tests.view.gestures import RecordedGestures
 
 TICKS = 600
 EVERY = 3
-"""Ticks a frame: 33 frames a second."""
+"""Ticks per frame: 33 frames a second."""
 
 
 class Hand(Clock):
-    """A clock that is turned by hand."""
+    """A clock that is set by hand."""
 
     def __init__(self) -> None:
         self.t = 0.0
 
     def now(self) -> float:
+        """Return the time that was set [s]."""
         return self.t
 
     def sleep_until(self, t: float) -> None:
+        """Set the time to ``t`` [s]."""
         self.t = t
 
 
 def quiet_server() -> viser.ViserServer:
+    """Start a viser server that prints nothing."""
     with contextlib.redirect_stdout(io.StringIO()):
         return viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
 
 
 def loop_of(robot: Robot, settings: Settings) -> tuple[ControlLoop, Session, Mailbox, Hand]:
+    """Return the control loop of ``robot`` with its session, mailbox and clock."""
     arm = robot.require_arm()
     world, _ = world_of(robot)
     assert world is not None
@@ -72,18 +76,19 @@ def loop_of(robot: Robot, settings: Settings) -> tuple[ControlLoop, Session, Mai
 
 
 class BareNodes:
-    """As many nodes as the arm has joints, turned by viser's own setter."""
+    """One node for each joint of the arm, turned by viser's own setter."""
 
     def __init__(self, server: viser.ViserServer, joints: int) -> None:
         self.frames = [server.scene.add_frame(f"/{i}", show_axes=False) for i in range(joints)]
 
     def move(self, q: FloatArray) -> None:
+        """Turn each node by its joint angle [rad]."""
         for frame, angle in zip(self.frames, q.tolist(), strict=True):
             frame.wxyz = (math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))
 
 
 def to_and_fro(tick: int, session: Session, _state: State) -> Command | None:
-    """From one side to the other every two seconds, all joints at once."""
+    """Move all joints from one side to the other every two seconds."""
     if tick % 200:
         return None
     side = 1.0 if tick % 400 == 0 else -1.0
@@ -91,7 +96,7 @@ def to_and_fro(tick: int, session: Session, _state: State) -> Command | None:
 
 
 def dragged(tick: int, session: Session, state: State) -> Command | None:
-    """Round a circle of 6 cm every two seconds, told twenty times a second as by the gizmo."""
+    """Move around a circle of 6 cm every two seconds, with 20 targets a second like the gizmo."""
     if tick % 5:
         return None
     centre = forward(session.require_arm().chain_to(state.tool), session.ready)[:3, 3]
@@ -100,13 +105,13 @@ def dragged(tick: int, session: Session, state: State) -> Command | None:
 
 
 def timed(show: Callable[[], None]) -> float:
-    """How long it takes [s]."""
+    """Return the time of ``show`` [s]."""
     started = time.perf_counter()
     show()
     return time.perf_counter() - started
 
 
-def drive(said: Callable[[int, Session, State], Command | None]) -> None:
+def drive(commands: Callable[[int, Session, State], Command | None]) -> None:
     """Measure one drive, and print."""
     settings, robot = Settings(), load()
     loop, session, mailbox, clock = loop_of(robot, settings)
@@ -123,20 +128,20 @@ def drive(said: Callable[[int, Session, State], Command | None]) -> None:
     nodes = BareNodes(bare, robot.require_arm().chain.n)
     ours: list[float] = []
     floor: list[float] = []
-    began = time.perf_counter()
+    started = time.perf_counter()
     for tick in range(TICKS):
-        command = said(tick, session, loop.state_publisher.snapshot.state)
+        command = commands(tick, session, loop.state_publisher.snapshot.state)
         if command is not None:
             mailbox.put(command)
         clock.t += 1.0 / settings.rate
-        # At the pace of the app: what is shown ten times a second comes in every fourth frame.
-        time.sleep(max(0.0, began + clock.t - time.perf_counter()))
+        # At the pace of the app, so that values shown ten times a second come every fourth frame.
+        time.sleep(max(0.0, started + clock.t - time.perf_counter()))
         loop.tick()
         if tick % EVERY or not loop.state_publisher.snapshot.state.moving:
             continue
         ours.append(timed(lambda: view.show(loop.state_publisher.snapshot)))
         floor.append(timed(lambda: nodes.move(loop.state_publisher.snapshot.state.q)))
-    print(f"{said.__name__.replace('_', ' ')}, {len(ours)} frames")
+    print(f"{commands.__name__.replace('_', ' ')}, {len(ours)} frames")
     for name, times in (("katana450", ours), ("turns alone, by viser's setter", floor)):
         p50, p95 = 1e3 * np.percentile(times, (50, 95))
         mean = 1e3 * np.mean(times)
@@ -148,8 +153,8 @@ def drive(said: Callable[[int, Session, State], Command | None]) -> None:
 
 def main() -> None:
     """Measure both drives."""
-    for said in (to_and_fro, dragged):
-        drive(said)
+    for commands in (to_and_fro, dragged):
+        drive(commands)
 
 
 if __name__ == "__main__":

@@ -1,1 +1,1 @@
-"""The robot as data: the URDF, its meshes, and the code that builds them."""
+"""The robot description: the URDF, its meshes, and the code that builds them."""

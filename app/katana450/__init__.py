@@ -12,8 +12,8 @@ The library in a few lines::
     circle.plot()
     arm.show(circle)
 
-Lengths are in m, angles in rad, times in s. `load` says which frame poses are in. Everything below
-is loaded when it is first used, so that ``import katana450`` takes no time of its own.
+Lengths are in m, angles in rad, times in s. The argument ``frame`` of `load` sets the frame of
+poses. Each name below is loaded on first use, so that ``import katana450`` is fast.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -79,7 +79,7 @@ _MODULES = {
 }
 
 
-# Hidden from type checkers, which would take it for any name there is.
+# Hidden from type checkers, which would otherwise accept every name.
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""``python -m katana450`` is ``katana450``."""
+"""Entry point of ``python -m katana450``, which does the same as the command ``katana450``."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Atomic writing of files: each file is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -16,25 +16,31 @@ Writer = Callable[[BinaryIO], object]
 
 
 def writer_of(content: bytes) -> Writer:
-    """What writes just that."""
+    """Return a writer of the bytes ``content``."""
     return lambda file: file.write(content)
 
 
 def write_files(writers: Mapping[Path, Writer], mode: int = 0o666) -> None:
-    """Write every file, and only then put them in place, over what was there.
+    """Write all files to temporary files, then move them to their paths, over existing files.
 
-    ``mode``: who may read and write them, less what the umask takes away. Whatever stops the
-    writing leaves the old files as they were. Raises InputError when a file cannot be written.
+    An error while writing leaves the old files unchanged.
+
+    Args:
+        writers: the writer of the content of each path.
+        mode: permissions of the new files, reduced by the umask.
+
+    Raises:
+        InputError: a file cannot be written.
     """
     with ExitStack() as stack:
         written: list[tuple[Path, Path]] = []
-        for path, writer in writers.items():
+        for path, write in writers.items():
             try:
                 temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
                 stack.callback(temporary.unlink, missing_ok=True)
                 opened = create_file(temporary, mode)
                 with os.fdopen(opened, "wb") as file:
-                    writer(file)
+                    write(file)
                     file.flush()
                     os.fsync(file.fileno())
             except OSError as error:
@@ -48,13 +54,13 @@ def write_files(writers: Mapping[Path, Writer], mode: int = 0o666) -> None:
 
 
 def check_writable(path: Path) -> None:
-    """InputError when no file can be made at `path`, told before a long computation."""
+    """Raise InputError if no file can be created at `path`; call it before a long computation."""
     if path.is_dir():
         raise InputError(f"{path} is a directory; name a file.")
     if not path.parent.is_dir():
-        raise InputError(f"There is no directory {path.parent}; make it, or name another file.")
+        raise InputError(f"There is no directory {path.parent}; create it, or name another file.")
     if not os.access(path.parent, os.W_OK):
-        raise InputError(f"The directory {path.parent} may not be written to.")
+        raise InputError(f"The directory {path.parent} is not writable.")
 
 
 def _refusal(path: Path, error: OSError) -> InputError:

@@ -1,38 +1,38 @@
-"""The errors a person may meet: whole sentences that say what is wrong, where, what to do."""
+"""Errors with texts for people: complete sentences on what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
 
 class KatanaError(Exception):
-    """Base of every error of this project; its text can be shown to a person as it stands."""
+    """Base class of all errors of this project; the text can be shown to a person unchanged."""
 
 
 class InputError(KatanaError, ValueError):
-    """A value handed in cannot be used: not finite, of the wrong shape, not a rotation, ..."""
+    """A value from outside is unusable: not finite, of the wrong shape, not a rotation, ..."""
 
 
 class CancelledError(KatanaError):
-    """A calculation was ended before it had a result."""
+    """A calculation was cancelled before it had a result."""
 
 
 class BlockedError(InputError):
-    """A way that is asked for would bring two objects too near to each other."""
+    """The requested path brings two bodies too close together."""
 
 
 class RobotDescriptionError(KatanaError):
-    """The description of the robot is broken, or of an arm these kinematics do not cover."""
+    """The robot description is invalid, or the kinematics do not support its arm."""
 
 
 class ConfigurationError(KatanaError):
-    """A setting of the program is missing or contradicts another."""
+    """A setting of the program is missing or contradicts another one."""
 
 
 class LeaseError(KatanaError):
-    """Somebody asked of the lease of the arm what is not theirs to ask."""
+    """The caller does not hold the lease of the arm, or may not take it."""
 
 
 def digits_beyond(value: float, lower: float, upper: float) -> str:
-    """Return ``value`` with the digits, four or more, that show it is not from lower to upper."""
+    """Return ``value`` with four or more digits, enough to show that it is outside the bounds."""
     for digits in range(4, 17):
         text = f"{value:.{digits}g}"
         if not lower <= float(text) <= upper:

@@ -1,12 +1,13 @@
-"""Extensions: parts of the app that the core never imports, found by name and loaded on use.
+"""Extensions: parts of the app that the core never imports, found by name and loaded on first use.
 
-An extension is one module with the constant ``EXTENSION``. Those of this distribution are listed in
-``BUILT_IN``; another distribution names its own in the entry point group ``katana450.extensions``:
+An extension is one module with the constant ``EXTENSION``. ``BUILT_IN`` lists the extensions of
+this distribution. Another distribution names its own in the entry point group
+``katana450.extensions``:
 
     [project.entry-points."katana450.extensions"]
     weather = "weather_station.katana450:EXTENSION"
 
-Importing such a module must load nothing heavy: it is imported whenever options are read.
+Such a module must import nothing heavy, because it is imported whenever options are read.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
 
 BUILT_IN = ("programs", "importers", "reachability", "export", "experiments", "media")
-"""Built-in extensions, in the order of their commands in the help."""
+"""Built-in extensions, in the order of their commands in the help text."""
 
 log = logging.getLogger(__name__)
 
@@ -48,10 +49,10 @@ class CliCommand:
     """A command ``katana450 NAME``.
 
     Attributes:
-        name: The word to type.
+        name: Name of the command on the command line.
         help: One line for ``katana450 --help``.
         add_options: Adds its options to a parser.
-        run: Runs it with the options given and returns the exit status. Imports what it needs.
+        run: Runs it with the parsed options and returns the exit status. Imports what it needs.
     """
 
     name: str
@@ -62,24 +63,24 @@ class CliCommand:
 
 @dataclass(frozen=True)
 class ServeExtension:
-    """A part of ``katana450 serve``. Each function is called once at the start, or never.
+    """Functions that extend ``katana450 serve``. Each is called at most once, at the start.
 
     Attributes:
         add_options: Adds options to the parser of ``serve``.
-        initial_scene: Returns what stands around at first according to the options, or None. Its
-            second argument returns the session of the robot, and raises RobotDescriptionError if
-            that is not an arm. Called in the process of the arm. Raises KatanaError.
-        view_layer: Returns what to show in the scene according to the options, or None. Called in
-            the process of the view. Raises KatanaError.
+        initial_scene: Returns the initial scene according to the options, or None. Its second
+            argument returns the session of the robot, and raises RobotDescriptionError if the robot
+            has no arm. Called in the process of the arm. Raises KatanaError.
+        view_layer: Returns a layer of the 3D scene according to the options, or None. Called in the
+            process of the view. Raises KatanaError.
         routes: Returns routes for the web server, below ``/api/v1``. Called in the process of the
             view.
-        nodes: Returns what of a robot and the objects around it can be read and set by name.
-            Called in the process of the view; the first extension that has it is asked.
-        runner: Returns the class of what drives the arm over time, with its requests. Called in the
-            process of the view; the first extension that has it is asked.
+        nodes: Returns the values of a robot and its environment that can be read and set by name.
+            Called in the process of the view, of the first extension that has it.
+        runner: Returns the class that drives the arm over time, with its requests. Called in the
+            process of the view, of the first extension that has it.
         folder: Returns a folder of the panel of an arm, or None. Called in the process of the view.
             Raises KatanaError.
-        needs: Built-in extensions without which this part is left out.
+        needs: Built-in extensions that must be installed; without them this part is left out.
     """
 
     add_options: Callable[[ArgumentParser], None] | None = None
@@ -94,7 +95,7 @@ class ServeExtension:
 
 @dataclass(frozen=True)
 class Extension:
-    """All that one extension adds to the app.
+    """One extension of the app.
 
     Attributes:
         name: Its name in messages.
@@ -111,15 +112,15 @@ class Extension:
 def extensions() -> tuple[Extension, ...]:
     """Return the installed extensions, the built-in ones first.
 
-    A built-in extension that is not installed is left out. One that cannot be loaded is left out
-    too, and logged.
+    Built-in extensions that are not installed are left out. Extensions that cannot be loaded are
+    left out and logged.
     """
     return tuple(_loaded())
 
 
 def serve_extensions() -> tuple[ServeExtension, ...]:
-    """Return what the installed extensions add to ``katana450 serve``."""
-    parts = (each.serve for each in extensions() if each.serve is not None)
+    """Return the parts of ``katana450 serve`` that the installed extensions provide."""
+    parts = (extension.serve for extension in extensions() if extension.serve is not None)
     return tuple(part for part in parts if all(map(_is_installed, part.needs)))
 
 
@@ -131,9 +132,7 @@ def _is_installed(name: str) -> bool:
 
 
 def missing_extension(error: ImportError) -> str | None:
-    """Return the name of the extension that ``error`` could not import, or None if it is another
-    module.
-    """
+    """Return the name of the extension that ``error`` could not import; None for another module."""
     prefix, _, rest = (error.name or "").partition(f"{PACKAGE}.")
     return rest.split(".")[0] if rest and not prefix else None
 
@@ -151,7 +150,7 @@ def _loaded() -> Iterator[Extension]:
         try:
             found = entry.load()
         except Exception as error:
-            # Code of other people: whatever is wrong with it, the app runs without it.
+            # Third-party code: the app must start without it, whatever error it raises.
             _report(entry.name, error)
             continue
         if isinstance(found, Extension):

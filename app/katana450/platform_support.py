@@ -1,6 +1,6 @@
-"""Calls that only some operating systems have, each with its alternative on the others.
+"""Calls that exist only on some operating systems, each with its alternative on the others.
 
-Everything else in the package runs on Linux, macOS and Windows alike. ``tests/packaging`` checks
+The rest of the package runs unchanged on Linux, macOS and Windows. ``tests/packaging`` checks
 that no other module uses these calls.
 """
 
@@ -22,17 +22,17 @@ else:
     import ctypes
 
 PROMPT = -10
-"""Niceness of a process that must run on time, where the system allows it."""
+"""Niceness of a time-critical process, where the system allows it."""
 
 NORMAL_CLASS, HIGH_CLASS = 0x20, 0x80
 """Priority classes of Windows."""
 
 TIMER_MS = 1
-"""[ms] Resolution of the timers of a process that must run on time, on Windows; otherwise 15.6."""
+"""[ms] Timer resolution of a time-critical process on Windows; the default there is 15.6."""
 
 
 def raise_priority() -> None:
-    """Run this process before others, where the system allows it."""
+    """Give this process a high priority, where the system allows it."""
     if sys.platform == "win32":
         _set_priority_class(HIGH_CLASS)
         ctypes.windll.winmm.timeBeginPeriod(TIMER_MS)
@@ -42,7 +42,7 @@ def raise_priority() -> None:
 
 
 def reset_priority() -> None:
-    """Run this process like any other, whatever its parent runs like."""
+    """Give this process the normal priority, whatever the priority of its parent."""
     if sys.platform == "win32":
         _set_priority_class(NORMAL_CLASS)
     else:
@@ -53,7 +53,7 @@ def raise_open_file_limit(wanted: int) -> int | None:
     """Let this process open ``wanted`` files, or as many as the system allows.
 
     Returns:
-        how many it may open then; None without a limit, as on Windows.
+        the number of files it may then open; None without a limit, as on Windows.
     """
     if sys.platform == "win32":
         return None
@@ -70,9 +70,10 @@ def raise_open_file_limit(wanted: int) -> int | None:
 
 
 def limit_resources(memory: int, seconds: int) -> None:
-    """Bound the memory [bytes] and the processor time [s] of this process.
+    """Limit the memory [bytes] and the processor time [s] of this process.
 
-    Windows bounds neither and macOS no memory; whoever starts the process bounds its time besides.
+    Windows limits neither, and macOS does not limit memory. The parent process must therefore
+    limit the running time too.
     """
     if sys.platform != "win32":
         limits = [("RLIMIT_AS", memory), ("RLIMIT_CPU", seconds), ("RLIMIT_CORE", 0)]
@@ -87,13 +88,13 @@ def limit_resources(memory: int, seconds: int) -> None:
 
 
 def stop_signals() -> list[signal.Signals]:
-    """Return the signals that ask a process to end: of the terminal, and of other programs."""
+    """Return the signals that ask a process to end, from the terminal and from other programs."""
     names = ("SIGINT", "SIGTERM", "SIGBREAK")
     return [getattr(signal, name) for name in names if hasattr(signal, name)]
 
 
 def without_interrupts() -> dict[str, Any]:
-    """Return arguments of Popen for a process that the terminal's Ctrl-C does not reach."""
+    """Return arguments of Popen for a process that does not receive Ctrl-C of the terminal."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     else:  # noqa: RET505 - so that mypy follows either system
@@ -101,9 +102,9 @@ def without_interrupts() -> dict[str, Any]:
 
 
 def claim_port(sock: socket.socket) -> None:
-    """Let ``sock`` bind a port whose last connections are closing, and none that is in use."""
+    """Let ``sock`` bind a port whose last connections are closing, but no port that is in use."""
     if sys.platform == "win32":
-        # There SO_REUSEADDR would take the port from the program that listens on it.
+        # On Windows SO_REUSEADDR would take the port from the program that listens on it.
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
     else:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -112,15 +113,21 @@ def claim_port(sock: socket.socket) -> None:
 def readable_by_others(about: os.stat_result) -> bool:
     """Return whether other users can read a file, by its mode.
 
-    Always False on Windows, whose modes do not tell: a user's own folder is closed to others there.
+    Always False on Windows, where the mode does not show it. The home folder of a user is closed
+    to other users there.
     """
     return sys.platform != "win32" and bool(stat.S_IMODE(about.st_mode) & 0o077)
 
 
 def create_file(path: Path, mode: int) -> int:
-    """Create ``path`` for writing bytes and return its descriptor. Raises OSError if it exists.
+    """Create ``path`` for writing bytes and return its descriptor.
 
-    ``mode``: who may read and write it, less what the umask takes away; without effect on Windows.
+    Args:
+        path: the new file.
+        mode: its permissions, reduced by the umask; no effect on Windows.
+
+    Raises:
+        OSError: the file exists already or cannot be created.
     """
     # Windows replaces line ends in a descriptor that is not binary.
     binary: int = getattr(os, "O_BINARY", 0)

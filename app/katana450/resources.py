@@ -1,6 +1,6 @@
-"""Files that belong to the package: the robot's description and the page.
+"""Files that belong to the package: the robot description and the page.
 
-In a checkout they are folders beside `app`; an installed package holds copies of them.
+In a checkout they are folders beside `app`. An installed package contains copies of them.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def folder(name: str) -> Path:
-    """Return the folder ``name`` of the installed package, or else the one of the checkout."""
+    """Return the folder ``name`` of the installed package, or else of the checkout."""
     installed = _PACKAGE / name
     return installed if installed.is_dir() else _PACKAGE.parents[1] / name
 
 
 STATIC: Path = folder("static")
-"""Scripts, styles and pages that a browser loads."""
+"""Scripts, styles and pages for the browser."""
 
 URDF_PATH: Path = folder("robot_description") / "katana450.urdf"
-"""The URDF of the Katana450: every number of the arm. Its meshes lie beside it."""
+"""URDF of the Katana450 with all numbers of the arm. Its meshes are beside it."""
 
 PROPS_PATH: Path = URDF_PATH.parent / "props" / "props.json"
 """Sizes and masses of the table, the cup and the basin."""

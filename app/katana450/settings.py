@@ -1,4 +1,4 @@
-"""What may be chosen at start-up, read once."""
+"""Settings of the server, read once at the start."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from dataclasses import dataclass
 from pathlib import Path
 
 READY_POSTURE_DEG = (0.0, -68.0, 85.0, 8.0, 0.0)
-"""Elbow up, tool 25 degrees down in front of the arm, the wrist midway between folded and
-stretched: room to drag and turn the tool in every direction."""
+"""[deg] Elbow up, tool pitched 25 degrees down in front of the arm, wrist midway between folded
+and stretched. It leaves room to drag and turn the tool in every direction."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Of one server.
+    """Settings of one server.
 
     Attributes:
-        host: address to listen on; only this machine unless told otherwise.
+        host: address to listen on; by default only this machine.
         port: TCP port.
-        rate: control ticks a second [Hz].
-        frame_rate: most view updates a second [Hz].
-        ready: posture the arm starts in and Home returns to [rad].
-        silence: time without a heartbeat of whoever drives that stops an arm that moves [s].
-        access: file of the links by which people come in; without it nobody is asked.
-        insecure: other machines may come in unasked.
+        rate: control ticks per second [Hz].
+        frame_rate: maximum rate of view updates [Hz].
+        ready: posture in which the arm starts and to which Home returns [rad].
+        silence: heartbeat timeout of the driver, after which a moving arm is stopped [s].
+        access: file of the access links; without it nobody has to sign in.
+        insecure: whether other machines may connect without signing in.
         tls_cert, tls_key: files of a certificate and its key, for https.
-        public_url: what people type when a reverse proxy stands in front.
-        bare: whether the arm is without its gripper.
-        lines: TCP port of this machine for programs that speak JSON lines; None without.
+        public_url: URL that people enter when the server is behind a reverse proxy.
+        lines: TCP port of this machine for programs that send JSON lines; None for no such port.
+        bare: whether the arm has no gripper.
     """
 
     host: str = "127.0.0.1"

@@ -1,4 +1,4 @@
-"""The arm's shape as code: ``python -m robot_description.cad`` builds the meshes of the URDF.
+"""The shape of the arm as code: ``python -m robot_description.cad`` builds the meshes of the URDF.
 
-Dimensions are millimetres in the frame of the link they belong to; the written meshes are metres.
+Dimensions are in millimetres, in the frame of their link. The written meshes are in metres.
 """

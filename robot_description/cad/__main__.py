@@ -1,4 +1,4 @@
-"""Build all of the robot: ``python -m robot_description.cad [folder]``."""
+"""Build all files of the robot description: ``python -m robot_description.cad [folder]``."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def _report(title: str, files: Iterable[Built]) -> None:
 
 
 def main() -> None:
-    """Write all files, and what the URDF says of masses and collision shapes."""
+    """Write all files, and update masses and collision shapes in the URDF."""
     parser = argparse.ArgumentParser(
         prog="python -m robot_description.cad",
-        description="Build meshes, props, STL files and collision shapes; keep the URDF to them.",
+        description="Build meshes, props, STL files and collision shapes, and update the URDF.",
     )
     parser.add_argument(
         "folder",

@@ -1,4 +1,4 @@
-"""From parts to files: one GLB for each link that has geometry."""
+"""Writing of parts to files: one GLB file for each link with geometry."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ PARTS: tuple[Callable[[], Part], ...] = (
     finger_right_link,
     finger_left_link,
 )
-"""From the table to the finger tips, each named as its link."""
+"""Makers of the parts, from the table to the finger tips, each named like its link."""
 
 
 @dataclass(frozen=True)
 class Built:
-    """One written file and what it holds."""
+    """One written file, with its numbers of materials, triangles and bytes."""
 
     path: Path
     materials: int
@@ -66,7 +66,7 @@ def primitives_of(part: Part) -> list[Primitive]:
 
 @functools.cache
 def parts() -> tuple[Part, ...]:
-    """Return every link's part, made once; read them only."""
+    """Return the parts of all links, made once; do not change them."""
     return tuple(make() for make in PARTS)
 
 
@@ -81,12 +81,12 @@ def write_glb(part: Part, folder: Path) -> Built:
 
 
 def build(folder: Path = MESHES) -> Iterator[Built]:
-    """Write every link's GLB into ``folder``, yielding each as it is done."""
+    """Write the GLB file of every link into ``folder``, and yield each when it is written."""
     folder.mkdir(parents=True, exist_ok=True)
     for part in parts():
         yield write_glb(part, folder)
 
 
 def write_conduits(path: Path = CONDUITS) -> None:
-    """Write where the conduit is held, for whoever draws it."""
+    """Write the fittings of the conduit to ``path``, for programs that draw the conduit."""
     path.write_text(conduits_json(), encoding="utf-8")

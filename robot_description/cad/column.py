@@ -1,4 +1,4 @@
-"""arm_base_link: the round column that the arm turns on; mm."""
+"""arm_base_link: the round column on which the arm turns; mm."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The conduit: where each stretch of it is held, and the file that tells so without solids.
+"""The conduit: the fittings of each stretch, and the file that describes them without solids.
 
-The stretches hang free between fittings, so no mesh holds them: whoever shows the arm draws each as
-a curve between its two ends. Dimensions are mm here, metres in the file.
+The stretches hang free between fittings, so no mesh contains them. Programs that show the arm draw
+each as a curve between its two ends. Dimensions are in mm here and in metres in the file.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 
 RADIUS = 8.0
-"""Of the conduit, mm."""
+"""Radius of the conduit, mm."""
 
 NUT_HEIGHT = 4.5
 BALL_HEIGHT = 6.0  # of the swivel's centre over the surface
@@ -24,10 +24,10 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Gland:
-    """A swivel gland on a face towards +y: ``at`` on the face, ``lean`` degrees off its normal.
+    """A swivel gland on a face towards +y.
 
-    It leans in the plane of the normal and the axis ``along`` ("x" or "z"), towards its positive
-    end where ``lean`` is positive.
+    ``at`` is on the face. The gland leans ``lean`` degrees from the normal, in the plane of the
+    normal and the axis ``along`` ("x" or "z"); a positive ``lean`` is towards the positive axis.
     """
 
     link: str
@@ -37,18 +37,18 @@ class Gland:
 
     @property
     def outward(self) -> Vector:
-        """The unit vector out of its mouth."""
+        """Unit vector out of the gland's mouth."""
         side, up = math.sin(math.radians(self.lean)), math.cos(math.radians(self.lean))
         return (side, up, 0.0) if self.along == "x" else (0.0, up, side)
 
     @property
     def swivel(self) -> Vector:
-        """The centre of its ball."""
+        """Centre of the gland's ball."""
         return (self.at[0], self.at[1] + BALL_HEIGHT, self.at[2])
 
     @property
     def mouth(self) -> Vector:
-        """Where the conduit ends, a little inside the sleeve."""
+        """End of the conduit, a little inside the sleeve."""
         reach = SLEEVE_LENGTH - INSERTED
         x, y, z = (c + reach * d for c, d in zip(self.swivel, self.outward, strict=True))
         return (x, y, z)
@@ -56,7 +56,7 @@ class Gland:
 
 @dataclass(frozen=True)
 class Eye:
-    """A ring about the vertical axis through ``at``, its middle; it leads the conduit upwards."""
+    """A ring around the vertical axis through its middle ``at``; it leads the conduit upwards."""
 
     link: str
     at: Vector
@@ -73,13 +73,13 @@ WRIST = Gland("wrist_link", (43.0, 71.5, 0.0), -14.0)
 
 @dataclass(frozen=True)
 class Stretch:
-    """A free run of conduit of rest length ``length``; one that ``winds`` lies about an axis."""
+    """A free run of conduit with rest length ``length``; it may lie around the axis of a joint."""
 
     name: str
     start: Gland | Eye
     end: Gland | Eye
     length: float
-    winds: str | None = None  # the joint about whose axis it lies when that turns
+    winds: str | None = None  # the joint around whose axis it lies
 
 
 STRETCHES = (
@@ -91,7 +91,7 @@ STRETCHES = (
 
 
 def _end(fitting: Gland | Eye, along: float) -> dict[str, object]:
-    """Describe one end; ``along`` is 1 where the conduit leaves the fitting, -1 where it comes."""
+    """Return the description of one end; ``along``: 1 at the start of a stretch, -1 at its end."""
     if isinstance(fitting, Eye):
         x, y, z = fitting.at
         point, tangent = (x, y, z + along * (EYE_HALF - INSERTED)), (0.0, 0.0, 1.0)
@@ -110,9 +110,9 @@ def conduits_json() -> str:
     """Return the text of ``conduits.json``.
 
     ``point`` [m] and unit ``tangent``, from the first end to the second, are in the frame of the
-    end's link. ``length`` [m] is the rest length. A stretch with ``winds`` goes round the axis of
-    the joint named: it is a smooth curve in cylindrical coordinates about it, in which its angle
-    follows the joint's.
+    end's link. ``length`` [m] is the rest length. A stretch with ``winds`` lies around the axis of
+    that joint: it is a smooth curve in cylindrical coordinates about it, whose angle follows the
+    joint's.
     """
     stretches = [
         {

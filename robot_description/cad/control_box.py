@@ -1,4 +1,4 @@
-"""base_link: the control box, from the table top up, connector panel towards -y; mm."""
+"""base_link: the control box, standing on the table, connector panel towards -y; mm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BOLTS, BOLT_CIRCLE, COUNTERBORE, BOLT_DEPTH, BOLT_HEAD = 6, 113.0, 11.0, 6.0, 8.
 DRUM_DIAMETER, DRUM_EDGE, DRUM_GAP = 195.0, 5.0, 1.2
 TOP_CENTRE = 73.0  # where the arm's base stands
 TOP_RISE, TOP_SAG = 10.0, 6.0  # of the saddle at the rim, towards y and towards x
-TOP_RINGS = (0.9, 0.8, 0.7, 0.6, 0.5)  # shares of the rim that bend with the saddle
+TOP_RINGS = (0.9, 0.8, 0.7, 0.6, 0.5)  # fractions of the rim; the rings bend with the saddle
 SEAT_DIAMETER = 112.0
 PANEL_Y, LIP_Y, LIP_CORNER = -72.0, -77.0, 9.0
 LIP_UNDERSIDE = 70.0
@@ -29,7 +29,10 @@ PANEL_STANDS = 1.4
 
 
 def _plan() -> Outline:
-    """Return the drum from above: a circle cut by the lip over the panel, its corners round."""
+    """Return the outline of the drum from above: a circle cut by the lip over the panel.
+
+    Its corners are rounded.
+    """
     rim = DRUM_DIAMETER / 2
     y = LIP_Y + LIP_CORNER
     x = math.sqrt((rim - LIP_CORNER) ** 2 - y * y)

@@ -1,4 +1,4 @@
-"""The two fingers: bent aluminium strips with black pads, sensor windows and a crown sector; mm.
+"""The fingers: bent aluminium strips with black pads, sensor windows and a crown sector; mm.
 
 The origin lies on the pivot, x forward, the right finger on +y. At zero the strip's foot is
 parallel to x; a positive angle opens.
@@ -39,7 +39,7 @@ TIP_CHAMFER = 5.0
 PAD_THICK, PAD_HALF_HEIGHT, PAD_EDGE = 2.0, 9.9, 0.45
 PAD_START = 7.4  # mm after the foot's bend
 
-CROWN_TEETH, CROWN_SECTOR = 43, 9  # on a full turn, and how many there are
+CROWN_TEETH, CROWN_SECTOR = 43, 9  # teeth of a full turn, and of the sector
 CROWN_RADII, CROWN_BACK = (6.6, 10.6), 7.0
 TOOTH_HEIGHT, TOOTH_CLEARANCE = 0.9, 0.12
 
@@ -72,7 +72,7 @@ def _band(path: Outline, low: float, high: float) -> Outline:
 
 
 def _from(path: Outline, start: float) -> Outline:
-    """Return what is left of ``path`` beyond ``start`` mm of its length."""
+    """Return the part of ``path`` beyond ``start`` mm of its length."""
     length = np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1))
     ends = np.concatenate(([0.0], np.cumsum(length)))
     k = int(np.searchsorted(ends, start, side="right")) - 1
@@ -81,7 +81,7 @@ def _from(path: Outline, start: float) -> Outline:
 
 
 def _tip(half_height: float) -> Manifold:
-    """Return the side view of the strip, its tip chamfered, as a prism along y."""
+    """Return the side view of the strip with its chamfered tip, as a prism along y."""
     end = STRIP[-1][0] + 2.0
     chamfer = TIP_CHAMFER
     return prism(
@@ -115,7 +115,7 @@ def _outward(along: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _face(piece: int, fraction: float, inner: bool) -> NDArray[np.float64]:
-    """Return the (3, 4) frame on a pad's surface: x along the strip, z out of the pad."""
+    """Return the frame (3, 4) on a pad's surface: x along the strip, z out of the pad."""
     start, end = np.array(STRIP[piece]), np.array(STRIP[piece + 1])
     along = _along(piece)
     out = -_outward(along) if inner else _outward(along)
@@ -125,10 +125,10 @@ def _face(piece: int, fraction: float, inner: bool) -> NDArray[np.float64]:
 
 
 def pocket(radius: float) -> tuple[float, float]:
-    """Return how the pads hold a cylinder along z: finger angle (rad) and mm from pivot to axis.
+    """Return the finger angle (rad) and the distance from pivot to axis (mm) for a held cylinder.
 
-    The cylinder touches each finger before and behind the outward knee: behind it on the flat or,
-    a thicker one, on the bulge of the inward knee.
+    The cylinder is parallel to z and touches each finger before and behind the outward knee. Behind
+    the knee it touches the flat or, if it is thicker, the bulge of the inward knee.
     """
     deep = STRIP_THICK / 2 + PAD_THICK  # from the centre line to the pad's surface
     before, behind, beyond = (_along(piece) for piece in (1, 2, 3))
@@ -147,7 +147,7 @@ def pocket(radius: float) -> tuple[float, float]:
 
 
 def _crown() -> list[Manifold]:
-    """Return the toothed sector under the lug, its middle tooth gap on -x when half open."""
+    """Return the toothed sector under the lug; its middle tooth gap is on -x when half open."""
     inner, outer = CROWN_RADII
     tips = PINION_TIP + TOOTH_CLEARANCE
     root = tips + TOOTH_HEIGHT
@@ -183,7 +183,7 @@ def _lug() -> Manifold:
 
 
 def _pads(part: Part, path: Outline) -> None:
-    """Add the black pads on both faces and what is set into them."""
+    """Add the black pads on both faces, with windows and contacts."""
     end = _from(path, STRIP[1][0] - STRIP[0][0] + PAD_START)
     half = STRIP_THICK / 2
     tip = _tip(PAD_HALF_HEIGHT)
@@ -237,7 +237,7 @@ def finger_right_link() -> Part:
 
 
 def finger_left_link() -> Part:
-    """Return the finger on -y in its frame: the right one turned half about x."""
+    """Return the finger on -y in its frame: the right one turned by half a turn about x."""
     part = Part("finger_left_link")
     for material, solid in _finger(part.link).bodies():
         part.add(material, solid.rotate((180.0, 0.0, 0.0)))

@@ -1,4 +1,4 @@
-"""What several links carry alike: hubs, boxes, conduit fittings, screws, names; mm."""
+"""Fittings of several links: hubs, boxes, conduit fittings, screws, names; mm."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from robot_description.cad.solid import (
 Sideways = Literal["+y", "-y"]
 
 SCREW_HEAD_HEIGHT = 1.6
-SOCKET_SHARE = 0.5  # of the head's diameter
+SOCKET_FRACTION = 0.5  # of the head's diameter
 GLAND_NUT = 18.0  # across flats
 SLEEVE_DIAMETER, SLEEVE_MOUTH, SLEEVE_NECK = 19.6, 14.4, 7.0
 EYE_DIAMETER = 22.0
 DISC_EDGE, DISC_GAP = 4.0, 1.4
-STAR_SCREWS, STAR_CIRCLE, STAR_SCREW = 6, 0.26, 0.19  # shares of the cap's diameter
+STAR_SCREWS, STAR_CIRCLE, STAR_SCREW = 6, 0.26, 0.19  # count; fractions of the cap's diameter
 LETTER_STANDS = 0.2
 BORE_CLEARANCE, BORE_SEGMENTS = 1.0, 24  # on the diameter
 SEAM_WIDTH, SEAM_STANDS = 0.8, 0.1
 
 
 def screws(part: Part, points: Iterable[Point], toward: Direction, head: float) -> None:
-    """Set socket screws with heads of diameter ``head`` on a surface at ``points``."""
+    """Add socket screws with heads of diameter ``head`` at ``points`` of a surface."""
     for at in points:
         part.add(
             STEEL,
@@ -52,12 +52,12 @@ def screws(part: Part, points: Iterable[Point], toward: Direction, head: float) 
                 [(-0.8, head / 2, 0.0), (SCREW_HEAD_HEIGHT, head / 2, 0.0)], toward, at, segments=10
             ),
         )
-        socket = SOCKET_SHARE * head
+        socket = SOCKET_FRACTION * head
         part.cut(rod(socket, SCREW_HEAD_HEIGHT - 0.9, 4.0, toward, at, segments=6), of=STEEL)
 
 
 def gland(part: Part, fitting: Gland) -> None:
-    """Set a swivel gland: nut, ball and the sleeve that the conduit goes into."""
+    """Add a swivel gland: nut, ball and the sleeve that holds the conduit."""
     nut = prism(
         circle(GLAND_NUT / 2 / math.cos(math.pi / 6), segments=6),
         -1.0,
@@ -86,7 +86,7 @@ def gland(part: Part, fitting: Gland) -> None:
 
 
 def eye(part: Part, fitting: Eye, foot: Manifold) -> None:
-    """Set a ring that the conduit passes through upwards, on the bracket ``foot``."""
+    """Add a ring that leads the conduit upwards, on the bracket ``foot``."""
     half = conduit.EYE_HALF
     outer = rod(EYE_DIAMETER, -half, half, at=fitting.at, edge=1.4)
     bore = rod(2 * conduit.RADIUS, -half - 1.0, half + 1.0, at=fitting.at)
@@ -113,8 +113,8 @@ def hub(
 ) -> None:
     """Close a joint on both sides: a black disc over the range ``disc``, a silver cap to ``end``.
 
-    ``diameter`` is the disc's and ``cap`` the silver centre's, which carries a ``star`` of screws
-    or a hole.
+    ``diameter`` is that of the disc and ``cap`` that of the silver centre, which has a ``star`` of
+    screws or a hole.
     """
     low, high = disc
     toward: Direction
@@ -140,20 +140,20 @@ def hub(
 
 
 def name(part: Part, text: str, height: float, at: Point, toward: Sideways) -> None:
-    """Letter ``text`` along the arm on a surface at ``at`` that faces sideways."""
+    """Add ``text`` along the arm at ``at`` on a surface that faces sideways."""
     flat = lettering(text, height, 2 * LETTER_STANDS).translate((0.0, 0.0, -LETTER_STANDS))
     upright = flat.rotate((90.0, 0.0, 0.0))  # faces -y, reads along +x
     part.add(BLUE, (upright if toward == "-y" else upright.rotate((0.0, 0.0, 180.0))).translate(at))
 
 
 def name_round(text: str, height: float, radius: float, azimuth: float) -> Manifold:
-    """Return ``text`` to read round a cylinder about z, centred at ``azimuth`` degrees and z 0."""
+    """Return ``text`` around a cylinder about z, centred at ``azimuth`` degrees and z 0."""
     ring = wrapped(text, height, 2 * LETTER_STANDS, radius - LETTER_STANDS)
     return ring.rotate((0.0, 0.0, azimuth))
 
 
 def bored(part: Part, diameter: float, half_length: float, x: float = 0.0) -> None:
-    """Bore everything there about the axis y at ``x`` for a shaft, out to both ``half_length``."""
+    """Bore ``part`` about the axis y at ``x`` for a shaft, to ``half_length`` on both sides."""
     reach = half_length
     part.cut(
         rod(
@@ -168,9 +168,10 @@ def bored(part: Part, diameter: float, half_length: float, x: float = 0.0) -> No
 
 
 def seam(radius: float, at: float, widest: float, toward: Direction = "+z") -> Manifold:
-    """Return the dark line of a joint round a turned part at height ``at`` along ``toward``.
+    """Return the dark line of a joint around a turned part at height ``at`` along ``toward``.
 
-    ``widest`` is the part's largest radius: with as many chords as the part the two never cross.
+    ``widest`` is the part's largest radius. The line has as many chords as the part, so the two
+    never intersect.
     """
     low, high = at - SEAM_WIDTH / 2, at + SEAM_WIDTH / 2
     return rod(2 * (radius + SEAM_STANDS), low, high, toward, segments=segments_of(widest))
@@ -179,7 +180,7 @@ def seam(radius: float, at: float, widest: float, toward: Direction = "+z") -> M
 def terminal_box(part: Part, x: Range, y: Range, z: Range, glands: Iterable[Gland]) -> None:
     """Add a box with a lid and screws towards +y and its ``glands``; a deep box has a second seam.
 
-    The seams show the dark core that the shells sit on.
+    The seams show the dark core under the shells.
     """
     gap = 0.8
     lid, edge = y[1] - 3.2, 1.2
@@ -199,7 +200,7 @@ def terminal_box(part: Part, x: Range, y: Range, z: Range, glands: Iterable[Glan
 
 
 def plug(part: Part, at: Point, toward: Direction, diameter: float) -> None:
-    """Set a round panel connector with a knurled ring and a dark face."""
+    """Add a round panel connector with a knurled ring and a dark face."""
     radius = diameter / 2
     part.add(
         BRIGHT,

@@ -1,4 +1,4 @@
-"""What the forks at shoulder, elbow and wrist have in common: cheeks, steps, covers, shafts; mm."""
+"""Common elements of the forks at shoulder, elbow and wrist: cheeks, steps, covers, shafts; mm."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PLATE_THICK, PLATE_SEAM = 3.2, 0.7
 
 
 def clamp(x: float) -> Manifold:
-    """Return the clamp round the tube at ``x``: two rings with a groove between them."""
+    """Return the clamp around the tube at ``x``: two rings with a groove between them."""
     radius, half = CLAMP_DIAMETER / 2, CLAMP_LENGTH / 2
     return lathe(
         [
@@ -49,12 +49,12 @@ def cover(radius: float, half: float, x: float, ribs: int = COVER_RIBS) -> Manif
 
 
 def egg(nose: float) -> Outline:
-    """Return the outline of a cheek about the joint, its nose ``nose`` along the link."""
+    """Return the outline of a cheek around the joint, with its nose at ``nose`` along the link."""
     return hull(circle(CHEEK_RADIUS), circle(CHEEK_NOSE_RADIUS, (nose, 0.0)))
 
 
 def cheeks(inside: float, nose: float) -> list[Manifold]:
-    """Return both cheeks: each a thin plate and a thick one with a seam between them."""
+    """Return both cheeks; each is a thin plate and a thick plate with a seam between them."""
     outline = egg(nose)
     inner, outer, fine = CHEEK_EDGE_INSIDE, CHEEK_EDGE_OUTSIDE, PLATE_SEAM
     middle, end = inside + PLATE_THICK, inside + CHEEK_THICK
@@ -79,5 +79,5 @@ def steps(diameter: float, start: float, end: float) -> list[Manifold]:
 
 
 def shaft(diameter: float, y: Range, x: float) -> Manifold:
-    """Return the cross cylinder that turns in the next fork, coarse because the fork hides it."""
+    """Return the cross cylinder that turns in the next fork; coarse, because the fork hides it."""
     return rod(diameter, y[0], y[1], "+y", (x, 0.0, 0.0), segments=20)

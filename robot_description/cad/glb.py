@@ -1,4 +1,4 @@
-"""Binary glTF 2.0, just what a link needs: one mesh, one primitive for each material."""
+"""Writing of binary glTF 2.0 for links: one mesh, one primitive for each material."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Primitive:
 
 
 class _Buffer:
-    """The binary chunk as it grows, with the views and accessors that describe it."""
+    """The growing binary chunk, with the views and accessors that describe it."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -35,7 +35,7 @@ class _Buffer:
         self.accessors: list[dict[str, Any]] = []
 
     def add(self, values: NDArray[Any], target: int, **accessor: Any) -> int:
-        """Append ``values`` and return the number of their accessor."""
+        """Append ``values`` and return the index of their accessor."""
         raw = values.tobytes()
         self.views.append(
             {
@@ -57,7 +57,7 @@ def _vectors(buffer: _Buffer, values: NDArray[np.float32], bounds: bool) -> int:
 
 
 def glb_bytes(name: str, primitives: list[Primitive]) -> bytes:
-    """Return the file of the mesh ``name``; the same input gives the same bytes."""
+    """Return the GLB file of the mesh ``name``; the same input gives the same bytes."""
     buffer = _Buffer()
     parts = []
     for number, primitive in enumerate(primitives):

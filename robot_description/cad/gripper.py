@@ -1,7 +1,7 @@
-"""gripper_link: the gripper's body, a turned cone milled to a fork about the finger drive; mm.
+"""gripper_link: the gripper's body, a turned cone milled to a fork around the finger drive; mm.
 
-The origin lies on the back of its plate, x forward. The fingers share a pivot along z; a pinion on
-x drives a crown sector on each, from both sides, so that they turn against each other.
+The origin lies on the back of its plate, x forward. The fingers share a pivot along z. A pinion on
+x drives a crown sector on each, from both sides, so that they turn in opposite directions.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ PLATE_RADIUS, PLATE_THICK, PLATE_EDGE = 25.0, 2.0, 0.5
 BOLTS, BOLT_HEAD, BOLT_POCKET = 15.8, 4.4, 5.4  # (+-15.8, +-15.8) from the axis
 COLLAR_RADIUS, COLLAR_END = 21.6, 4.5
 GROOVE_RADIUS = 18.4
-SOCKET_CLEARANCE = 0.1  # about the roll link's flange, which the plate takes in
+SOCKET_CLEARANCE = 0.1  # around the roll link's flange, which fits into the plate
 
 SEGMENTS = 60  # of the turned surfaces
 
 CONE_RADIUS, CONE_X, CONE_TAPER = 20.0, (5.3, 48.5), 3.6
-CONE_RINGS = 6  # so many facets a degree steeper each keep the flats' edges crisp
-FLAT_X, FLAT_SINKS, FLAT_RIM = 10.5, 0.04, 0.5  # where the flats begin, and their rims
+CONE_RINGS = 6  # facets, each a degree steeper than the last, which keep the flats' edges crisp
+FLAT_X, FLAT_SINKS, FLAT_RIM = 10.5, 0.04, 0.5  # start, depth and rim of the flats
 TIP_HALF_Y, TIP_HALF_Z = 7.0, 15.5
 TIP_CORNER = 4.0
 
@@ -39,7 +39,7 @@ BEARING_RADIUS, BEARING_END = 4.6, 23.1
 PIVOT_X, PIN_DIAMETER = 34.0, 3.7
 PIN_HEAD, PIN_HEAD_Z = 7.4, (15.0, 18.0)
 
-# A 14-tooth pinion and 43 on a full crown: the manufacturer's 0.3254 turns a turn of the motor.
+# A pinion of 14 teeth and a full crown of 43 give the manufacturer's ratio 0.3254.
 PINION_TEETH, PINION_X = 14, (23.0, 27.4)
 PINION_TIP, PINION_ROOT = 3.25, 2.35
 EYE_DIAMETER = 5.0
@@ -62,10 +62,10 @@ def _wedge(half: float) -> Outline:
 
 
 def _milled(blank: Manifold, half: float, roll: float) -> Manifold:
-    """Return what to take off the flat of ``blank`` that ends ``half`` off the axis at the tip.
+    """Return the solid to remove for the flat of ``blank`` that ends ``half`` off the axis.
 
-    The flat sinks by a hair within a hair's breadth of its outline, so that it is shaded flat and
-    the rim catches the light. ``roll`` (degrees about x) tells which of the flats.
+    The flat lies FLAT_SINKS deep inside a narrow rim, so that it is shaded flat and the rim catches
+    the light. ``half`` is measured at the tip. ``roll`` (degrees about x) selects the flat.
     """
     tilt = math.degrees(math.atan((CONE_RADIUS - half) / (CONE_X[1] - FLAT_X)))
     level_with = blank.rotate((-roll, 0.0, 0.0)).rotate((0.0, -tilt, 0.0))
@@ -76,7 +76,7 @@ def _milled(blank: Manifold, half: float, roll: float) -> Manifold:
 
 
 def _cone() -> Manifold:
-    """Return the body's blank: turned to a slight barrel, with four flats towards the tip."""
+    """Return the blank of the body: turned to a slight barrel, with four flats towards the tip."""
     low, high = CONE_X
     profile = [
         (
@@ -96,7 +96,7 @@ def _cone() -> Manifold:
 
 
 def _window() -> list[Manifold]:
-    """Return what to cut for the window: a slot through both flats, its rims chamfered."""
+    """Return the solids to cut for the window: a slot through both flats, with chamfered rims."""
     (low, high), half = WINDOW_X, WINDOW_HALF_Z
     slot = prism(rectangle(WINDOW_X, (-half, half), WINDOW_CORNER), -30.0, 30.0, 0.0, "y")
     slope = (CONE_RADIUS - TIP_HALF_Y) / (CONE_X[1] - FLAT_X)
@@ -126,7 +126,7 @@ def _pinion() -> Manifold:
             (0.30, PINION_ROOT),
         )
     ]
-    # A tooth points to each crown, on +z and on -z.
+    # One tooth points to each crown, on +z and on -z.
     turn = math.pi / 2.0
     turned = [
         (u * math.cos(turn) - v * math.sin(turn), u * math.sin(turn) + v * math.cos(turn))

@@ -1,7 +1,8 @@
-"""Collision shapes: every link cut into slabs along chosen planes, each slab replaced by its hull.
+"""Collision shapes: each link is cut into slabs along chosen planes, and each slab gets its hull.
 
-One hull a link would fill its forks. The planes are chosen where a link changes its outline, so
-that each hull stays near the solid; fork cheeks are cut apart sideways. mm, in the link's frame.
+A single hull per link would fill its forks. The planes are at changes of a link's outline, so that
+each hull is near the solid. Fork cheeks are cut apart sideways. Dimensions are in mm, in the link's
+frame.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ NORMALS: dict[Axis, tuple[float, float, float]] = {
 
 @dataclass(frozen=True)
 class Cut:
-    """Parallel planes across a solid, and the pieces between them that are cut further.
+    """Parallel planes across a solid, with further cuts of the pieces between them.
 
     Attributes:
-        axis: the planes are square to it.
-        planes: where they are [mm], rising; n planes make n + 1 pieces.
+        axis: the planes are perpendicular to it.
+        planes: their positions [mm], rising; n planes make n + 1 pieces.
         pieces: further cuts by the piece's number, counted from 0 along the axis.
-        enclosed: numbers of the pieces that a neighbour's hull encloses at every angle of the joint
-            between. They get no hull: nothing else can reach them, and programs that check a link
-            on the table against its child would see the two overlap for ever.
+        enclosed: numbers of the pieces that a neighbour's hull encloses at every joint angle. They
+            get no hull, because nothing else can reach them. Programs that check a link on the
+            table against its child would otherwise always find a contact of the two.
     """
 
     axis: Axis
@@ -94,16 +95,16 @@ CUTS: dict[str, Cut] = {
     "finger_right_link": Cut("x", (9.6, 48.0, 63.0), {0: Cut("y", (12.0,))}),
     "finger_left_link": Cut("x", (9.6, 48.0, 63.0), {0: Cut("y", (-12.0,))}),
 }
-"""By link: a change of its outline asks for another plane here, and a test says where."""
+"""Cuts by link. A change of a link's outline can need another plane here; a test shows where."""
 
 
 def whole(part: Part) -> Manifold:
-    """Return everything of ``part`` as one solid."""
+    """Return all bodies of ``part`` as one solid."""
     return reduce(lambda a, b: a + b, (body for _, body in part.bodies()))
 
 
 def pieces(solid: Manifold, cut: Cut) -> list[Manifold]:
-    """Return ``solid`` cut apart, in the order of the planes, without empty and enclosed pieces."""
+    """Return the pieces of ``solid`` in the order of the planes, except empty and enclosed ones."""
     found: list[Manifold] = []
     rest = solid
     for number, plane in enumerate((*cut.planes, None)):
@@ -118,12 +119,12 @@ def pieces(solid: Manifold, cut: Cut) -> list[Manifold]:
 
 
 def hulls_of(part: Part) -> list[Manifold]:
-    """Return the hulls of ``part``: together they hold all of it that is not enclosed."""
+    """Return the hulls of ``part``; together they contain all of it that is not enclosed."""
     return [piece.hull() for piece in pieces(whole(part), CUTS.get(part.link, UNCUT))]
 
 
 def build_hulls(folder: Path = COLLISION) -> Iterator[Built]:
-    """Write every hull as binary STL in metres into ``folder``, and take away what was there."""
+    """Write every hull as binary STL in metres into ``folder``, in place of its old files."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.stl"):
         old.unlink()
@@ -137,7 +138,7 @@ def build_hulls(folder: Path = COLLISION) -> Iterator[Built]:
 
 
 def with_collisions(urdf: str, folder: Path = COLLISION) -> str:
-    """Return the text of a URDF with the hulls in ``folder`` as the shapes of its links."""
+    """Return the text of a URDF with the hulls in ``folder`` as collision shapes of its links."""
 
     def shaped(link: re.Match[str]) -> str:
         files = sorted(folder.glob(f"{link['name']}_[0-9]*.stl"), key=_number)
@@ -161,6 +162,6 @@ def _stl_bytes(hull: Manifold) -> bytes:
     corners = np.asarray(mesh.vert_properties)[:, :3] * MILLIMETRE
     triangles = corners[np.asarray(mesh.tri_verts, dtype=np.int64)]
     facets = np.zeros(len(triangles), dtype=[("values", "<f4", (4, 3)), ("attribute", "<u2")])
-    # A facet's normal is left zero, which readers take from its corners.
+    # Facet normals are zero, so that readers compute them from the corners.
     facets["values"][:, 1:] = triangles
     return b"".join((bytes(80), np.array(len(facets), "<u4").tobytes(), facets.tobytes()))

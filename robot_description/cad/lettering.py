@@ -24,8 +24,8 @@ def _arc(
     )
 
 
-# Centre lines: capitals and digits 6 high, small letters 4.2. A stroke that ends where it starts
-# is closed. Beside them stands the letter's width.
+# Width and centre lines of each letter: capitals and digits are 6 high, small letters 4.2. A stroke
+# that ends where it starts is closed.
 _STROKES: dict[str, tuple[float, tuple[Stroke, ...]]] = {
     "A": (4.0, (((0, 0), (2, 6), (4, 0)), ((0.7, 2), (3.3, 2)))),
     "K": (4.0, (((0, 0), (0, 6)), ((4, 6), (0, 2.4)), ((1.4, 3.6), (4, 0)))),
@@ -54,7 +54,7 @@ _SLANT = 0.16  # sideways for each mm of height
 
 
 def _line(stroke: Stroke) -> CrossSection:
-    """Return ``stroke`` with the letters' weight, its bends mitred."""
+    """Return ``stroke`` with the weight of the letters and mitred bends."""
     path: NDArray[np.float64] = np.array(stroke, dtype=np.float64)
     closed = math.dist(stroke[0], stroke[-1]) < 1e-9
     side = np.diff(path, axis=0)
@@ -62,7 +62,7 @@ def _line(stroke: Stroke) -> CrossSection:
     left = np.column_stack((-side[:, 1], side[:, 0]))
     before = np.vstack((left[-1:] if closed else left[:1], left))
     after = np.vstack((left, left[:1] if closed else left[-1:]))
-    # A sharp bend is cut blunt: its mitre would be a spike.
+    # The mitre of a sharp bend is limited, because it would be a spike.
     mitre = (before + after) / np.maximum(1.0 + (before * after).sum(axis=1), 0.75)[:, None]
     if not closed:
         path[0] -= side[0] * _WEIGHT / 2
@@ -90,12 +90,10 @@ def _slanted(sections: Sequence[CrossSection]) -> CrossSection:
 
 
 def lettering(text: str, height: float, thick: float) -> Manifold:
-    """Return ``text`` centred on the origin, reading along x, standing from z 0 to ``thick``.
+    """Return ``text`` centred on the origin, reading along x, from z 0 to ``thick``.
 
     Raises:
-    ------
-    ValueError
-        A letter has no strokes.
+        ValueError: a letter has no strokes.
     """
     unknown = sorted(set(text) - set(_STROKES) - {" "})
     if unknown:
@@ -112,7 +110,7 @@ def lettering(text: str, height: float, thick: float) -> Manifold:
 
 
 def wrapped(text: str, height: float, thick: float, radius: float) -> Manifold:
-    """Return ``text`` bent round the axis z, centred on +x at z 0, standing out from ``radius``."""
+    """Return ``text`` bent around the axis z, centred on +x at z 0, raised from ``radius``."""
 
     def bend(points: NDArray[np.float64]) -> NDArray[np.float64]:
         angle, reach = points[:, 0] / radius, radius + points[:, 2]

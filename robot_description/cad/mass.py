@@ -1,8 +1,9 @@
 """Mass, centre of mass and inertia of each link, from its solids, written into the URDF.
 
-A link is the outer shape drawn here with a motor inside. The castings are hollow and hold gears and
-boards that are not drawn, so each link counts its materials at one fraction of their density: the
-share that, with the motor, gives the link its mass. Overlapping bodies count once, as the denser.
+A link is its outer shape with a motor inside. The castings are hollow and contain gears and boards
+that are not drawn. Therefore all materials of a link count with one fraction of their density,
+chosen so that the mass of the link including the motor is correct. Overlapping bodies count once,
+as the denser one.
 """
 
 from __future__ import annotations
@@ -58,9 +59,9 @@ DENSITY: Mapping[Material, float] = {  # kg/m^3
     PAD: 1200.0,
     BIRCH: 680.0,
 }
-"""Densest first: where two overlap, the first counts."""
+"""Sorted by density, highest first: where two materials overlap, the first one counts."""
 
-LINK_MASS: Mapping[str, float] = {  # kg; the arm without its box weighs 4.80
+LINK_MASS: Mapping[str, float] = {  # kg; the arm without its box has 4.80
     "base_link": 4.471,
     "arm_base_link": 1.405,
     "pan_link": 0.748,
@@ -76,7 +77,7 @@ LINK_MASS: Mapping[str, float] = {  # kg; the arm without its box weighs 4.80
 
 @dataclass(frozen=True)
 class Motor:
-    """A motor inside a link: catalogue mass in kg, diameter and length in mm, its middle."""
+    """A motor inside a link: catalogue mass in kg, diameter and length in mm, and its centre."""
 
     mass: float
     diameter: float
@@ -104,18 +105,23 @@ class Moments:
     second: NDArray[np.float64]
 
     def __add__(self, other: Moments) -> Moments:
+        """Return the moments of both shapes together."""
         return Moments(self.mass + other.mass, self.first + other.first, self.second + other.second)
 
     def times(self, factor: float) -> Moments:
-        """Return the moments of the same shape, ``factor`` times as dense."""
+        """Return the moments of the same shape with ``factor`` times the density."""
         return Moments(factor * self.mass, factor * self.first, factor * self.second)
 
 
 @dataclass(frozen=True)
 class Inertial:
-    """What a URDF says of a link: kg, centre of mass (3,) in m, inertia (3, 3) about it in kg m^2.
+    """The inertial values of a link in a URDF.
 
-    ``fill`` is the fraction of the materials' density that the link's hollow castings have.
+    Attributes:
+        mass: kg.
+        centre: (3,) centre of mass in m.
+        inertia: (3, 3) about the centre of mass in kg m^2.
+        fill: fraction of the materials' density that the link's hollow castings have.
     """
 
     mass: float
@@ -127,8 +133,8 @@ class Inertial:
 def moments(solid: Manifold, density: float = 1.0) -> Moments:
     """Return the moments of ``solid`` (mm) at ``density`` kg/m^3, exact for its triangles.
 
-    Each triangle spans a tetrahedron with the origin, whose signed moments add up (Tonon, Explicit
-    exact formulas for the 3-D tetrahedron inertia tensor, J. Math. Stat. 1, 2005).
+    Each triangle spans a tetrahedron with the origin, whose signed moments are summed (Tonon,
+    Explicit exact formulas for the 3-D tetrahedron inertia tensor, J. Math. Stat. 1, 2005).
     """
     mesh = solid.to_mesh64()
     corner = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] * MILLIMETRE
@@ -159,7 +165,7 @@ def moments_of(part: Part) -> Moments:
 
 
 def inertial(part: Part, mass: float, motor: Motor | None = None) -> Inertial:
-    """Return the inertial of ``part`` that weighs ``mass`` kg with ``motor`` inside."""
+    """Return the inertial of ``part`` with a total mass of ``mass`` kg including ``motor``."""
     shell = moments_of(part)
     inside = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
     if motor is not None:
@@ -182,7 +188,7 @@ def inertials() -> Mapping[str, Inertial]:
 
 
 def _text(value: float) -> str:
-    """Return five digits, and zero for what symmetry makes zero."""
+    """Return ``value`` with five digits, and zero for values that are zero by symmetry."""
     return f"{value:.5g}" if abs(value) > 1e-10 else "0"
 
 
@@ -198,12 +204,10 @@ def _block(found: Inertial) -> str:
 
 
 def with_inertials(urdf: str, found: Mapping[str, Inertial]) -> str:
-    """Return the text ``urdf`` with the <inertial> of each link replaced, all else untouched.
+    """Return the text ``urdf`` with the <inertial> of each link replaced, and all else unchanged.
 
     Raises:
-    ------
-    ValueError
-        A link has no <inertial> to replace.
+        ValueError: a link has no <inertial> to replace.
     """
     for link, values in found.items():
         pattern = rf'(<link name="{link}">(?:(?!</link>).)*?)<inertial>.*?</inertial>'

@@ -1,4 +1,4 @@
-"""Physically based materials, as glTF's metallic-roughness model knows them."""
+"""Physically based materials in glTF's metallic-roughness model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Material:
     """A surface: colour is sRGB 0..1, metallic and rough are glTF's factors 0..1.
 
-    ``paint`` lies so thin that its edges are shaded with its face.
+    ``paint`` is so thin that its edges are shaded together with its face.
     """
 
     name: str
@@ -19,7 +19,7 @@ class Material:
     paint: bool = False
 
     def linear_colour(self) -> list[float]:
-        """Return the colour as glTF wants it: linear RGB and opacity."""
+        """Return the colour for glTF: linear RGB and opacity."""
         linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in self.colour]
         return [*(round(c, 5) for c in linear), 1.0]
 
@@ -56,4 +56,4 @@ MATERIALS: tuple[Material, ...] = (
     *(BRASS, LENS, PAD),
     *(MELAMINE, RIM, LAMINATE, BIRCH),
 )
-"""In the order their primitives are written."""
+"""All materials, in the order in which their primitives are written."""

@@ -1,4 +1,4 @@
-"""Closed plane outlines, counter-clockwise, in mm: what a prism is extruded from."""
+"""Closed plane outlines, counter-clockwise, in mm, from which prisms are extruded."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Outline = NDArray[np.float64]
 """(n, 2) corners, counter-clockwise, mm."""
 
 SAGITTA = 0.15
-"""How far a chord may lie inside its circle, mm."""
+"""Maximum distance of a chord from its circle, mm."""
 FACETS_PER_QUARTER = 3
-"""Facets a quarter turn of a fillet gets: 30 degrees each, under the shading crease."""
+"""Facets per quarter turn of a fillet: 30 degrees each, less than the shading crease."""
 CHAMFER_BELOW = 1.3
-"""Fillets with a smaller radius, mm, become chamfers: nobody sees the difference."""
+"""Fillets with a smaller radius, mm, become chamfers; the difference is invisible."""
 GRID = 1e5
-"""Points are rounded to 1/GRID mm, so that the last bit of a sine never reaches a file."""
+"""Points are rounded to 1/GRID mm, so that the last bit of a sine never changes a file."""
 
 
 def on_grid(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -28,7 +28,7 @@ def on_grid(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def segments_of(radius: float) -> int:
-    """Return how many chords a circle of ``radius`` mm gets: a multiple of 4, at least 12."""
+    """Return the number of chords of a circle of ``radius`` mm: a multiple of 4, at least 12."""
     half_turn = math.acos(1.0 - min(SAGITTA / radius, 0.5))
     return max(12, 4 * math.ceil(math.pi / (4.0 * half_turn)))
 
@@ -42,7 +42,7 @@ def circle(radius: float, at: tuple[float, float] = (0.0, 0.0), segments: int = 
 
 
 def facets_of(radius: float, sweep: float = math.pi / 2.0) -> int:
-    """Return how many facets an arc of ``radius`` mm over the angle ``sweep`` gets."""
+    """Return the number of facets of an arc of ``radius`` mm over the angle ``sweep``."""
     if radius < CHAMFER_BELOW:
         return 1
     turn = min(math.pi / 2.0 / FACETS_PER_QUARTER, 2.0 * math.pi / segments_of(radius))
@@ -58,9 +58,7 @@ def fillet_points(
     """Return the points that replace ``corner`` between two others by an arc of ``radius`` mm.
 
     Raises:
-    ------
-    ValueError
-        The arc does not fit: a side is shorter than the arc's tangent.
+        ValueError: the arc does not fit, because a side is shorter than the arc's tangent.
     """
     cx, cy = corner
     ax, ay = before[0] - cx, before[1] - cy
@@ -89,12 +87,12 @@ def fillet_points(
 
 
 def filleted(chain: Sequence[tuple[float, float, float]]) -> list[list[tuple[float, float]]]:
-    """Return what replaces each inner corner (u, v, fillet radius) of an open ``chain``, mm.
+    """Return the arcs that replace the inner corners (u, v, fillet radius) of ``chain``, mm.
+
+    The chain is open.
 
     Raises:
-    ------
-    ValueError
-        Two neighbouring fillets overlap, or one is longer than its side.
+        ValueError: two neighbouring fillets overlap, or one is longer than its side.
     """
     arcs: list[list[tuple[float, float]]] = []
     for before, (u, v, radius), after in zip(chain, chain[1:], chain[2:], strict=False):
@@ -135,8 +133,9 @@ def toothed(
     count: int,
     at: tuple[float, float] = (0.0, 0.0),
 ) -> Outline:
-    """Return a circle with ``count`` teeth: each (fraction of the pitch, depth below
-    ``radius``).
+    """Return a circle of ``radius`` with ``count`` equal teeth.
+
+    ``teeth``: the corners of one tooth, each (fraction of the pitch, depth below ``radius``).
     """
     step = 2.0 * math.pi / count
     points = [
@@ -160,9 +159,7 @@ def inset(outline: Outline, distance: float) -> Outline:
     """Return ``outline`` with every side moved inwards by ``distance`` mm, point for point.
 
     Raises:
-    ------
-    ValueError
-        A side would vanish or turn round: the distance exceeds a corner's radius.
+        ValueError: a side would vanish or reverse, because ``distance`` exceeds a corner's radius.
     """
     side = np.roll(outline, -1, axis=0) - outline
     length = np.sqrt(side[:, 0] ** 2 + side[:, 1] ** 2)

@@ -19,7 +19,7 @@ LABEL_Z, LABEL_HEIGHT = 18.3, 1.2
 
 
 def _socket(part: Part, x: Range, z: Range, front: float) -> None:
-    """Set a metal shell with a dark mouth."""
+    """Add a metal shell with a dark mouth."""
     part.add(BRIGHT, block(x, (front - SOCKET_STANDS, front + 1.0), z, 0.5))
     mouth_x, mouth_z = (x[0] + WALL, x[1] - WALL), (z[0] + WALL, z[1] - WALL)
     part.cut(block(mouth_x, (front - 9.0, front - 0.2), mouth_z), of=BRIGHT)
@@ -27,7 +27,7 @@ def _socket(part: Part, x: Range, z: Range, front: float) -> None:
 
 
 def _network(part: Part, low: float, front: float) -> None:
-    """Set a network socket: a mouth with the latch's notch below, two lamps above."""
+    """Add a network socket: a mouth with the latch's notch below, two lamps above."""
     high, (bottom, top) = low + NETWORK_WIDTH, NETWORK_Z
     middle = (low + high) / 2
     part.add(BRIGHT, block((low, high), (front - SOCKET_STANDS, front + 1.0), NETWORK_Z, 0.5))
@@ -61,7 +61,7 @@ def _network(part: Part, low: float, front: float) -> None:
 
 
 def _terminals(part: Part, front: float) -> None:
-    """Set the row of screw terminals: a wire's hole and a screw's head each."""
+    """Add the row of screw terminals, each with a hole for the wire and the head of a screw."""
     shell = block(STRIP_X, (front - STRIP_DEPTH, front + 1.0), STRIP_Z, 0.5)
     pitch = (STRIP_X[1] - STRIP_X[0]) / TERMINALS
     middle = sum(STRIP_Z) / 2
@@ -75,7 +75,7 @@ def _terminals(part: Part, front: float) -> None:
 
 
 def connectors(part: Part, front: float) -> None:
-    """Set everything on the panel whose face lies at y ``front``."""
+    """Add all connectors to the panel whose face is at y ``front``."""
     _terminals(part, front)
     for low in NETWORK_X:
         _network(part, low - NETWORK_WIDTH / 2 + 1.0, front)

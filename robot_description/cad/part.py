@@ -1,4 +1,4 @@
-"""A part: the solids of one link, kept apart by material."""
+"""A part: the solids of one link, one for each material."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from manifold3d import Manifold
 from robot_description.cad.material import MATERIALS, Material
 
 SIMPLIFY = 0.004
-"""Edges and bumps below this many mm that booleans leave are taken away."""
+"""Edges and bumps smaller than this, left by booleans, are removed; mm."""
 
 
 class Part:
@@ -18,13 +18,13 @@ class Part:
         self._solids: dict[Material, Manifold] = {}
 
     def add(self, material: Material, *solids: Manifold) -> None:
-        """Join ``solids`` to what is there of ``material``."""
+        """Add ``solids`` to the solid of ``material``."""
         for solid in solids:
             there = self._solids.get(material)
             self._solids[material] = solid if there is None else there + solid
 
     def cut(self, *tools: Manifold, of: Material | None = None) -> None:
-        """Take ``tools`` away from every material, or only from one."""
+        """Remove ``tools`` from every material, or only from ``of``."""
         for material in [of] if of is not None else list(self._solids):
             for tool in tools:
                 self._solids[material] = self._solids[material] - tool
@@ -33,9 +33,7 @@ class Part:
         """Return one solid for each material used, in the fixed order of the materials.
 
         Raises:
-        ------
-        ValueError
-            A cut has left nothing of a material.
+            ValueError: a cut has removed all of a material.
         """
         bodies = []
         for material in MATERIALS:

@@ -1,4 +1,4 @@
-"""What the arm works with: a cup, a basin and the table top it stands on; mm.
+"""The props of the arm: a cup, a basin and the table top on which it stands; mm.
 
 Cup and basin stand on z = 0 about their own axis. The table is in the frame of base_link.
 """
@@ -122,7 +122,7 @@ def _metres(*lengths: float) -> Any:
 
 
 def dimensions() -> dict[str, Any]:
-    """Return what the data file says of the props: metres and kilograms."""
+    """Return the contents of the data file of the props, in metres and kilograms."""
     angle, distance = pocket(CUP_OUTER_RADIUS)
     return {
         "about": "Metres, kilograms, radians. Cup and basin stand on z = 0 about their own axis z; "
@@ -158,7 +158,7 @@ def dimensions() -> dict[str, Any]:
 
 
 def build_props(folder: Path = PROPS) -> Iterator[Built]:
-    """Write every prop's GLB and the data file into ``folder``, yielding each GLB."""
+    """Write the GLB file of every prop and the data file into ``folder``; yield each GLB file."""
     folder.mkdir(parents=True, exist_ok=True)
     for make in PARTS:
         yield write_glb(make(), folder)

@@ -63,7 +63,7 @@ def _ring() -> Manifold:
 
 
 def _dome() -> Manifold:
-    crown = [  # a shallow cap, 12 degrees a facet are smooth
+    crown = [  # a shallow cap; facets of 12 degrees look smooth
         (DOME_TOP - DOME_CROWN * fraction * fraction, (DOME_RADIUS - 1.0) * fraction, 0.0)
         for fraction in (0.7, 0.35)
     ]
@@ -82,7 +82,7 @@ def _dome() -> Manifold:
 
 
 def _cover(part: Part, toward: Sideways) -> None:
-    """Add the light cover on one flat, its screws and the three lamps at its foot."""
+    """Add the light cover on one flat, with its screws and the three lamps at its foot."""
     sign = 1.0 if toward == "+y" else -1.0
     face = FLAT_Y + COVER_THICK
     sheet = rectangle(COVER_X, (-COVER_HALF_HEIGHT, COVER_HALF_HEIGHT), COVER_CORNER)

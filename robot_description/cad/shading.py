@@ -1,4 +1,4 @@
-"""Vertex normals: smooth over fillets, sharp over creases, flat where a face is flat."""
+"""Vertex normals: smooth over fillets, sharp over creases, flat on plane faces."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 CREASE = math.radians(47.0)
-"""Faces that meet at a larger angle are shaded apart; a chamfer of 45 degrees reads as rounded."""
+"""Faces that meet at a larger angle have separate normals; a 45 degree chamfer looks rounded."""
 PAINT_CREASE = math.radians(100.0)
-"""The same for paint: an edge of a fraction of a millimetre needs no shading of its own."""
+"""The same for paint: an edge of a fraction of a millimetre needs no separate normals."""
 COPLANAR = math.radians(0.5)
 """Faces that meet at a smaller angle count as one plane."""
 NORMAL_DIGITS = 4
-"""Corners of one vertex share it when their normals agree to this many decimals."""
+"""Corners of one vertex are merged if their normals agree to this many decimals."""
 
 
 def weld(
@@ -22,8 +22,8 @@ def weld(
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Return single-precision ``positions`` (n, 3) without duplicates, and their triangles.
 
-    Triangles that single precision collapses to a line are dropped with their twins, so a closed
-    surface stays closed.
+    Triangles that single precision collapses to a line are removed together with their twins, so a
+    closed surface stays closed.
     """
     unique, inverse = np.unique(positions.astype(np.float32), axis=0, return_inverse=True)
     faces = inverse.reshape(-1)[triangles]
@@ -32,7 +32,7 @@ def weld(
 
 
 def _patches(triangles: NDArray[np.int64], flat: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return for each triangle the lowest number among the coplanar ones it hangs together with."""
+    """Return for each triangle the lowest number in its connected coplanar patch."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
@@ -51,7 +51,7 @@ def _patches(triangles: NDArray[np.int64], flat: NDArray[np.float64]) -> NDArray
 
 
 def _angles(corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the (m, 3) angles of triangles given by their corners (m, 3, 3)."""
+    """Return the angles (m, 3) of triangles with the corners (m, 3, 3)."""
     ahead = np.roll(corner, -1, axis=1) - corner
     back = np.roll(corner, 1, axis=1) - corner
     dot = (ahead * back).sum(axis=2)
@@ -63,14 +63,14 @@ def _angles(corner: NDArray[np.float64]) -> NDArray[np.float64]:
 def shade(
     positions: NDArray[np.float32], triangles: NDArray[np.int64], crease: float = CREASE
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-    """Return vertices, unit normals, triangles with each vertex split where the surface creases.
+    """Return vertices, unit normals and triangles; vertices are split where the surface creases.
 
-    ``crease`` is the angle [rad] from which it does.
+    ``crease`` is the minimum angle [rad] of a crease.
 
-    A corner's normal is the sum of the normals of the faces about its vertex that lie within the
-    crease angle of its own face, each weighted by the corner's angle and by the area of the whole
-    plane patch the face belongs to. So a large flat face stays flat beside the facets of a fillet,
-    and how a patch happens to be cut into triangles does not show.
+    A corner's normal is a weighted sum of the normals of faces around its vertex, for all faces
+    within the crease angle of its own face. The weight is the corner's angle times the area of the
+    whole plane patch of the face. So a large flat face stays flat beside the facets of a fillet,
+    and the triangulation of a patch is invisible.
     """
     corner = positions[triangles].astype(np.float64)
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -85,7 +85,7 @@ def shade(
     degree = np.bincount(vertex, minlength=len(positions))
     first = np.concatenate(([0], np.cumsum(degree)[:-1]))
 
-    # Every corner meets every corner of its vertex once: `mine` and `other` list those pairs.
+    # `mine` and `other` list all pairs of corners with a common vertex.
     meets = degree[vertex]
     mine = np.repeat(np.arange(len(vertex)), meets)
     offset = np.arange(len(mine)) - np.repeat(np.cumsum(meets) - meets, meets)

@@ -31,7 +31,7 @@ APRON_HALF, APRON_CLEARANCE, APRON_PLEAT, APRON_DEPTH = 22.0, 0.7, 3.4, 1.5
 
 
 def _apron(foot: float, top: float, height: float) -> Manifold:
-    """Return a pleated wall across the slot, hollowed for the bellows that turn inside."""
+    """Return a pleated wall across the slot, with space for the bellows that turn inside."""
     count = round((height - SKIRT_TOP) / APRON_PLEAT)
     outward = 1.0 if foot > 0.0 else -1.0
     corners = [(outward * 12.0, SKIRT_TOP - 1.0), (foot, SKIRT_TOP - 1.0)]
@@ -53,7 +53,7 @@ def _boss(toward: float) -> Manifold:
 
 
 def pan_link() -> Part:
-    """Return the shoulder fork in its frame: the origin where axes 1 and 2 cross."""
+    """Return the shoulder fork in its frame, whose origin is the crossing of axes 1 and 2."""
     part = Part("pan_link")
     side = CHEEK_RADIUS
     foot = prism(rectangle((-side, side), (-CHEEK_OUTSIDE, CHEEK_OUTSIDE), 9.0), -1.0, 0.0)

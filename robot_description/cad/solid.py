@@ -28,7 +28,7 @@ Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Point = tuple[float, float, float]
 Range = tuple[float, float]
 
-# Columns: where the outline's two coordinates and the height go.
+# Target axes of the outline's two coordinates and of the height.
 _AXES: dict[Axis, tuple[int, int, int]] = {"x": (1, 2, 0), "y": (0, 2, 1), "z": (0, 1, 2)}
 _TURNS: dict[Direction, list[list[int]]] = {
     "+x": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
@@ -41,12 +41,10 @@ _TURNS: dict[Direction, list[list[int]]] = {
 
 
 def loft(rings: Sequence[NDArray[np.float64]]) -> Manifold:
-    """Return the solid through ``rings``, each (n, 3), counter-clockwise about the way up.
+    """Return the solid through ``rings``, each (n, 3), counter-clockwise about the up direction.
 
     Raises:
-    ------
-    ValueError
-        The rings do not close to a solid.
+        ValueError: the rings do not close to a solid.
     """
     count = len(rings[0])
     here = np.arange(count)
@@ -70,7 +68,7 @@ def loft(rings: Sequence[NDArray[np.float64]]) -> Manifold:
 
 
 def placed(solid: Manifold, toward: Direction = "+z", at: Point = (0.0, 0.0, 0.0)) -> Manifold:
-    """Return ``solid`` with its z axis turned ``toward`` a direction and its origin moved."""
+    """Return ``solid`` with its z axis turned to the direction ``toward`` and its origin moved."""
     turn = np.array(_TURNS[toward], dtype=np.float64)
     return solid.transform(np.column_stack((turn, np.array(at))))
 
@@ -147,13 +145,13 @@ def block(x: Range, y: Range, z: Range, edge: float = 0.0) -> Manifold:
 
 
 def around(count: int, radius: float, phase: float = 0.0) -> list[tuple[float, float]]:
-    """Return ``count`` points evenly round a circle of ``radius`` mm, the first at ``phase``."""
+    """Return ``count`` evenly spaced points on a circle of ``radius`` mm, from ``phase`` on."""
     angles = [phase + 2.0 * math.pi * k / count for k in range(count)]
     return [(radius * math.cos(a), radius * math.sin(a)) for a in angles]
 
 
 def ball(diameter: float, at: Point, segments: int = 16) -> Manifold:
-    """Return a sphere with ``segments`` round its equator."""
+    """Return a sphere with ``segments`` around its equator."""
     radius, half = diameter / 2.0, segments // 2
     angles = [math.pi * (k / half - 0.5) for k in range(1, half)]
     profile = [(radius * math.sin(a), radius * math.cos(a), 0.0) for a in angles]

@@ -1,4 +1,4 @@
-"""Binary STL: one closed solid a link, for simulators and slicers that read no GLB; metres."""
+"""Binary STL files, one closed solid per link, for programs that read no GLB; metres."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from robot_description.cad.shading import weld
 
 STL = Path(__file__).resolve().parent.parent / "stl"
 COARSER = 0.1
-"""Details below this many mm are left out."""
+"""Details smaller than this are left out; mm."""
 
 DIGITS = 4
-"""Decimals of a mm kept: readers that join corners by distance find the same ones."""
+"""Decimals of a mm in the file. Readers that join corners by distance find the same corners."""
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -32,7 +32,7 @@ def solid_of(part: Part) -> Manifold:
 
 
 def stl_bytes(name: str, solid: Manifold) -> tuple[bytes, int]:
-    """Return the file of ``solid`` (mm) in metres and its number of triangles."""
+    """Return the STL file of ``solid`` (mm) in metres, and its number of triangles."""
     mesh = solid.to_mesh64()
     points = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3].round(DIGITS) * MILLIMETRE
     positions, triangles = weld(points, np.asarray(mesh.tri_verts, dtype=np.int64))
@@ -47,7 +47,7 @@ def stl_bytes(name: str, solid: Manifold) -> tuple[bytes, int]:
 
 
 def build_stl(folder: Path = STL) -> Iterator[Built]:
-    """Write every link's STL into ``folder``, yielding each as it is done."""
+    """Write the STL file of every link into ``folder``, and yield each when it is written."""
     folder.mkdir(parents=True, exist_ok=True)
     for part in parts():
         data, triangles = stl_bytes(part.link, solid_of(part))

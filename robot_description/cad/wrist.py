@@ -1,4 +1,4 @@
-"""wrist_link: a fork and the round housing whose end face bears the roll joint; mm.
+"""wrist_link: a fork and the round housing whose end face carries the roll joint; mm.
 
 The origin lies on the wrist's axis, x along the link and the roll axis, y along the wrist's axis.
 """

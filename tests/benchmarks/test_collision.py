@@ -1,4 +1,4 @@
-"""The collision benchmark measures what it says."""
+"""The collision benchmark measures the advertised quantities."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 
 
-def test_it_prints_both_tables(capsys: pytest.CaptureFixture[str]) -> None:
+def test_both_tables_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
     main(["--postures", "3"])
     printed = capsys.readouterr().out
     assert "the nearest pair" in printed

@@ -1,4 +1,4 @@
-"""The kinematics benchmark measures what it says; no peer is needed for that."""
+"""The kinematics benchmark measures the advertised quantities; the tests need no peer."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is
 
 @pytest.fixture(scope="module")
 def tables() -> Tables:
-    """One short run of what needs no peer."""
+    """Return the tables of a short run without peers."""
     return measure(POSES, 2, 1, ROOT / "nowhere", ["katana450", "floor"])
 
 
@@ -63,7 +63,7 @@ def test_the_batch_table_holds_the_floor_and_the_app(tables: Tables) -> None:
     assert np.allclose(own.ratios, own.microseconds / floor.microseconds)
 
 
-def test_the_task_keeps_the_arm_and_survives_its_file(tmp_path: Path) -> None:
+def test_the_task_is_the_same_after_saving(tmp_path: Path) -> None:
     chain, task = seeded_task(3, 5)
     task.save(tmp_path / "task.npz")
     other = Task.load(tmp_path / "task.npz")
@@ -95,7 +95,7 @@ def test_wrong_answers_and_doubles_do_not_count() -> None:
 def test_a_peer_that_cannot_be_installed_is_listed_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without network and cache there is nothing to install from."""
+    """Run without network and cache, so that nothing can be installed."""
     monkeypatch.setenv("UV_OFFLINE", "1")
     monkeypatch.setenv("UV_NO_CACHE", "1")
     tables = measure(2, 1, 1, tmp_path / "peers", ["katana450", "eaik"])
@@ -110,7 +110,7 @@ def test_a_peer_that_cannot_be_installed_is_listed_with_the_reason(
 
 
 def test_a_peer_that_cannot_be_imported_is_an_error(tmp_path: Path) -> None:
-    """The app's own environment holds no peer."""
+    """Use the app's own environment, which has no peer."""
     seeded_task(2, 1)[1].save(tmp_path / "task.npz")
     for name, module in (("eaik", "eaik"), ("pinocchio", "pinocchio"), ("mink-free", "mink")):
         with pytest.raises(SolverError, match=rf"ModuleNotFoundError.*{module}"):
@@ -119,7 +119,7 @@ def test_a_peer_that_cannot_be_imported_is_an_error(tmp_path: Path) -> None:
 
 @needs_compiler
 def test_a_solver_that_dies_is_an_error(tmp_path: Path) -> None:
-    """The floor solves batches alone: asked for anything else it goes, and says why."""
+    """Ask the floor for a single pose: it solves only batches, so it fails and ends."""
     seeded_task(2, 1)[1].save(tmp_path / "task.npz")
     with SolverProcess(HERE, "floor", tmp_path / "task.npz", ROOT) as process:
         with pytest.raises(SolverError, match="AttributeError"):
@@ -151,9 +151,9 @@ def test_the_command_prints_both_tables_and_writes_json(
     written = ("--json", str(tmp_path / "figures.json"))
     monkeypatch.setattr(sys, "argv", ["kinematics", *options, *written])
     main()
-    said = capsys.readouterr().out
-    assert "One pose a call" in said
-    assert "in one call" in said
+    printed = capsys.readouterr().out
+    assert "One pose a call" in printed
+    assert "in one call" in printed
     figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
     (row,) = figures["one_by_one"]
     assert row["solver"] == "katana450 `inverse`"

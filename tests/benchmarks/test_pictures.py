@@ -1,4 +1,4 @@
-"""The picture benchmark draws what it says; VTK is not needed for that."""
+"""The picture benchmark draws its scenes; the tests do not need VTK."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A map worked out by a real scheduler and several worker processes on this machine."""
+"""A map computed by a real scheduler and several worker processes on this machine."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ ROOT = Path(__file__).resolve().parents[2]
 WORKERS = 2
 MAP = ("--voxel", "150", "--pitches", "4", "--rolls", "4", "--samples", "30", "--seed", "2")
 
-# distributed leaves sockets to the garbage collector when it is closed.
+# When distributed is closed, it leaves sockets to the garbage collector.
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
 
 class Processes:
-    """Dask processes of a test, each stopped at its end."""
+    """Dask processes of a test; all are stopped at its end."""
 
     def __init__(self, stack: ExitStack, folder: Path) -> None:
         self._stack, self._folder = stack, folder
 
     def scheduler(self) -> tuple[subprocess.Popen[str], str]:
-        """A new scheduler, and its address."""
+        """Start a new scheduler; return it and its address."""
         process, (address,) = self._start(
             "distributed.cli.dask_scheduler", "--port", "0", wait_for=[r"Scheduler at:\s+(tcp\S+)"]
         )
         return process, address
 
     def workers(self, address: str, count: int) -> None:
-        """Worker processes of the scheduler at ``address``."""
+        """Start worker processes of the scheduler at ``address``."""
         self._start(
             "distributed.cli.dask_worker",
             *(address, "--nworkers", str(count), "--nthreads", "1"),
@@ -55,7 +55,7 @@ class Processes:
     def _start(
         self, module: str, *options: str, wait_for: list[str]
     ) -> tuple[subprocess.Popen[str], list[str]]:
-        """Start ``python -m module`` and wait for lines that match; their first groups come too."""
+        """Start ``python -m module`` and wait for matching lines; return their first groups too."""
         process = self._stack.enter_context(
             subprocess.Popen(
                 [sys.executable, "-m", module, "--host", "127.0.0.1", "--no-dashboard", *options],
@@ -86,7 +86,7 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
 
 @pytest.fixture(scope="module")
 def scheduler(processes: Processes) -> tuple[subprocess.Popen[str], str]:
-    """A scheduler with its workers, and its address."""
+    """Start a scheduler with its workers; return it and its address."""
     process, address = processes.scheduler()
     processes.workers(address, WORKERS)
     return process, address
@@ -118,9 +118,9 @@ def test_workers_of_another_version_are_refused(
 ) -> None:
     monkeypatch.setattr(cluster, "version", lambda: "0.0.0")
     assert main(["workspace", *MAP, "--scheduler", address]) == 1
-    said = capsys.readouterr()
-    assert re.search(r"worker tcp\S+ has katana450 \S+ and this machine 0\.0\.0", said.err)
-    assert said.out == ""
+    printed = capsys.readouterr()
+    assert re.search(r"worker tcp\S+ has katana450 \S+ and this machine 0\.0\.0", printed.err)
+    assert printed.out == ""
 
 
 def test_workers_without_katana450_are_refused(
@@ -153,7 +153,7 @@ def test_scheduler_without_workers_is_reported(
 def test_dead_scheduler_is_reported(
     scheduler: tuple[subprocess.Popen[str], str], arm: MountedArm
 ) -> None:
-    """The last test of this file, because nobody is left to answer after it."""
+    """Kill the scheduler; this must be the last test of the file."""
     process, address = scheduler
     reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.0, 4, 4)
     survey = Survey(reachability, voxel=0.05, samples=0, seed=0)

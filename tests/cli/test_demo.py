@@ -45,12 +45,13 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_circle_is_traced_as_exactly_as_the_paper_has_it(out: Path) -> None:
+def test_the_circle_is_as_exact_as_in_the_paper(out: Path) -> None:
     found = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert next(iter(found)) == "max_position_error_mm"
     assert 0.0 < found["max_position_error_mm"] < 1e-12
     assert 0.0 < found["executed_position_error_mm"] < 1e-9
-    # Between two ticks a drive cuts the corner: v^2 dt^2 / (8 r), about 0.19 m/s and 100 mm.
+    # Between two ticks the drive takes the chord: an error of v^2 dt^2 / (8 r), with about 0.19 m/s
+    # and 100 mm.
     assert 1e-3 < found["between_ticks_error_mm"] < 1e-2
     assert found["path_length_mm"] == pytest.approx(200.0 * math.pi, rel=1e-5)
     assert found["margin_to_limits_deg"] > 5.0
@@ -62,7 +63,7 @@ def test_the_circle_is_traced_as_exactly_as_the_paper_has_it(out: Path) -> None:
 
 
 def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
-    """As the paper's equation has it, by the arm's own chain on the joints of every tick."""
+    """Compare with the paper's equation, by the arm's own chain at the joints of every tick."""
     with (out / "trace.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     on_circle = [row for row in rows if row["task"] == "circle"]
@@ -78,7 +79,7 @@ def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
     assert float(rows[-1]["t_s"]) == found["duration_s"]
 
 
-def test_figures_and_page_are_there(out: Path) -> None:
+def test_figures_and_page_are_written(out: Path) -> None:
     for name in ("tracing.png", "path.png", "joints.png", "speeds.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     page = (out / "report.html").read_text(encoding="utf-8")
@@ -102,7 +103,7 @@ def test_the_same_seed_gives_the_same_report(out: Path, tmp_path: Path) -> None:
 
 
 def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
-    """Initial configuration, grasping, approaching, emptying: its figures 9 to 12."""
+    """Check the phases of figures 9 to 12: initial posture, grasping, approaching, emptying."""
     done = katana450("demo", "pour", "--headless", "--report", str(tmp_path), seconds=150.0)
     assert done.returncode == 0, done.stderr
     shown = []
@@ -110,10 +111,10 @@ def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
         with Image.open(tmp_path / f"{name}.png") as picture:
             shown.append(np.asarray(picture).astype(int))
     for one, other in itertools.combinations(shown, 2):
-        # At least the hand is elsewhere.
+        # At least the hand is at another place.
         assert (np.abs(one - other).sum(axis=2) > 60).mean() > 0.005
     found = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
-    # The cup on the table, before it is lifted, is no clearance of the arm's.
+    # The contact of cup and table before the lift does not count as clearance of the arm.
     assert 6.0 < found["nearest_clearance_mm"] < 60.0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Emptied: 100 %; at least 99" in page
@@ -160,7 +161,7 @@ def test_a_circle_out_of_reach_is_refused_with_its_line() -> None:
     assert "reach" in done.stderr
 
 
-def test_the_script_that_comes_along_is_the_demo() -> None:
+def test_the_example_script_is_the_demo() -> None:
     path = ROOT / "app" / "katana450" / "extensions" / "programs" / "library" / "circle.yaml"
     stored, demo = parse(path.read_text(encoding="utf-8")), parse(CircleDemo().text)
     assert (stored.about, stored.expected) == (demo.about, demo.expected)

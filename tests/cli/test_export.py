@@ -1,4 +1,4 @@
-"""``katana450 export`` writes what it says, and says what it cannot."""
+"""``katana450 export`` writes all formats, and reports the reason where it cannot."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONGEST = 3.0
         ("urdf", "katana450_description.zip"),
     ],
 )
-def test_every_format_is_there_soon(
+def test_every_format_is_written_quickly(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, file: str
 ) -> None:
     before = time.process_time()
@@ -43,7 +43,7 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("c", "--trajectory", "m.csv"), "A file of c holds no motion"),
         (("urdf", "--pose", "0,0"), "A file of urdf stands in no pose"),
@@ -52,20 +52,20 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
         (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),
     ],
 )
-def test_what_cannot_be_done_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
+def test_impossible_exports_are_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
 ) -> None:
     assert main(["export", *words, "--out", str(tmp_path)]) == 1
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_in_the_way_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_existing_file_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("")
     assert main(["export", "glb", "--out", str(tmp_path / "file")]) == 1
     assert "cannot be made" in capsys.readouterr().err
 
 
-def test_words_that_are_no_pose_are_not_understood(tmp_path: Path) -> None:
+def test_an_invalid_pose_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SystemExit):
         main(["export", "glb", "--out", str(tmp_path), "--pose", "up"])

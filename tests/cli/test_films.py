@@ -1,4 +1,4 @@
-"""Films and pages of runs as a person makes them, and Ctrl-C in the middle of one."""
+"""Films and pages of runs as a person makes them, and Ctrl-C during a film."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ def test_a_film_of_a_motion(tmp_path: Path) -> None:
     path = tmp_path / "m.mp4"
     words = ("--trajectory", str(tmp_path / "m.csv"), "--size", "160x100", "--fps", "10")
     subprocess.run(command("render", "--out", str(path), *words), cwd=ROOT, check=True, timeout=120)
-    told = subprocess.run(
+    output = subprocess.run(
         [get_ffmpeg_exe(), "-i", str(path)], capture_output=True, text=True, check=False
     ).stderr
-    assert "160x100" in told
-    assert "10 fps" in told
-    # From 0 to 0.5 s, both ends shown.
-    assert re.search(r"Duration: 00:00:00.60", told)
+    assert "160x100" in output
+    assert "10 fps" in output
+    # From 0 to 0.5 s, with both ends.
+    assert re.search(r"Duration: 00:00:00.60", output)
 
 
-def test_ctrl_c_leaves_no_half_of_a_film(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_no_partial_film(tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text(TABLE.replace("0.5,1", "60,1"))
     path = tmp_path / "film" / "m.mp4"
     path.parent.mkdir()
@@ -56,20 +56,20 @@ def test_ctrl_c_leaves_no_half_of_a_film(tmp_path: Path) -> None:
         text=True,
         start_new_session=True,
     ) as process:
-        # Not before a picture is in it.
+        # Wait for the first picture in it.
         deadline = time.monotonic() + 90.0
         while not list(path.parent.iterdir()):
             assert time.monotonic() < deadline
             assert process.poll() is None
             time.sleep(0.1)
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=60)
+        _, output = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "Traceback" not in told
+    assert "Traceback" not in output
     assert list(path.parent.iterdir()) == []
 
 
-def test_the_pages_of_both_demos_are_small_and_ask_nobody(tmp_path: Path) -> None:
+def test_the_pages_of_both_demos_are_small_and_load_nothing(tmp_path: Path) -> None:
     for run in ("circle", "pour"):
         path = tmp_path / f"{run}.html"
         assert main(["export", "html", "--out", str(path), "--run", run]) == 0

@@ -28,7 +28,7 @@ GOLDEN = json.loads((ROOT / "tests" / "golden" / "fk_reference.json").read_text(
 def ask(
     command: str, lines: Sequence[object], *options: str, status: int = 0
 ) -> list[dict[str, Any]]:
-    """Return the answers to ``lines``: strings as they are, anything else as JSON."""
+    """Return the answers to ``lines``: strings are sent unchanged, other values as JSON."""
     text = "".join((x if isinstance(x, str) else json.dumps(x)) + "\n" for x in lines)
     out, err = io.StringIO(), io.StringIO()
     with (
@@ -69,7 +69,7 @@ def test_ik_gives_back_the_joints_among_every_branch() -> None:
         assert answer["residual_rad"] < 1e-9
 
 
-def test_ik_states_what_is_lost_of_a_pose_no_5_axis_arm_can_take() -> None:
+def test_ik_states_the_error_of_a_pose_that_five_axes_cannot_take() -> None:
     T = np.eye(4)
     T[:3, 3] = [0.3, 0.3, 0.0]  # the arm points along the diagonal, the pose along x
     (answer,) = ask("ik", [{"T": T.tolist()}])
@@ -105,10 +105,10 @@ def test_ik_with_metrics_gives_the_cost_of_each_solution() -> None:
 
 @pytest.mark.parametrize("decimals", [6, 5, 4])
 def test_ik_takes_printed_poses(arm: MountedArm, decimals: int) -> None:
-    """2,000 of 2,000, each answered within what the rounding implies.
+    """Check that all 2,000 poses are answered within the error that the rounding implies.
 
-    Next to a stretched elbow a rounded point can be out of reach at its orientation, which then
-    gives way by more than the rounding; ``residual_rad`` reports that.
+    Next to a stretched elbow a rounded point can be out of reach at its orientation. The
+    orientation then changes by more than the rounding; ``residual_rad`` reports that.
     """
     chain = arm.chain
     poses = [forward(chain, q) for q in random_postures(arm, 2000)]
@@ -197,18 +197,18 @@ GOOD = {"fk": {"q": [0, 0, 0, 0, 0]}, "ik": {"T": np.eye(4).tolist()}}
 
 
 @pytest.mark.parametrize("command", ["fk", "ik"])
-def test_a_bad_line_gets_an_error_and_the_rest_go_on(command: str) -> None:
-    """Good and bad lines take turns; each bad one is told its number and what is wrong."""
+def test_a_wrong_line_gets_an_error_and_the_rest_is_answered(command: str) -> None:
+    """Mix good and wrong lines; each wrong one is answered with its number and the reason."""
     lines = [line for bad, _ in BAD[command] for line in (GOOD[command], bad)]
     answers = ask(command, [*lines, GOOD[command]])
     assert all("error" not in answer for answer in answers[::2])
     assert answers[0] == answers[-1]
-    for number, (said, answer) in enumerate(
-        zip((said for _, said in BAD[command]), answers[1::2], strict=True), start=1
+    for number, (message, answer) in enumerate(
+        zip((message for _, message in BAD[command]), answers[1::2], strict=True), start=1
     ):
         assert set(answer) == {"error"}
         assert f"line {2 * number}: " in answer["error"]
-        assert said in answer["error"]
+        assert message in answer["error"]
 
 
 def test_the_exit_status_is_1_when_every_line_failed() -> None:
@@ -217,7 +217,7 @@ def test_the_exit_status_is_1_when_every_line_failed() -> None:
     ask("fk", [bad, good, bad], status=0)
 
 
-def test_bytes_that_are_not_utf_8_spoil_their_line_alone() -> None:
+def test_bytes_that_are_not_utf_8_affect_only_their_line() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "katana450", "fk"],
         input=b'\xff\xfe\n{"q": [0, 0, 0, 0, 0]}\n\xef\xbb\xbf{"q": [0, 0, 0, 0, 0]}\n',
@@ -236,7 +236,7 @@ def test_empty_lines_are_no_requests() -> None:
 
 
 def test_answers_come_line_by_line() -> None:
-    """A program that keeps the pipe open gets each answer at once."""
+    """Check that a program that keeps the pipe open gets each answer at once."""
     with subprocess.Popen(
         [sys.executable, "-m", "katana450", "fk"],
         stdin=subprocess.PIPE,

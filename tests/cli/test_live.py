@@ -1,4 +1,4 @@
-"""``katana450 run`` and ``demo`` where no server is running yet: they start one."""
+"""``katana450 run`` and ``demo`` start a server if none is running."""
 
 from __future__ import annotations
 

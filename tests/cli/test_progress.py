@@ -1,4 +1,4 @@
-"""The bar is drawn on a terminal and nowhere else."""
+"""The progress bar is drawn only on a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_items_pass_and_a_terminal_sees_how_many() -> None:
+def test_items_pass_and_a_terminal_shows_their_count() -> None:
     terminal = Terminal()
     assert list(progress(range(4), 4, "Work", terminal)) == [0, 1, 2, 3]
     text = terminal.getvalue()
@@ -32,7 +32,7 @@ def test_remaining_distance_is_reported() -> None:
     assert " s left" in terminal.getvalue()
 
 
-def test_anything_else_sees_nothing() -> None:
+def test_other_streams_get_nothing() -> None:
     stream = io.StringIO()
     assert list(progress(range(4), 4, "Work", stream)) == [0, 1, 2, 3]
     assert stream.getvalue() == ""

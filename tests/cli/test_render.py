@@ -1,4 +1,4 @@
-"""``katana450 render``: a picture as a person asks for it, and what is said where none can be."""
+"""``katana450 render`` makes the requested picture, and reports the reason where it cannot."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from katana450.cli.main import main
 SMALL = ("--size", "160x100")
 
 
-def test_a_picture_as_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_picture_has_the_requested_size(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "one.png"
     words = ["--pose=0.4,-1.187,1.484,0.14,0.5,0.2", "--camera", "tool", *SMALL]
     assert main(["render", "--out", str(path), *words]) == 0
@@ -22,7 +24,7 @@ def test_a_picture_as_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("a.gif",), "must end in .png for a picture or in .mp4"),
         (("a.mp4",), "A film wants a motion"),
@@ -37,12 +39,12 @@ def test_a_picture_as_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixt
         (("a.png", "--urdf", "nowhere.urdf"), "no robot description"),
     ],
 )
-def test_what_cannot_be_done_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
+def test_impossible_pictures_are_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
 ) -> None:
     out, *more = words
     assert main(["render", "--out", str(tmp_path / out), *more]) == 1
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -62,7 +62,7 @@ def test_two_servers_do_not_share_a_port() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (("--port", "70000"), "0 to 65535"),
         (("--port", "http"), "0 to 65535"),
@@ -70,10 +70,10 @@ def test_two_servers_do_not_share_a_port() -> None:
         (("--host", "192.0.2.1", "--port", "8299"), "--host"),
     ],
 )
-def test_invalid_address_is_reported(options: tuple[str, ...], said: str) -> None:
+def test_invalid_address_is_reported(options: tuple[str, ...], message: str) -> None:
     done = serve(*options)
     assert done.returncode != 0
-    assert said in done.stderr
+    assert message in done.stderr
     assert "Traceback" not in done.stderr
 
 
@@ -95,7 +95,7 @@ def test_viewer_stops_on_request(number: signal.Signals) -> None:
     output = process.communicate(timeout=20)[0]
     assert process.returncode == 0, output
     assert time.monotonic() - started < 5.0
-    # Whoever ends it is told nothing more, by no library either.
+    # Neither the program nor a library prints anything after the interrupt.
     assert output == ""
 
 
@@ -103,12 +103,12 @@ def test_late_start_failure_reports_only_its_reason(tmp_path: Path) -> None:
     (tmp_path / "map.npz").write_text("no map")
     done = serve("--port", str(free_port()), "--workspace", str(tmp_path / "map.npz"))
     assert done.returncode == 1
-    (said,) = done.stderr.strip().splitlines()
-    assert "map.npz is no reachability map" in said
+    (message,) = done.stderr.strip().splitlines()
+    assert "map.npz is no reachability map" in message
     assert "viser" not in done.stdout
 
 
-def test_the_command_tells_its_version_and_its_ways() -> None:
+def test_the_command_prints_its_version_and_its_commands() -> None:
     for option in ("--version", "--help"):
         done = subprocess.run(
             [sys.executable, "-m", "katana450", option],

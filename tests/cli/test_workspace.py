@@ -25,12 +25,12 @@ def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFi
     assert (
         main(["workspace", *COARSE, "--tool", "grasp", "--out", str(out), "--ply", str(ply)]) == 0
     )
-    said = capsys.readouterr()
+    printed = capsys.readouterr()
     stored = load_map(out)
-    assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in said.out
-    assert f"{stored.fraction.max():.1%}" in said.out
-    assert f"Written: {ply}" in said.out
-    assert said.err == ""
+    assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in printed.out
+    assert f"{stored.fraction.max():.1%}" in printed.out
+    assert f"Written: {ply}" in printed.out
+    assert printed.err == ""
     assert sorted(tmp_path.iterdir()) == [out, ply]
     assert (stored.robot, stored.tool) == ("katana450", "grasp")
     assert stored.voxel == pytest.approx(0.17)
@@ -43,7 +43,7 @@ def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
     assert one.read_bytes() == two.read_bytes()
 
 
-def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
+def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
     out = tmp_path / "map.npz"
     assert main(["workspace", *COARSE, "--table", "300", "--out", str(out)]) == 0
     assert load_map(out).points[:, 2].min() >= 0.3
@@ -53,7 +53,7 @@ def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--tool", "hammer"], "no link 'hammer'"),
         (["--table", "2000"], "comes up to"),
@@ -74,18 +74,18 @@ def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
     ],
 )
 def test_impossible_options_are_refused_before_the_work(
-    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    options: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     start = time.monotonic()
     assert main(["workspace", *options]) == 1
-    heard = capsys.readouterr()
-    assert heard.err.startswith("katana450: ")
-    assert said in heard.err
-    assert heard.out == ""
+    printed = capsys.readouterr()
+    assert printed.err.startswith("katana450: ")
+    assert message in printed.err
+    assert printed.out == ""
     assert time.monotonic() - start < 5.0
 
 
-def test_a_value_that_is_no_number_is_not_understood(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_value_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as exit_:
         main(["workspace", "--voxel", "big"])
     assert exit_.value.code == 2
@@ -93,7 +93,7 @@ def test_a_value_that_is_no_number_is_not_understood(capsys: pytest.CaptureFixtu
 
 
 def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
-    """A map fine enough to take minutes, on a terminal of its own, so that the bar is drawn."""
+    """Interrupt a map that takes minutes, on a terminal of its own, so that the bar is drawn."""
     master, slave = os.openpty()
     out = tmp_path / "map.npz"
     command = [sys.executable, "-m", "katana450", "workspace", "--voxel", "2", "--out", str(out)]

@@ -34,7 +34,9 @@ def test_what_follows_binds_what_it_follows() -> None:
     np.testing.assert_allclose(joints.lower, (-0.4, -math.pi, -1.0))
     np.testing.assert_allclose(joints.upper, (0.4, math.pi, 0.5))
     assert joints.speed[1] == 1.0
-    assert any("'turn' has no speed of its own: 1 rad/s" in note for note in robot.joint_notes)
+    assert any(
+        "'turn' has no speed in its file; it gets 1 rad/s" in note for note in robot.joint_notes
+    )
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -67,8 +69,8 @@ LOCKED = """<robot name="r"><link name="a"/><link name="b"/>
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('<robot name="r"><link name="a"/></robot>', "r has no joint that could be driven"),
-        (LOCKED, "'j' of r cannot be driven.*from 0.1 to 0.1"),
+        ('<robot name="r"><link name="a"/></robot>', "r has no joint that can be driven"),
+        (LOCKED, "'j' of r cannot be driven.*range is 0.1 to 0.1"),
         ("<robot", "no robot description|not a robot description"),
     ],
 )

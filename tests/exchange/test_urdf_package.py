@@ -337,7 +337,7 @@ def test_an_unreadable_mesh_is_named_in_words_of_ours(
     assert main(["export", kind, "--urdf", str(path), "--out", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err == (
         f"katana450: {mesh} cannot be read as a mesh: the file is corrupt, or {suffix} is not "
-        "understood. Export it anew, for example as binary STL.\n"
+        "supported. Export it again, for example as binary STL.\n"
     )
 
 

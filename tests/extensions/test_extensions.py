@@ -125,7 +125,7 @@ def test_command_of_a_missing_extension_reports_it(blocking: Path) -> None:
     blocked = "katana450.extensions.media"
     said = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
     assert said.startswith("1 ")
-    assert "The extension media is needed and not installed." in said
+    assert "The extension media is needed but not installed." in said
 
 
 NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "media")

@@ -9,11 +9,11 @@ import katana450
 
 @pytest.fixture(scope="session")
 def shoulder_arm() -> katana450.Arm:
-    """The Katana450 with poses in the frame {S}."""
+    """Return the Katana450 with poses in the frame {S}."""
     return katana450.load()
 
 
 @pytest.fixture(scope="session")
 def base_arm() -> katana450.Arm:
-    """The Katana450 with poses in the base frame."""
+    """Return the Katana450 with poses in the base frame."""
     return katana450.load(frame="base")

@@ -1,4 +1,4 @@
-"""``import katana450``: what it gives, and what it leaves unloaded."""
+"""``import katana450``: its public names, and the libraries that it does not load."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ import katana450
 HEAVY = ("numpy", "viser", "coal", "trimesh", "yourdfpy", "matplotlib", "ruckig", "msgspec")
 
 
-def modules_after(words: str) -> set[str]:
-    """Return the names of all modules that a fresh process has loaded after ``words``."""
+def modules_after(statement: str) -> set[str]:
+    """Return the names of all modules that a fresh process has loaded after ``statement``."""
     done = subprocess.run(
-        [sys.executable, "-c", f"{words}; import sys; print(*sys.modules)"],
+        [sys.executable, "-c", f"{statement}; import sys; print(*sys.modules)"],
         capture_output=True,
         text=True,
         check=True,
@@ -45,7 +45,7 @@ def test_kinematics_load_neither_viewer_nor_plots() -> None:
 
 
 @pytest.mark.parametrize("name", katana450.__all__)
-def test_every_public_name_is_there_with_a_docstring(name: str) -> None:
+def test_every_public_name_has_a_docstring(name: str) -> None:
     assert getattr(katana450, name).__doc__
     assert name in dir(katana450)
 

@@ -1,4 +1,4 @@
-"""Kinematics of the library: the core's own numbers, in the frame asked for."""
+"""Kinematics of the library: the same numbers as in the core, in the requested frame."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_nearest_pose_of_a_feasible_one_is_itself(arm: katana450.Arm) -> None:
     assert best.reason == ""
 
 
-def test_nearest_pose_says_what_is_missed_and_why(arm: katana450.Arm) -> None:
+def test_nearest_pose_reports_errors_and_reason(arm: katana450.Arm) -> None:
     T = arm.fk(arm.ready)
     far = T.copy()
     far[0, 3] += 1.0
@@ -167,13 +167,13 @@ REFUSED: dict[str, tuple[Refused, str]] = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_unusable_input_is_refused_with_the_reason(arm: katana450.Arm, case: str) -> None:
-    call, said = REFUSED[case]
-    with pytest.raises(katana450.InputError, match=said):
+    call, message = REFUSED[case]
+    with pytest.raises(katana450.InputError, match=message):
         call(arm)
 
 
 @pytest.mark.parametrize(
-    ("file", "tool", "said"),
+    ("file", "tool", "message"),
     [
         (GANTRY, None, "axis|axes|joint"),
         (Path("/nowhere/arm.urdf"), None, "nowhere"),
@@ -181,7 +181,7 @@ def test_unusable_input_is_refused_with_the_reason(arm: katana450.Arm, case: str
     ],
 )
 def test_other_mechanisms_and_tools_are_refused(
-    file: Path | None, tool: str | None, said: str
+    file: Path | None, tool: str | None, message: str
 ) -> None:
-    with pytest.raises(katana450.RobotDescriptionError, match=said):
+    with pytest.raises(katana450.RobotDescriptionError, match=message):
         katana450.load(file, tool)

@@ -1,4 +1,4 @@
-"""Plans of the library: where they go, how fast, and what is refused."""
+"""Plans of the library: their goals, speeds and refusals."""
 
 from __future__ import annotations
 
@@ -145,8 +145,8 @@ REFUSED: dict[str, tuple[Callable[[katana450.Arm], Any], str]] = {
 def test_impossible_plans_are_refused_with_the_reason(
     shoulder_arm: katana450.Arm, case: str
 ) -> None:
-    call, said = REFUSED[case]
-    with pytest.raises(katana450.InputError, match=said):
+    call, message = REFUSED[case]
+    with pytest.raises(katana450.InputError, match=message):
         call(shoulder_arm)
 
 

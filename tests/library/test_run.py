@@ -1,4 +1,4 @@
-"""Plans that the arm of a real server follows, and a STOP in the middle of one."""
+"""Plans that the arm of a real server follows, and a STOP during one."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
         for state in onlooker.states(50.0):
             if abs(state.q[0] - plan.start[0]) < 3.5 if to_start else state.q[0] > -1.5:
                 break
-        # Both arrive together, on the connection that also carries the run.
+        # Both are sent together, on the connection that also carries the run.
         client.tell(requests.Stop())
         client.tell(requests.ClearStop())
         running.join(60.0)

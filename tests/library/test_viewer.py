@@ -12,7 +12,7 @@ import katana450
 
 
 def angle_shown(viewer: katana450.Viewer) -> float:
-    """Return axis 1 as it was last sent to browsers [rad]."""
+    """Return the angle of axis 1 that was last sent to browsers [rad]."""
     return viewer._scenery.arm._joints[0].angle
 
 

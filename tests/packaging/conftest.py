@@ -1,4 +1,4 @@
-"""The built wheel, installed in an environment that holds what ``make run`` installs."""
+"""The built wheel, installed in an environment with the packages that ``make run`` installs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the interpreter of a fresh environment with the wheel in it.
 
-    Its dependencies are the packages of requirements.lock and no others, as links to those of the
+    Its dependencies are only the packages of requirements.lock, as links to those of the
     environment that runs the tests.
     """
     home = tmp_path_factory.mktemp("fresh")
@@ -68,7 +68,7 @@ def link_locked_packages(site: Path) -> None:
         try:
             found = distribution(name)
         except PackageNotFoundError:
-            # For another system or version of Python.
+            # The package is for another system or version of Python.
             continue
         assert found.version in locked, f"{name} {found.version} is not the one that is locked"
         for top in {file.parts[0] for file in found.files or ()} - {"..", "__pycache__"}:

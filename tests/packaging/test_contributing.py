@@ -1,4 +1,4 @@
-"""The recipes of CONTRIBUTING.md name files and traits that there are."""
+"""The recipes of CONTRIBUTING.md name only files and traits that exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reports, films and a Dask cluster work with what ``make run`` installs, and with nothing else."""
+"""Reports, films and a Dask cluster work with only the packages that ``make run`` installs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAP = ("--voxel", "150", "--pitches", "4", "--rolls", "4", "--samples", "30", "-
 
 
 def run(folder: Path, *command: str | Path, seconds: float = 120.0) -> str:
-    """Return what ``command``, started in ``folder``, prints."""
+    """Return the output of ``command``, started in ``folder``."""
     words = [str(part) for part in command]
     done = subprocess.run(
         words, cwd=folder, capture_output=True, text=True, check=False, timeout=seconds
@@ -29,7 +29,7 @@ def run(folder: Path, *command: str | Path, seconds: float = 120.0) -> str:
 
 @contextmanager
 def dask(python: Path, folder: Path, *words: str, until: str) -> Iterator[str]:
-    """Run a Dask process; yields the first group of ``until`` in what it prints."""
+    """Run a Dask process; yield the first group of the pattern ``until`` in its output."""
     command = [str(python), "-m", *words, "--host", "127.0.0.1", "--no-dashboard"]
     with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
@@ -42,7 +42,7 @@ def dask(python: Path, folder: Path, *words: str, until: str) -> Iterator[str]:
             process.stderr.read()
 
 
-def test_libraries_are_there_without_those_of_the_tests(python: Path, tmp_path: Path) -> None:
+def test_libraries_are_installed_without_those_of_the_tests(python: Path, tmp_path: Path) -> None:
     words = (
         "import distributed, embreex.rtcore_scene, imageio_ffmpeg, matplotlib.pyplot, PIL.Image; "
         f"from importlib.util import find_spec; print(*filter(find_spec, {NOT_LOCKED})); "

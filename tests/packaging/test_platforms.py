@@ -1,4 +1,4 @@
-"""Calls that only some systems have stand in one module, and their alternatives work."""
+"""Calls that exist only on some systems are in one module, and their alternatives work."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from katana450 import platform_support
 APP = Path(katana450.__file__).parent
 ALLOWED = {
     "platform_support.py": None,
-    # Asks the kernel about one socket, and says what it answers where it cannot.
+    # Queries the kernel about one socket, and has an answer for systems without that call.
     "arm/runtime/readiness.py": {"TCP_INFO", "poll", "POLLIN", "POLLOUT"},
 }
 MODULES = {"curses", "fcntl", "grp", "msvcrt", "pty", "pwd", "resource", "syslog", "termios", "tty"}
@@ -72,7 +72,7 @@ SIGNALS = {"SIGINT", "SIG_IGN", "signal"}
 
 
 def used_names(source: str) -> Iterator[str]:
-    """Yield the modules, names and paths of ``source`` that not every system has."""
+    """Yield the modules, names and paths in ``source`` that exist only on some systems."""
     for node in ast.walk(ast.parse(source)):
         match node:
             case ast.Import(names=names):
@@ -83,7 +83,7 @@ def used_names(source: str) -> Iterator[str]:
                 yield attr
             case ast.Attribute(value=ast.Name(id="self")):
                 continue
-            # Polling a pipe or a process has nothing to do with select.
+            # The method ``poll`` of a pipe or a process does not need select.
             case ast.Attribute(value=value, attr="poll") if ast.unparse(value) != "select":
                 continue
             case ast.Attribute(attr=attr) if attr in NAMES:
@@ -126,7 +126,7 @@ def test_such_calls_are_found(source: str, name: str) -> None:
 
 @pytest.fixture
 def windows(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, tuple[Any, ...]]]:
-    """Pretend to be Windows; return the calls of its libraries that are made, with arguments."""
+    """Pretend to be Windows; return the recorded calls of its libraries, with arguments."""
     calls: list[tuple[str, tuple[Any, ...]]] = []
 
     class Library:
@@ -174,7 +174,7 @@ def test_windows_claims_a_port_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert options == [(socket.SOL_SOCKET, -5, 1)]
 
 
-def test_modes_do_not_tell_on_windows_who_can_read_a_file(
+def test_modes_of_windows_never_show_other_readers(
     tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     path = tmp_path / "links.json"
@@ -188,18 +188,18 @@ def test_modes_do_not_tell_on_windows_who_can_read_a_file(
 
 
 def test_files_are_created_as_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
+    opened_flags: list[int] = []
     create = os.open
 
     def opened(path: Path, flags: int, mode: int) -> int:
-        asked.append(flags)
+        opened_flags.append(flags)
         return create(path, flags & ~(1 << 20), mode)
 
     monkeypatch.setattr(os, "O_BINARY", 1 << 20, raising=False)
     monkeypatch.setattr(os, "open", opened)
     path = tmp_path / "file"
     os.close(platform_support.create_file(path, 0o600))
-    assert asked[0] & (1 << 20)
+    assert opened_flags[0] & (1 << 20)
     if sys.platform != "win32":
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
     with pytest.raises(FileExistsError):
@@ -212,8 +212,8 @@ def test_stop_signals_are_those_of_the_system(monkeypatch: pytest.MonkeyPatch) -
     assert 21 in platform_support.stop_signals()
 
 
-def test_the_collision_engine_of_windows_is_the_other_one() -> None:
-    """A process without coal builds the arm's world and measures it."""
+def test_the_collision_engine_of_windows_works_without_coal() -> None:
+    """Build and measure the arm's world in a process without coal."""
     program = """
 import sys
 sys.modules["coal"] = None

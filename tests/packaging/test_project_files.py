@@ -1,4 +1,4 @@
-"""The files that services around the repository read are valid, and the versions agree."""
+"""The files that services around the repository read are valid, and all versions agree."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Installed by `uv tool install`, without make: the command works and serves the page."""
+"""An installation by `uv tool install`, without make, has a working command and serves the page."""
 
 from __future__ import annotations
 

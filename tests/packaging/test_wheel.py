@@ -1,4 +1,4 @@
-"""The built wheel, installed in a virtual environment of its own, beside files of other people."""
+"""The built wheel works in a virtual environment, beside files of a user with colliding names."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LINE = '{"q": [0, 0, 0, 0, 0]}\n'
 
 @pytest.fixture(params=["app.py", "app/__init__.py"])
 def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    """Return the folder of a user who has files with our old names, and works there."""
+    """Return the folder of a user who works there and has files with our old names."""
     for name in (request.param, "static/__init__.py", "robot_description/__init__.py"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(BROKEN, encoding="utf-8")
@@ -80,5 +80,5 @@ def test_server_runs_beside_files_of_the_user(
 
 @pytest.mark.long
 def test_demo_runs_beside_files_of_the_user(python: Path, folder: Path) -> None:
-    said = run(folder, python.parent / "katana450", "demo", "circle", "--headless")
-    assert "circle" in said.lower()
+    output = run(folder, python.parent / "katana450", "demo", "circle", "--headless")
+    assert "circle" in output.lower()

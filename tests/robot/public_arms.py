@@ -1,4 +1,4 @@
-"""Small descriptions of arms that are sold or printed: their joints, written anew from numbers."""
+"""Small descriptions of commercial and printed arms, made from their published numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ X: Triple = (1.0, 0.0, 0.0)
 
 
 class J(NamedTuple):
-    """A joint and its child link; limits None for one that has none."""
+    """A joint and its child link; ``limits`` is None for a joint without limits."""
 
     name: str
     type: str
@@ -30,7 +30,7 @@ class J(NamedTuple):
 
     @property
     def xml(self) -> str:
-        """As URDF has it."""
+        """The joint as an element of a URDF."""
         numbers = {
             name: " ".join(map(repr, getattr(self, name))) for name in ("xyz", "rpy", "axis")
         }
@@ -49,23 +49,24 @@ class J(NamedTuple):
 
 
 def urdf(name: str, joints: Sequence[J]) -> str:
-    """The text of a URDF without shapes."""
+    """Return the text of a URDF without shapes."""
     links = dict.fromkeys(link for joint in joints for link in (joint.parent, joint.child))
     parts = [f'<link name="{link}"/>' for link in links]
     return "\n".join([f'<robot name="{name}">', *parts, *(j.xml for j in joints), "</robot>"])
 
 
 def written(folder: Path, name: str, joints: Sequence[J]) -> Path:
-    """``urdf`` in a file of its name in ``folder``."""
+    """Write ``urdf`` to a file of its name in ``folder`` and return the path."""
     path = folder / f"{name}.urdf"
     path.write_text(urdf(name, joints), encoding="utf-8")
     return path
 
 
 def katana(wrist: float, tool: Triple, *, turned: bool = False) -> list[J]:
-    """A Katana as its ROS driver has it: two driven fingers, neither of which mimics the other.
+    """Return a Katana as in its ROS driver, with two driven fingers that do not mimic each other.
 
-    wrist: axis 4 to 5 [m]. tool: frame on link 5. turned: whether link 5 has its z along the roll.
+    wrist: distance from axis 4 to 5 [m]. tool: frame on link 5. turned: whether the z axis of link
+    5 is along the roll axis.
     """
     bent = (QUARTER, 0.0, -QUARTER) if turned else (-QUARTER, 0.0, QUARTER)
     level = (0.0, QUARTER if turned else 0.0, 0.0)
@@ -102,7 +103,7 @@ KATANAS = {
 
 
 def interbotix(*axes: J) -> list[J]:
-    """An arm of the X series: a horn that turns without end, and two fingers that slide."""
+    """Return an arm of the X series, with an endless horn and two sliding fingers."""
     last = axes[-1].child
     return [
         *axes,
@@ -157,7 +158,7 @@ YOUBOT_FINGERS = [
         ("finger_r", "right", -0.008, 0.0),
     )
 ]
-"""Neither mimics the other."""
+"""Two fingers that do not mimic each other."""
 
 UR5 = [
     J("shoulder_pan", "revolute", "base", "l1", (0.0, 0.0, 0.089159)),
@@ -232,11 +233,11 @@ SO101 = [
         limits=(-0.174533, 1.74533),
     ),
 ]
-"""With the rounding of the published file: angles of six digits."""
+"""Joints with the rounding of the published file: angles of six digits."""
 
 
 def stewart() -> list[J]:
-    """Six legs of three joints each between a base and one plate."""
+    """Return a Stewart platform: six legs of three joints each between a base and one plate."""
     return [
         J(name, kind, parent, child)
         for leg in range(1, 7)

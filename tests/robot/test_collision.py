@@ -1,4 +1,4 @@
-"""What collision bodies are made of what a URDF says."""
+"""The collision bodies follow from the shapes in a URDF."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_an_arm_without_collision_shapes_has_no_world(arm: str) -> None:
     assert world_of(robot) == (None, ())
 
 
-def test_our_own_arm_has_every_link_in_it(robot: Robot) -> None:
+def test_world_of_the_katana_has_every_link(robot: Robot) -> None:
     world, notes = world_of(robot)
     assert notes == ()
     assert world is not None
@@ -40,7 +40,7 @@ def test_our_own_arm_has_every_link_in_it(robot: Robot) -> None:
     assert [len(part.shapes) for part in world.parts] == [len(b.collisions) for b in shaped]
 
 
-def test_primitives_stand_where_the_file_puts_them(tmp_path: Path) -> None:
+def test_primitives_have_the_poses_of_the_file(tmp_path: Path) -> None:
     model = with_forearm(
         tmp_path,
         '<collision><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/>'
@@ -55,7 +55,7 @@ def test_primitives_stand_where_the_file_puts_them(tmp_path: Path) -> None:
     np.testing.assert_allclose(shape.high, (0.12, 0.1, 0.03), atol=1e-9)
 
 
-def test_shapes_without_a_volume_or_a_file_are_told(tmp_path: Path) -> None:
+def test_shapes_without_volume_or_file_are_reported(tmp_path: Path) -> None:
     sheet = trimesh.Trimesh(vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2]])
     sheet.export(tmp_path / "sheet.stl")
     mesh = '<collision><geometry><mesh filename="{}.stl"/></geometry></collision>'

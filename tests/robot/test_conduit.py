@@ -1,4 +1,4 @@
-"""The conduit keeps to its fittings, its length and its way, whatever the joints do."""
+"""The conduit keeps its fittings, its length and its path at all joint angles."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_it_runs_from_the_base_to_the_wrist_over_every_bending_joint(arm: Mounte
 
 @pytest.mark.parametrize("number", range(4))
 def test_it_leaves_one_fitting_and_arrives_at_the_other(arm: MountedArm, number: int) -> None:
-    """Where the URDF, read by other code, has the two links."""
+    """Compare with the poses of both links, as yourdfpy reads them from the URDF."""
     stretch = arm.stretches[number]
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
     hinge = stretch.hinge
@@ -48,15 +48,16 @@ def test_it_leaves_one_fitting_and_arrives_at_the_other(arm: MountedArm, number:
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_its_ribs_keep_their_distance_and_it_never_leaps(arm: MountedArm, number: int) -> None:
+def test_its_ribs_keep_their_distance_and_it_moves_continuously(
+    arm: MountedArm, number: int
+) -> None:
     stretch = arm.stretches[number]
     before = None
     for angle in np.linspace(stretch.hinge.lower, stretch.hinge.upper, 400):
         (points,), _ = stretch.courses([angle], DENSE)
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         length = steps.sum() * DENSE / (DENSE - 1)
-        # Round axis 1 it is drawn out and pushed together, as far as its ribs give; elsewhere it
-        # hangs.
+        # Around axis 1 its ribs stretch and compress it; elsewhere it hangs.
         give = STRETCH_FRACTION if stretch.winds else 0.08
         assert 1.0 - give < length / stretch.length < 1.0 + give
         # Ribs are drawn at even steps along it.
@@ -67,7 +68,7 @@ def test_its_ribs_keep_their_distance_and_it_never_leaps(arm: MountedArm, number
 
 
 FITTED = 0.022
-"""[m] From each end: so much of it is in the fitting, or comes out of it."""
+"""[m] Length at each end that is inside the fitting or comes out of it."""
 
 POSTURES = (
     (0, -68, 85, 8, 0),
@@ -81,14 +82,14 @@ POSTURES = (
     (-90, -100, -60, 30, 0),
     (-130, -80, 110, 100, 0),
 )
-"""[degrees] Of the pictures, the limits of axis 1, and folded up both ways."""
+"""[deg] Postures of the pictures, at the limits of axis 1, and folded up in both directions."""
 
 
 @pytest.mark.parametrize("posture", POSTURES)
 def test_it_is_clear_of_every_solid(
     robot: Robot, arm: MountedArm, surfaces: dict[str, FloatArray], posture: tuple[int, ...]
 ) -> None:
-    """By random points on what is seen of the links, some 5 mm apart."""
+    """Test random points on the visible surfaces of the links, about 5 mm apart."""
     angles = robot.joint_values(np.radians(posture), 0.0)
     T = robot.frames(angles)
     solid = np.concatenate(
@@ -104,7 +105,7 @@ def test_it_is_clear_of_every_solid(
 
 @pytest.fixture(scope="module")
 def surfaces(robot: Robot) -> dict[str, FloatArray]:
-    """Points (n, 3) [m] on each link, in its frame."""
+    """Return points (n, 3) [m] on each link, in its frame."""
     return {
         body.name: np.concatenate(
             [
@@ -127,7 +128,7 @@ def test_a_rib_is_a_closed_band_seen_from_outside() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("nonsense", "Expecting value"),
         ("{}", "conduits"),
@@ -135,48 +136,48 @@ def test_a_rib_is_a_closed_band_seen_from_outside() -> None:
         ('{"conduits": 3}', "not iterable"),
     ],
 )
-def test_a_broken_file_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_a_broken_file_is_refused(tmp_path: Path, text: str, message: str) -> None:
     urdf = tmp_path / URDF_PATH.name
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(text, encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=said) as refused:
+    with pytest.raises(RobotDescriptionError, match=message) as refused:
         load(urdf).require_arm()
     assert CONDUITS in str(refused.value)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
-        ({"radius": -1.0}, "thick"),
-        ({"length": float("inf")}, "long"),
+        ({"radius": -1.0}, "radius -1.0 m"),
+        ({"length": float("inf")}, "length inf m"),
         ({"radius": "thick"}, "could not convert"),
         ({"ends": []}, "not enough values"),
     ],
 )
-def test_a_conduit_that_is_none_is_refused(
-    tmp_path: Path, change: dict[str, object], said: str
+def test_a_conduit_with_invalid_values_is_refused(
+    tmp_path: Path, change: dict[str, object], message: str
 ) -> None:
     described = json.loads((URDF_PATH.parent / CONDUITS).read_text(encoding="utf-8"))
     described["conduits"][0].update(change)
     urdf = tmp_path / URDF_PATH.name
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(urdf).require_arm()
 
 
 @pytest.mark.parametrize(
-    ("start", "end", "said"),
+    ("start", "end", "message"),
     [
         ("arm_base_link", "upper_arm_link", "2 driven joints"),
-        ("upper_arm_link", "pan_link", "does not hang on"),
+        ("upper_arm_link", "pan_link", "is not a descendant of"),
         ("roll_link", "flange", "0 driven joints"),
-        ("nowhere", "wrist_link", "does not hang on"),
+        ("nowhere", "wrist_link", "is not a descendant of"),
         ("arm_base_link", "nowhere", "nowhere"),
     ],
 )
 def test_ends_on_links_without_one_joint_between_are_refused(
-    tmp_path: Path, start: str, end: str, said: str
+    tmp_path: Path, start: str, end: str, message: str
 ) -> None:
     described = json.loads((URDF_PATH.parent / CONDUITS).read_text(encoding="utf-8"))
     for one, link in zip(described["conduits"][0]["ends"], (start, end), strict=True):
@@ -184,5 +185,5 @@ def test_ends_on_links_without_one_joint_between_are_refused(
     urdf = tmp_path / URDF_PATH.name
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(urdf).require_arm()

@@ -1,4 +1,4 @@
-"""Faults of a URDF file: each is named with its file and line, and none in the words of Python."""
+"""Faults of a URDF file are reported with file and line, and never as an exception of Python."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ('xyz="0.05 0.0 0.15"', 'xyz="${a} 0 0"', r"line \d+: this is xacro, .* xacro arm.urdf >"),
         ('<link name="base"/>', '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/>', "is xacro"),
@@ -34,7 +34,7 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
         ('xyz="0.05 0.0 0.15"', 'xyz="5cm 0 0"', "xyz='5cm 0 0' .*must be 3 finite numbers"),
         ('lower="-2.0"', 'lower="low"', "lower='low' of the <limit> of <joint> .* a finite number"),
         ('<parent link="upper"/>', '<parent link="uper"/>', r"parent of joint 'elbow' is 'uper'"),
-        ('<child link="fore"/>', '<child link="for"/>', r"child of joint 'elbow' is 'for', and"),
+        ('<child link="fore"/>', '<child link="for"/>', r"child of joint 'elbow' is 'for', but"),
         ('<parent link="upper"/>', "", r"joint 'elbow' has no <parent>"),
         ('<parent link="upper"/>', "<parent/>", r"the <parent> of <joint> 'elbow' has no 'link'"),
         ('name="elbow" type="revolute"', 'name="elbow"', r"the <joint> 'elbow' has no 'type'"),
@@ -68,19 +68,19 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
         ),
     ],
 )
-def test_every_fault_of_a_file_is_named_with_its_line(
-    tmp_path: Path, old: str, new: str, said: str
+def test_every_fault_of_a_file_is_reported_with_its_line(
+    tmp_path: Path, old: str, new: str, expected: str
 ) -> None:
     path = edited(tmp_path, old, new)
-    with pytest.raises(RobotDescriptionError, match=said) as raised:
+    with pytest.raises(RobotDescriptionError, match=expected) as raised:
         find_robot(Settings(), path, None)
-    told = str(raised.value)
-    assert "arm.urdf" in told
+    message = str(raised.value)
+    assert "arm.urdf" in message
     for words in ("list.remove", "could not convert", "NoneType", "KeyError", "invalid literal"):
-        assert words not in told
+        assert words not in message
 
 
-def test_a_fault_that_only_the_reader_finds_ends_in_a_sentence_of_ours(
+def test_a_fault_that_only_the_reader_finds_is_reported_plainly(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object, **__: object) -> None:

@@ -1,4 +1,4 @@
-"""Any arm of the family, end to end: read, classified, solved, projected, served."""
+"""Other arms of the family, end to end: read, classified, solved, projected, served."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_the_youbot_is_that_of_its_manual() -> None:
     assert canonical.signs[1] == -canonical.signs[2] == canonical.signs[3]
     np.testing.assert_allclose(arm.T_base_shoulder[:3, 3], [0.0, 0.0, 0.147], atol=1e-15)
     assert list(arm.tools) == ["tip"]
-    assert arm.notes == ("Joint 'left' is taken for that of a gripper; 'tip' is the tool.",)
+    assert arm.notes == ("Joint 'left' is assumed to be a gripper joint; 'tip' is the tool.",)
     assert arm.fingers == {"left": (1.0, 0.0), "right": (1.0, 0.0)}
     assert (arm.gripper.lower, arm.gripper.upper) == (0.0, 0.0115)
 
@@ -83,7 +83,7 @@ def test_the_chain_agrees_with_yourdfpy(path: Path, other: MountedArm) -> None:
         np.testing.assert_allclose(other.T_base_shoulder @ forward(chain, q), expected, atol=1e-12)
 
 
-def test_every_pose_it_takes_is_solved_and_left_alone(other: MountedArm) -> None:
+def test_feasible_poses_are_solved_and_projected_unchanged(other: MountedArm) -> None:
     chain = other.chain
     rng = np.random.default_rng(4)
     exact = 0
@@ -104,7 +104,7 @@ def test_every_pose_it_takes_is_solved_and_left_alone(other: MountedArm) -> None
     assert exact >= 600
 
 
-def test_it_stands_ready_with_room_to_move(other: MountedArm) -> None:
+def test_ready_posture_has_room_to_move(other: MountedArm) -> None:
     chain = other.chain
     q = other.ready(Settings().ready)
     assert (q > chain.lower).all()
@@ -114,7 +114,7 @@ def test_it_stands_ready_with_room_to_move(other: MountedArm) -> None:
     assert abs(tool[1, 3]) < 1e-12
 
 
-def test_dragging_keeps_what_the_hand_does_not_move(other: MountedArm) -> None:
+def test_dragging_keeps_the_coordinates_that_are_not_dragged(other: MountedArm) -> None:
     chain = other.chain
     session = Session(other, other.ready(Settings().ready))
     state = session.begin(session.ready, 0.0, 0.0)
@@ -152,7 +152,7 @@ def test_it_is_served(path: Path) -> None:
         assert "Traceback" not in server.output
 
 
-def test_its_kinematics_are_answered_a_line(path: Path, other: MountedArm) -> None:
+def test_kinematics_are_answered_line_by_line(path: Path, other: MountedArm) -> None:
     def ask(command: str, request: object, *options: str) -> dict[str, object]:
         done = subprocess.run(
             [sys.executable, "-m", "katana450", command, "--urdf", str(path), *options],
@@ -188,7 +188,7 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ('<axis xyz="1 0 0"/>', '<axis xyz="0 1 0"/>', "axis 5 must be perpendicular to axis 4"),
         ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.1 0 0"/>', "axis 3 must be parallel"),
@@ -223,20 +223,20 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
     ],
 )
 def test_an_arm_of_another_kind_is_refused_with_the_reason(
-    tmp_path: Path, old: str, new: str, said: str
+    tmp_path: Path, old: str, new: str, message: str
 ) -> None:
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(edited(tmp_path, old, new)).require_arm()
 
 
-def test_a_tool_that_cannot_be_is_refused() -> None:
+def test_an_impossible_tool_is_refused() -> None:
     with pytest.raises(RobotDescriptionError, match="no link 'nose'; its links are base, turret"):
         load(PINCHER, "nose")
-    with pytest.raises(RobotDescriptionError, match=r"hangs on 4 turning joints .* --tool"):
+    with pytest.raises(RobotDescriptionError, match=r"is carried by 4 turning joints .* --tool"):
         load(PINCHER, "wrist")
 
 
-def test_meshes_of_other_formats_are_read_and_absent_ones_told(tmp_path: Path) -> None:
+def test_meshes_of_other_formats_are_read_and_absent_ones_reported(tmp_path: Path) -> None:
     trimesh.creation.box(extents=[10.0, 20.0, 30.0]).export(tmp_path / "box.stl")
     shape = (
         '<link name="forearm"><visual><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/>'
@@ -263,7 +263,7 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("no markup", "its XML is broken, syntax error: line 1"),
         ("<robot name='r'>\n <link name='a'>\n", "its XML is broken, no element found: line 3"),
@@ -273,23 +273,23 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
     ],
 )
 def test_invalid_robot_description_is_reported_plainly(
-    text: str, said: str, tmp_path: Path
+    text: str, message: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(text)
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(path)
 
 
-def test_a_joint_behind_a_tool_that_nobody_named_is_told(tmp_path: Path) -> None:
+def test_a_joint_behind_a_tool_without_name_is_reported(tmp_path: Path) -> None:
     more = """<link name="more"/><joint name="{}" type="revolute"><parent link="fingertips"/>
         <child link="more"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
     path = tmp_path / "six.urdf"
     path.write_text(PINCHER.read_text().replace("</robot>", more.format("jaw")))
     (note,) = load(path).require_arm().notes
-    assert note == "Joint 'jaw' is taken for that of a gripper; 'fingertips' is the tool."
+    assert note == "Joint 'jaw' is assumed to be a gripper joint; 'fingertips' is the tool."
     assert load(path, "fingertips").require_arm().notes == ()
-    # What no name calls a finger is an axis, until a person says where the tool is.
+    # A joint whose name does not suggest a finger is an axis, unless --tool names the tool.
     path.write_text(PINCHER.read_text().replace("</robot>", more.format("sixth")))
     with pytest.raises(RobotDescriptionError, match=r"has 6 axes .* add --tool fingertips"):
         load(path).require_arm()

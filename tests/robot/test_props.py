@@ -1,4 +1,4 @@
-"""The props are as large as their file says, and a broken file is refused."""
+"""The props have the sizes of their file, and an invalid file is refused."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ def test_a_straight_vessel_is_as_wide_at_its_floor() -> None:
 
 
 @pytest.mark.parametrize(
-    ("prop", "change", "said"),
+    ("prop", "change", "message"),
     [
         ("cup", {"height": -1.0}, "'height' is -1.0"),
         ("cup", {"outer_radius": 0.01}, "no thickness"),
         ("basin", {"mass": float("nan")}, "'mass' is nan"),
         ("basin", {"floor_radius": 0.0}, "'floor_radius' is 0.0"),
         ("basin", {"floor": "thick"}, "could not convert"),
-        ("table", {"x": [1.0, 0.0]}, "no span"),
+        ("table", {"x": [1.0, 0.0]}, "not an interval"),
         ("table", {"mesh": "chair.glb"}, "no mesh"),
     ],
 )
-def test_props_that_are_none_are_refused(
-    tmp_path: Path, prop: str, change: dict[str, object], said: str
+def test_invalid_props_are_refused(
+    tmp_path: Path, prop: str, change: dict[str, object], message: str
 ) -> None:
     described = json.loads(PROPS_PATH.read_text(encoding="utf-8"))
     described[prop].update(change)
@@ -63,12 +63,12 @@ def test_props_that_are_none_are_refused(
         (tmp_path / f"{name}.glb").touch()
     path = tmp_path / "props.json"
     path.write_text(json.dumps(described), encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load_props(path)
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"cup": 3, "basin": 3, "table": 3}'])
-def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
+def test_an_invalid_file_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "props.json"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(RobotDescriptionError, match=r"props\.json"):
@@ -77,8 +77,8 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
         load_props(tmp_path / "none.json")
 
 
-def test_what_stands_around_holds_the_props(robot: Robot, arm: MountedArm) -> None:
-    """Nothing of a prop's mesh is outside the shape that stands for it, nor the table above it."""
+def test_obstacles_enclose_the_props(robot: Robot, arm: MountedArm) -> None:
+    """Check that no mesh of a prop leaves its collision shape, nor the table's top face."""
     props = load_props()
     table, cup, basin = initial_objects(props)
     assert table.name == "table"

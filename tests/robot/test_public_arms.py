@@ -1,4 +1,4 @@
-"""Arms as their makers describe them: taken with their grippers, or refused for the true reason."""
+"""Arms as their makers describe them: read with their grippers, or refused for the true reason."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("joints", "said"),
+    ("joints", "message"),
     [
         (PX100, r"arm.urdf has 4 axes \(waist, shoulder, elbow, wrist_angle\)"),
         (UR5, r"arm.urdf has 6 axes \(shoulder_pan, .*, wrist_3\); the closed-form"),
@@ -156,9 +156,11 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
     ids=["PincherX-100", "UR5", "Z1", "Z1 with a jaw", "ViperX-300 6DOF", "a sixth axis",
          "a flange on six", "two arms", "a trigger", "six with a rail", "five with a rail"],
 )  # fmt: skip
-def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J], said: str) -> None:
+def test_the_number_of_axes_is_the_first_reason(
+    tmp_path: Path, joints: list[J], message: str
+) -> None:
     path = written(tmp_path, "arm", joints)
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(path).require_arm()
     found = find_robot(Settings(), path, None)
     assert found.robot.arm is None
@@ -196,10 +198,12 @@ def test_a_wheeled_base_does_not_hide_its_arm(tmp_path: Path) -> None:
     assert arm.chain.names == ("waist", "shoulder", "elbow", "wrist_angle", "wrist_rotate")
 
 
-def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) -> None:
+def test_the_loops_of_a_stewart_platform_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path, "stewart", stewart())
-    said = r"stewart.urdf, line \d+: link 'plate' is the child of 6 joints \(ball_1, .*closed loops"
-    with pytest.raises(RobotDescriptionError, match=r"(?i)" + said):
+    message = (
+        r"stewart.urdf, line \d+: link 'plate' is the child of 6 joints \(ball_1, .*closed loops"
+    )
+    with pytest.raises(RobotDescriptionError, match=r"(?i)" + message):
         find_robot(Settings(), path, None)
     four_bar = [
         J("a", "revolute", "ground", "crank"),
@@ -208,7 +212,9 @@ def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) ->
         J("d", "revolute", "rocker", "ground"),
     ]
     path = written(tmp_path, "four_bar", four_bar)
-    with pytest.raises(RobotDescriptionError, match=r"link 'ground' hangs on itself, by joint 'd'"):
+    with pytest.raises(
+        RobotDescriptionError, match=r"link 'ground' is its own ancestor, by joint 'd'"
+    ):
         find_robot(Settings(), path, None)
 
 
@@ -223,7 +229,7 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
         solutions = inverse(chain, project(chain, forward(chain, q), within_limits=False).T)
         exact = [s for s in solutions if s.exact]
         assert max(s.position_error for s in exact) < 1e-14
-        # Its own posture comes back: with the rounding of the file it was off by 35 mrad.
+        # Its own posture is found again; with the rounding of the file the error was 35 mrad.
         assert min(np.abs(np.sin(0.5 * (s.q - q))).max() for s in exact) < 1e-9
     robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     moved = []
@@ -231,7 +237,7 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
         robot.update_cfg(dict(zip(chain.names, q.tolist(), strict=True)) | {"gripper": 0.0})
         T = arm.T_base_shoulder @ forward(chain, q)
         moved.append(T[:3, 3] - robot.get_transform("gripper_frame_link")[:3, 3])
-    # Less than the last digit of the file, and as much as the note says.
+    # Less than the last digit of the file, and the amount in the note.
     assert np.linalg.norm(moved, axis=1).max() < 1.5e-6
     assert "about 0.001 mm" in note
 

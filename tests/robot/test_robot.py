@@ -1,4 +1,4 @@
-"""The URDF becomes a chain: screw axes, home configuration and limits come from the file alone."""
+"""The URDF becomes a chain: screw axes, home configuration and limits come only from the file."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_the_chain_agrees_with_yourdfpy_everywhere(robot: Robot, arm: MountedArm
             assert np.allclose(T, urdf.get_transform(tool), atol=1e-12)
 
 
-def test_the_links_the_view_draws_stand_where_yourdfpy_has_them(robot: Robot) -> None:
+def test_drawn_links_have_the_poses_of_yourdfpy(robot: Robot) -> None:
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
     q = np.array([0.4, -1.0, 0.7, 0.5, 1.1])
     angles = robot.joint_values(q, 0.2)
@@ -93,14 +93,14 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 
 
 def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
-    """Nothing of the robot is typed a second time: a longer arm in the file is a longer arm."""
+    """Check that a longer arm in the file is a longer arm: no number is duplicated."""
     changed = load(edited(tmp_path, 'xyz="0.190', 'xyz="0.290')).require_arm()
     assert changed.tools["tcp"][0, 3] == pytest.approx(0.7318)
     assert math.isclose(changed.chain.S[5, 2], 0.290)  # v of axis 3: -omega x r
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         (
             'xyz="0.190',
@@ -109,11 +109,11 @@ def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_file_that_will_not_do_is_refused_with_a_reason(
-    tmp_path: Path, old: str, new: str, said: str
+def test_an_unusable_file_is_refused_with_a_reason(
+    tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     path = edited(tmp_path, old, new)
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(path)
 
 
@@ -123,6 +123,6 @@ def test_a_finger_that_mimics_nothing_is_driven_with_the_other(tmp_path: Path) -
     assert (angles["finger_right_joint"], angles["finger_left_joint"]) == (0.2, 0.2)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(RobotDescriptionError, match=r"nowhere\.urdf"):
         load(tmp_path / "nowhere.urdf")

@@ -1,4 +1,4 @@
-"""Fingers that slide, from the file to what they hold."""
+"""Sliding fingers, from the file to the objects that they hold."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from tests.robot.public_arms import PX150, urdf
 
 BOX = '<link name="{0}"><{1}><geometry><box size="{2}"/></geometry></{1}></link>'
 THICK = 0.01
-"""[m] Of a finger, along its way."""
+"""[m] Thickness of a finger along its direction of motion."""
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A PincherX-150 with boxes for its fingers and its forearm."""
+    """Return the file of a PincherX-150 with boxes for its fingers and its forearm."""
     text = urdf("arm", PX150)
     sizes = {"left": f"0.04 {THICK} 0.02", "right": f"0.04 {THICK} 0.02", "upper": "0.03 0.03 0.03"}
     for link, size in sizes.items():
@@ -56,7 +56,7 @@ def world(robot: Robot) -> CollisionWorld:
     return world
 
 
-def test_their_bodies_slide(path: Path, arm: MountedArm, world: CollisionWorld) -> None:
+def test_bodies_of_fingers_slide(path: Path, arm: MountedArm, world: CollisionWorld) -> None:
     robot = yourdfpy.URDF.load(str(path), load_meshes=False)
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -104,7 +104,7 @@ def run(session: Session, state: State, *commands: cmd.Command) -> State:
     raise AssertionError(f"still on its way: {state.findings}")
 
 
-def test_they_hold_a_object_and_let_go_of_it(
+def test_they_hold_and_release_an_object(
     robot: Robot, arm: MountedArm, world: CollisionWorld
 ) -> None:
     ready = arm.ready(Settings().ready)

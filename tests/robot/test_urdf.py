@@ -1,4 +1,4 @@
-"""A URDF file is read once, by yourdfpy, and nothing of it is lost in plain values."""
+"""A URDF file is read once, by yourdfpy, and its plain values are complete."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     values = robot.values(())
     for files in (vrml_files(robot, values), c_files(robot, values), glb_files(robot, values)):
         assert all(files.values())
-    # Once by the checks, once by yourdfpy.
+    # One pass of the checks, one of yourdfpy.
     assert len(opened) == 2
 
 

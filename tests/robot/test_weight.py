@@ -1,4 +1,4 @@
-"""The torques that hold the arm of the file up, against its energy and against MuJoCo."""
+"""The torques that hold the arm of the file up agree with its energy and with MuJoCo."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from katana450.resources import URDF_PATH
 
 
 def energy(robot: Robot, q: FloatArray) -> float:
-    """[J] Of the weight, from where each mass is."""
+    """Return the potential energy [J] of the weight, from the position of each mass."""
     moved = (np.eye(4), *joint_frames(robot.require_arm().chain, q))
     return sum(
         GRAVITY * load.mass * float((moved[load.axes] @ [*load.centre, 1.0])[2])
@@ -27,7 +27,7 @@ def energy(robot: Robot, q: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_they_are_the_slope_of_the_energy(robot: Robot, arm: MountedArm, seed: int) -> None:
+def test_torques_are_the_slope_of_the_energy(robot: Robot, arm: MountedArm, seed: int) -> None:
     chain = arm.chain
     q = np.random.default_rng(seed).uniform(chain.lower, chain.upper)
     step = 1e-5
@@ -58,7 +58,7 @@ def test_vertical_arm_needs_torque_for_the_gripper_only(robot: Robot, arm: Mount
     chain = arm.chain
     upright = holding_torques(chain, np.deg2rad((30.0, -90.0, 0.0, 0.0, 0.0)), loads_of(robot))
     stretched = holding_torques(chain, np.zeros(chain.n), loads_of(robot))
-    # Axis 1 is vertical; a shoulder that holds the arm out pulls up, against positive angles.
+    # Axis 1 is vertical. A shoulder that holds the arm out pulls up, towards negative angles.
     assert abs(stretched[0]) < 1e-12
     assert stretched[1] < -5.0
     assert abs(upright[1]) < 0.1 * abs(stretched[1])

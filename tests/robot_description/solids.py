@@ -11,6 +11,6 @@ from robot_description.cad.build import PARTS
 
 @functools.cache
 def solid(link: str) -> Manifold:
-    """Return everything of ``link`` as one solid, mm."""
+    """Return all bodies of ``link`` as one solid, mm."""
     part = next(make() for make in PARTS if make.__name__ == link)
     return functools.reduce(lambda a, b: a + b, (body for _, body in part.bodies()))

@@ -1,4 +1,4 @@
-"""The design as code: the same bytes again, no link through another, errors that help."""
+"""The build of the design: reproducible bytes, no link through another, errors that help."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ JOINTS = (
 
 @functools.cache
 def solid(link: str) -> Manifold:
-    """Return everything of ``link`` as one solid, mm."""
+    """Return all bodies of ``link`` as one solid, mm."""
     part = next(make() for make in PARTS if make.__name__ == link)
     return functools.reduce(lambda a, b: a + b, (body for _, body in part.bodies()))
 
@@ -65,7 +65,7 @@ def test_no_link_cuts_its_neighbour_over_the_joint_range(name: str) -> None:
 
 
 @pytest.mark.parametrize("make", PARTS, ids=lambda make: make.__name__)
-def test_nothing_floats(make: Callable[[], Part]) -> None:
+def test_each_part_is_connected(make: Callable[[], Part]) -> None:
     assert len(solid(make.__name__).decompose()) == 1
 
 

@@ -1,4 +1,4 @@
-"""What the links carry: conduit ends where the fittings are, letters that can be read."""
+"""Fittings of the links: conduit ends are in the fittings, letters are legible."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_the_stretches_follow_one_another_from_the_base_to_the_wrist() -> None:
     assert [s.end.link for s in STRETCHES] == links[1:]
 
 
-def test_letters_have_the_width_and_height_asked_for() -> None:
+def test_letters_have_the_requested_width_and_height() -> None:
     made = lettering("katana450", 6.0, 0.5)
     low_x, low_y, low_z, high_x, high_y, high_z = made.bounding_box()
     slanted = 0.16 * 7.0

@@ -1,4 +1,4 @@
-"""The gripper on its raw solids: fingers that clear each other, open as far, hold the cup."""
+"""The gripper on its raw solids: the fingers are clear, open like the real ones, and hold a cup."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def corners(made: Manifold) -> NDArray[np.float64]:
     return np.asarray(made.to_mesh64().vert_properties, dtype=np.float64)[:, :3]
 
 
-def test_fingers_swing_clear_of_each_other_and_of_the_body() -> None:
+def test_fingers_are_clear_of_each_other_and_of_the_body() -> None:
     body = solid("gripper_link").translate((-PIVOT_X, 0.0, 0.0))
     for angle in np.linspace(*limits(), 25):
         right, left = fingers(float(angle))
@@ -115,6 +115,6 @@ def test_the_grasp_frame_is_on_the_axis_of_the_cup_held() -> None:
     np.testing.assert_allclose(grasp - pivot, (cup["held_before_pivot"], 0.0, 0.0), atol=1e-4)
 
 
-def test_a_thicker_cylinder_is_held_wider_open() -> None:
+def test_a_thicker_cylinder_opens_the_fingers_wider() -> None:
     angles = [pocket(radius)[0] for radius in (15.0, 25.0, 35.0)]
     assert angles == sorted(angles)

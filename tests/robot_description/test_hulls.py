@@ -1,4 +1,4 @@
-"""The collision shapes: they hold the whole of every link and stay near it."""
+"""The collision shapes enclose every link completely and stay near it."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def robot() -> yourdfpy.URDF:
 
 @functools.cache
 def solid(link: str) -> Manifold:
-    """Return everything of ``link``, mm."""
+    """Return all bodies of ``link``, mm."""
     return whole(next(make() for make in PARTS if make.__name__ == link))
 
 
@@ -56,7 +56,7 @@ def hulls(link: str) -> list[Manifold]:
 
 
 def turned(joint: yourdfpy.Joint, angle: float) -> NDArray[np.float64]:
-    """Return the child in the parent's frame, (4, 4) in mm."""
+    """Return the pose (4, 4) of the child in the parent's frame, mm."""
     T = np.eye(4) if joint.origin is None else np.array(joint.origin)
     T[:3, 3] *= 1e3
     x, y, z = joint.axis
@@ -78,7 +78,7 @@ def threaded(eye: conduit.Eye) -> Manifold:
 
 
 def filled(link: str) -> Manifold:
-    """Return ``link`` with what its neighbours at every angle, and the conduit, fill of it."""
+    """Return ``link`` with the space that its neighbours at every angle and the conduit take."""
     result = functools.reduce(lambda a, b: a + b, map(threaded, eyes(link)), solid(link))
     for joint in robot().joint_map.values():
         if link not in (joint.parent, joint.child):
@@ -112,7 +112,7 @@ def surface(shape: Manifold) -> coal.BVHModelOBBRSS:
 
 
 def standoff(excess: Manifold, model: coal.BVHModelOBBRSS) -> tuple[float, list[float]]:
-    """Return how far ``excess`` reaches from the surface of ``model``, and where that is, mm."""
+    """Return the maximum distance [mm] of ``excess`` from the surface of ``model``, and where."""
     mesh = excess.refine_to_length(5.0).to_mesh64()
     point, still, request = coal.Sphere(1e-9), coal.Transform3s(), coal.DistanceRequest()
     found = (0.0, [0.0, 0.0, 0.0])
@@ -167,8 +167,8 @@ def outside_hulls(link: str) -> Manifold:
 
 
 @pytest.mark.parametrize("link", [link for link in LINKS if link != "pan_link"])
-def test_hulls_hold_the_whole_link(link: str) -> None:
-    # Rounding leaves skins where a hull's face is the solid's.
+def test_hulls_enclose_the_whole_link(link: str) -> None:
+    # Rounding leaves thin skins where the faces of hull and solid coincide.
     assert outside_hulls(link).volume() < SKIN * solid(link).volume()
 
 
@@ -188,7 +188,7 @@ def test_the_column_encloses_what_the_hulls_of_the_shoulder_leave_out() -> None:
 
 
 def test_shoulder_and_column_do_not_overlap_at_any_angle() -> None:
-    """Programs do not excuse a pair of neighbours when one of them is fixed to the world."""
+    """Check a pair that programs never exclude, since one of the two is fixed to the world."""
     joint = robot().joint_map["axis_1"]
     for angle in np.linspace(joint.limit.lower, joint.limit.upper, 25):
         T = turned(joint, float(angle))[:3]
@@ -212,12 +212,12 @@ def test_every_hull_stays_near_its_link(link: str) -> None:
         )
 
 
-def test_pieces_come_in_order_and_lose_nothing() -> None:
+def test_pieces_are_in_order_and_complete() -> None:
     bar = block((0.0, 9.0), (0.0, 2.0), (0.0, 1.0))
     found = pieces(bar, Cut("x", (1.0, 3.0), {1: Cut("y", (0.5,))}))
     assert [piece.volume() for piece in found] == pytest.approx([2.0, 1.0, 3.0, 12.0])
     assert len(pieces(bar, Cut("x", (-1.0, 10.0)))) == 1
 
 
-def test_cuts_are_of_links_there_are() -> None:
+def test_cuts_are_of_existing_links() -> None:
     assert set(CUTS) <= set(LINKS)

@@ -1,4 +1,4 @@
-"""The URDF as other programs read it: MuJoCo, with no help from this project."""
+"""The URDF as MuJoCo reads it, without help from this project."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_mujoco_places_every_link_where_yourdfpy_does(
 
 
 def moving(robot: yourdfpy.URDF) -> list[tuple[str, yourdfpy.Joint]]:
-    """Return the joints that are no mimic and not fixed, by name."""
+    """Return the joints by name that are neither fixed nor mimics."""
     return [(name, robot.joint_map[name]) for name in robot.actuated_joint_names]
 
 
@@ -90,8 +90,8 @@ def test_mujoco_reads_the_stl_files_as_shapes(tmp_path: Path) -> None:
     assert shaped.ngeom == LINKS_WITH_SHAPE
 
 
-def test_a_dropped_arm_moves_as_a_body_does(model: mujoco.MjModel) -> None:
-    """Free joints, gravity, no friction, nothing in the way: energy stays."""
+def test_a_dropped_arm_keeps_its_energy(model: mujoco.MjModel) -> None:
+    """Check that energy is constant with free joints, gravity, no friction and no obstacles."""
     data = mujoco.MjData(model)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     model.opt.disableflags |= (

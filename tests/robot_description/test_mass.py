@@ -1,4 +1,4 @@
-"""Inertials: exact integrals, plausible castings, and the numbers that the URDF holds."""
+"""Inertials: exact integrals, plausible castings, and the numbers in the URDF."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_the_arm_weighs_what_the_real_one_does() -> None:
     assert sum(LINK_MASS.values()) - LINK_MASS["base_link"] == pytest.approx(ARM_MASS, abs=1e-9)
 
 
-def test_castings_are_hollow_but_no_foil() -> None:
+def test_castings_are_hollow_with_plausible_walls() -> None:
     for link, found in inertials().items():
         assert 0.25 < found.fill <= 1.0, f"{link}: {found.fill:.2f} of the solid's weight"
 

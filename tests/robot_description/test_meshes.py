@@ -18,9 +18,9 @@ TRIANGLE_BUDGET = 60_000
 BYTE_BUDGET = 1_500_000
 TOLERANCE = 5.0  # mm
 
-# Outer sizes in mm in the link's frame: (x, y, z) ranges. The black covers in the fork slots stand
-# out beyond the bare links in x and z, so there the bare metal is measured. On +y the base and the
-# shoulder end with the fittings of the conduit.
+# Outer sizes in mm in the link's frame: (x, y, z) ranges. The black covers in the fork slots
+# protrude from the bare links in x and z, so the bare metal is measured there. On +y the base and
+# the shoulder end with the fittings of the conduit.
 EXTENT = {
     "base_link": ((-121.0, 121.0), (-121.0, 121.0), (0.0, 83.0)),
     "arm_base_link": ((-57.0, 55.0), (-55.0, 76.0), (0.0, 138.0)),
@@ -45,7 +45,7 @@ def material(mesh: trimesh.Trimesh) -> PBRMaterial:
 
 @functools.cache
 def primitives(link: str) -> dict[str, trimesh.Trimesh]:
-    """Return the meshes of ``link`` by material, as the file holds them."""
+    """Return the meshes of ``link`` by material, as stored in the file."""
     scene = trimesh.load(MESHES / f"{link}.glb", process=False)
     assert isinstance(scene, trimesh.Scene)
     meshes = list(scene.geometry.values())
@@ -53,7 +53,7 @@ def primitives(link: str) -> dict[str, trimesh.Trimesh]:
 
 
 def welded(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
-    """Return the triangles with vertices of one position made one."""
+    """Return the triangles with equal vertices merged."""
     _, inverse = np.unique(mesh.vertices, axis=0, return_inverse=True)
     return np.asarray(inverse.reshape(-1)[mesh.faces], dtype=np.int64)
 

@@ -1,4 +1,4 @@
-"""Cup, basin and table: the files, their sizes and the data that describes them."""
+"""Cup, basin and table: the files, their sizes, and the data file."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_basin_takes_the_cups_water_many_times() -> None:
 
 
 @pytest.mark.parametrize("make", PARTS, ids=lambda make: make.__name__)
-def test_nothing_floats(make: Any) -> None:
+def test_each_prop_is_connected(make: Any) -> None:
     assert len(whole(make.__name__).decompose()) == 1
 
 

@@ -1,4 +1,4 @@
-"""The committed STL files: as the code makes them, closed, in metres, in the link's frame."""
+"""The committed STL files: reproducible, closed, in metres, in the link's frame."""
 
 from __future__ import annotations
 

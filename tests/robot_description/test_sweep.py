@@ -1,4 +1,4 @@
-"""The raw solids in motion: no link of the arm cuts into its neighbour anywhere in the range."""
+"""The raw solids in motion: no link intersects its neighbour at any joint angle."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def robot() -> yourdfpy.URDF:
 
 
 def pair(name: str, angle: float) -> tuple[Manifold, Manifold]:
-    """Return the links on both sides of a joint turned by ``angle`` [rad]."""
+    """Return the links on both sides of a joint at ``angle`` [rad]."""
     joint = robot().joint_map[name]
     offset = np.zeros(3) if joint.origin is None else joint.origin[:3, 3] * 1e3
     turned = solid(joint.child).rotate(tuple(np.degrees(angle) * np.asarray(joint.axis)))
@@ -44,7 +44,7 @@ def test_neighbours_keep_apart_over_the_joint_range(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["axis_2", "axis_3", "axis_4"])
-def test_forks_have_air_around_what_turns_in_them(name: str) -> None:
+def test_forks_have_air_around_the_parts_that_turn_in_them(name: str) -> None:
     limit = robot().joint_map[name].limit
     for angle in (limit.lower, limit.upper):
         parent, child = pair(name, angle)

@@ -1,4 +1,4 @@
-"""The robot as a reader of URDF finds it: frames, axes, limits, inertials, meshes."""
+"""The URDF as a reader sees it: frames, axes, limits, inertials, meshes."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""A running application, put together from its parts."""
+"""Assembly of a running application from its parts."""

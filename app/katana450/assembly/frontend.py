@@ -1,4 +1,4 @@
-"""What the front shows and steers: a view and the arm as its gateway sees it, put together."""
+"""Assembly of the front end: the view, and the arm as the gateway sees it."""
 
 from __future__ import annotations
 
@@ -28,10 +28,20 @@ from katana450.server.view.view_updater import ViewUpdater
 def build_frontend(
     gateway: Gateway, config: FrontendConfig, meshes: Meshes, pipe: Connection
 ) -> tuple[FrontEnd, ViewUpdater]:
-    """Connect ``gateway`` to the arm and return the front's end of ``pipe`` and the view.
+    """Connect ``gateway`` to the arm and return this process's end of ``pipe`` and the view.
 
-    The link runs by then, so that nobody is answered with a state older than the link; the view is
-    not started. ``meshes``: the meshes of scene objects. Raises ConfigurationError, EOFError.
+    The link runs when this function returns, so no answer contains a state older than the link. The
+    view is not started.
+
+    Args:
+        gateway: the server of the page.
+        config: settings and options of the front end.
+        meshes: the meshes of scene objects.
+        pipe: the connection to the arm's process.
+
+    Raises:
+        ConfigurationError: an option needs an arm, but the robot has none.
+        EOFError: the arm's process has closed the pipe.
     """
     settings, layers = config.settings, _layers(config.options)
     found = find_robot(settings, config.urdf, config.tool)
@@ -57,7 +67,7 @@ def build_frontend(
 
 
 def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
-    """Return what the extensions show in the scene of an arm."""
+    """Return the layers that the extensions add to the scene of an arm."""
     if options is None:
         return ()
     found = [part.view_layer(options) for part in serve_extensions() if part.view_layer is not None]
@@ -65,7 +75,7 @@ def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
 
 
 def _nodes(options: Namespace | None, robot: Robot, environment: Environment) -> Nodes:
-    """Return the nodes of the first extension that names any, else the links alone."""
+    """Return the nodes of the first extension that provides any, else those of the links alone."""
     for part in () if options is None else serve_extensions():
         if part.nodes is not None:
             return part.nodes(robot, environment)

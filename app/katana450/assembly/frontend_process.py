@@ -1,5 +1,6 @@
-"""The process that people and programs speak to: gateway and view. It can end and begin again; the
-arm is in another, and stops meanwhile.
+"""The front end process, with gateway and view, that serves people and programs.
+
+It can end and be started again. The arm runs in another process, which stops the arm meanwhile.
 """
 
 from __future__ import annotations
@@ -29,19 +30,23 @@ START_SECONDS = 60.0
 GOODBYE_SECONDS = 5.0
 
 WAKE_INTERVAL = 0.5
-"""[s] How soon it is noticed that there is no view any more."""
+"""[s] Interval at which a failure of the view is checked."""
 
 OPEN, READY = "open", "ready"
-"""What it says of itself: pages load; the arm is there."""
+"""Status messages of the process: pages can be loaded; the arm is connected."""
 
 
 @dataclass(frozen=True)
 class FrontendConfig:
-    """What a front is given each time it is started.
+    """Configuration of a front end, used each time it is started.
 
-    ``urdf``, ``tool``: see ``robot.loader.load``. ``listening``: the port for browsers. ``lines``:
-    the one for JSON lines. ``options``: those of the extensions; None where none takes part.
-    ``meshes``: those of the objects there are at first.
+    Attributes:
+        settings: of the server.
+        urdf, tool: see ``robot.loader.load``.
+        listening: the socket for browsers.
+        lines: the socket for programs that send JSON lines, if any.
+        options: options of the extensions; None if no extension takes part.
+        meshes: meshes of the initial scene objects.
     """
 
     settings: Settings
@@ -54,45 +59,50 @@ class FrontendConfig:
 
 
 class Front:
-    """One such process, as the one that started it sees it."""
+    """One front end process, as its parent process sees it."""
 
     def __init__(self, config: FrontendConfig) -> None:
-        """Starts it."""
+        """Start the process."""
         spawn = multiprocessing.get_context("spawn")
-        self._told, telling = spawn.Pipe(duplex=False)
+        self._status_receiver, status_sender = spawn.Pipe(duplex=False)
         # The ends are of another class on Windows, with the same methods.
         ends: Any = spawn.Pipe()
         self.pipe: Connection
-        self.pipe, theirs = ends
+        self.pipe, child_end = ends
         self._process = spawn.Process(
             target=_run,
-            args=(config, theirs, telling),
+            args=(config, child_end, status_sender),
             name="katana450 front",
             daemon=True,
         )
         self._process.start()
-        self._said: set[str] = set()
-        # Theirs alone, so that each side hears when the other is gone.
-        theirs.close()
-        telling.close()
+        self._statuses: set[str] = set()
+        # Closed here, so that each side notices when the other is gone.
+        child_end.close()
+        status_sender.close()
 
     @property
     def running(self) -> bool:
+        """True while the process runs."""
         return self._process.is_alive()
 
     @property
     def exit_code(self) -> int | None:
+        """Exit status of the process; None while it runs."""
         return self._process.exitcode
 
     def wait_for(self, word: str) -> None:
-        """Return once it says ``word``. Raises what kept it from that, or ConfigurationError."""
+        """Wait until the process reports ``word``.
+
+        Raises the error that the process reports, or ConfigurationError if it does not start.
+        """
         try:
-            if self._told.poll(START_SECONDS):
-                said: Any = self._told.recv()
-                if isinstance(said, KatanaError):
-                    raise said
-                self._said.add(said)
-                if said == word:
+            if self._status_receiver.poll(START_SECONDS):
+                status: Any = self._status_receiver.recv()
+                if isinstance(status, KatanaError):
+                    raise status
+                self._statuses.add(status)
+                if status == word:
                     return
         except EOFError:
             pass
@@ -100,16 +110,19 @@ class Front:
 
     def _is_ready(self) -> bool:
         with suppress(EOFError):
-            while self._told.poll():
-                self._said.add(str(self._told.recv()))
-        return READY in self._said
+            while self._status_receiver.poll():
+                self._statuses.add(str(self._status_receiver.recv()))
+        return READY in self._statuses
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill the process at once."""
         self._process.kill()
 
     def stop(self) -> None:
-        """End it: once the arm has hung up in peace, before that or after a while by force."""
+        """Wait until the process ends after the arm has closed the link; kill it after a timeout.
+
+        A process that is not ready yet is terminated at once.
+        """
         if not self._is_ready():
             self._process.terminate()
         self._process.join(GOODBYE_SECONDS)
@@ -118,52 +131,53 @@ class Front:
             self._process.join()
 
 
-def _run(config: FrontendConfig, pipe: Connection, telling: Connection) -> None:
-    """What it does, from its start to its end."""
-    # Ctrl-C goes to all processes of a terminal; the arm's says when this one is to end.
+def _run(config: FrontendConfig, pipe: Connection, status_sender: Connection) -> None:
+    """Run the front end in this process, from start to end."""
+    # Ctrl-C reaches all processes of a terminal; the arm's process ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     reset_priority()
     start_log()
     try:
-        _serve(config, pipe, telling)
+        _serve(config, pipe, status_sender)
     except KatanaError as error:
-        telling.send(error)
+        status_sender.send(error)
     except (EOFError, BrokenPipeError):
-        # The other process is gone before this one was there.
+        # The other process ended before this one was ready.
         return
 
 
-def _serve(config: FrontendConfig, pipe: Connection, telling: Connection) -> None:
+def _serve(config: FrontendConfig, pipe: Connection, status_sender: Connection) -> None:
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.gateway import Gateway
     from katana450.server.viser_bridge.viser_server import close_server
 
-    kept = Meshes()
-    kept.put(config.meshes, ())
+    meshes = Meshes()
+    meshes.put(config.meshes, ())
     options = config.options
-    taking_part = () if options is None else serve_extensions()
-    routes = [part.routes for part in taking_part if part.routes is not None]
-    runners = [part.runner() for part in taking_part if part.runner is not None]
+    parts = () if options is None else serve_extensions()
+    routes = [part.routes for part in parts if part.routes is not None]
+    runners = [part.runner() for part in parts if part.runner is not None]
     gateway = Gateway(
         config.settings,
         config.listening,
         config.lines,
-        kept,
+        meshes,
         routes,
         partial(runners[0], options=options) if runners and options is not None else None,
     )
     gateway.start()
-    telling.send(OPEN)
+    status_sender.send(OPEN)
     try:
-        # The libraries that read the robot take most of a second: the page loads in the meantime.
+        # Importing the libraries that read the robot takes most of a second. The page loads
+        # meanwhile.
         from katana450.assembly.frontend import build_frontend
 
-        link, view = build_frontend(gateway, config, kept, pipe)
+        link, view = build_frontend(gateway, config, meshes, pipe)
         view.start()
-        # What is there by now stays: looking through it for garbage would keep STOP waiting.
+        # Exempt all present objects from garbage collection, which would delay STOP.
         gc.collect()
         gc.freeze()
-        telling.send(READY)
+        status_sender.send(READY)
         while not link.cut.wait(WAKE_INTERVAL):
             if view.failed.is_set():
                 raise SystemExit(1)
@@ -172,5 +186,5 @@ def _serve(config: FrontendConfig, pipe: Connection, telling: Connection) -> Non
     finally:
         gateway.stop()
         close_server(gateway.viser)
-        # So that Python, as it ends, puts away what hangs together in circles.
+        # Let Python collect reference cycles when it ends.
         gc.unfreeze()

@@ -1,4 +1,4 @@
-"""The front door, running: a thread of its own with the only port that others can reach."""
+"""The gateway: a thread with the web server on the only port that other machines can reach."""
 
 from __future__ import annotations
 
@@ -46,24 +46,23 @@ from katana450.settings import Settings
 log = logging.getLogger(__name__)
 
 MAX_UNSENT_BYTES = 16_384
-"""Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
+"""Bytes that may wait to be sent to a browser. Newer states do not replace waiting bytes."""
 
 READ_CHUNK_BYTES = 4_096
-"""Bytes that are read at once of what a browser sends: they are taken apart at once, and everybody
-waits for it."""
+"""Bytes that are read at once from a browser. All clients wait while they are parsed."""
 
 TLS_READ_CHUNK_BYTES = 65_536
-"""Likewise where TLS reads them, which takes all that the machine holds."""
+"""Size of the receive buffer with TLS, which reads all that the system holds."""
 
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
 
 ANSWER_SECONDS = 2.0
-"""[s] Until a thread of the view gives up on an answer of the server's thread."""
+"""[s] Timeout of a thread of the view for an answer of the server's thread."""
 
 
 class Gateway:
-    """Owns the port, and viser behind it."""
+    """The web server with its port, and viser behind it."""
 
     def __init__(
         self,
@@ -74,16 +73,23 @@ class Gateway:
         routes: Sequence[RouteProvider] = (),
         runner: Callable[[Hub], Runner] | None = None,
     ) -> None:
-        """``listening``: the port; ``lines``: that for programs which speak JSON lines.
-        ``meshes``: those that objects are of, where uploaded ones are kept too. ``routes``: of the
-        extensions. ``runner``: see ``Hub``.
+        """Set up the server; it does not answer yet.
 
-        Raises ConfigurationError when it must not be served there as ``settings`` say.
+        Args:
+            settings: settings of the server.
+            listening: the socket for browsers.
+            lines: the socket for programs that send JSON lines.
+            meshes: the meshes of scene objects, to which uploaded ones are added.
+            routes: routes of the extensions.
+            runner: see ``Hub``.
+
+        Raises:
+            ConfigurationError: ``settings`` do not allow serving on this socket.
         """
         _check_tls(settings)
         raise_descriptor_limit()
         self._listening = listening
-        self._lines_at = lines
+        self._lines_socket = lines
         self._loop: asyncio.AbstractEventLoop | None = None
         try:
             access = _access(settings, self._listening)
@@ -129,17 +135,17 @@ class Gateway:
         self._started = threading.Event()
 
     def start(self) -> None:
-        """Answer from now on."""
+        """Start answering. Raises ConfigurationError if the server does not start."""
         self._thread.start()
         if not self._started.wait(START_SECONDS) or not self._thread.is_alive():
             raise ConfigurationError("The gateway did not start; see the log above.")
 
     def attach(self, arm: ArmHandle) -> None:
-        """From now on the arm can be driven."""
+        """Let clients drive ``arm`` from now on."""
         self.hub.gate.arm = arm
 
     def announce(self, why: str) -> None:
-        """Tell everybody why something that was asked is not done. For any thread."""
+        """Tell all clients why a request is not executed. Can be called in any thread."""
         loop = self._loop
         if loop is not None:
             loop.call_soon_threadsafe(self.hub.announce, why)
@@ -147,11 +153,11 @@ class Gateway:
     def call(self, act: Callable[[], None]) -> None:
         """Run ``act`` in the server's thread, and return afterwards. For any other thread.
 
-        Raises what ``act`` raises, and LeaseError where the server does not answer.
+        Raises the error of ``act``, and LeaseError if the server does not answer.
         """
         loop, future = self._loop, Future[None]()
         if loop is None:
-            raise LeaseError("The server is not there yet.")
+            raise LeaseError("The server has not started yet.")
 
         def done() -> None:
             try:
@@ -165,10 +171,10 @@ class Gateway:
         try:
             future.result(ANSWER_SECONDS)
         except TimeoutError as error:
-            raise LeaseError("The server does not answer. See how the arm stands.") from error
+            raise LeaseError("The server does not answer. Check the state of the arm.") from error
 
     def stop(self) -> None:
-        """Close every socket and the port; viser is left to ``close_server``."""
+        """Close every socket and the port; ``close_server`` closes viser."""
         self._server.should_exit = True
         if self._thread.is_alive():
             self._thread.join()
@@ -181,7 +187,7 @@ class Gateway:
         self._loop = asyncio.get_running_loop()
         watch = asyncio.create_task(self._watch())
         try:
-            async with self._lines.open(self._lines_at):
+            async with self._lines.open(self._lines_socket):
                 await self._server.serve()
         finally:
             watch.cancel()
@@ -196,15 +202,16 @@ class Gateway:
             try:
                 self.hub.tick()
             except Exception:
-                # Whatever went wrong, the watch over the arm goes on.
-                log.exception("The watch over who drives met an error.")
+                # The watchdog of the arm must survive every error.
+                log.exception("The watchdog of the driver met an error.")
             await asyncio.sleep(TICK)
 
 
 class _Server(uvicorn.Server):
-    """Serves what an acceptor lets in.
+    """A server for the connections that an acceptor admits.
 
-    asyncio alone accepts thousands in a turn, bounds nothing, and logs a traceback per failure.
+    asyncio alone accepts thousands of connections in a turn, has no limits, and logs a traceback
+    for each failure.
     """
 
     def __init__(self, acceptor: Acceptor, config: uvicorn.Config) -> None:
@@ -213,7 +220,7 @@ class _Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:  # noqa: ARG002
         await super().startup(sockets=[])
-        # It can be closed and waited for, as uvicorn does with its servers.
+        # The acceptor has the methods with which uvicorn closes its servers and waits for them.
         self.servers.append(cast(Any, self._acceptor.start(self._protocol, self.config.ssl)))
 
     def _protocol(self) -> asyncio.Protocol:
@@ -224,34 +231,36 @@ class _Server(uvicorn.Server):
 
 
 class _BrowserSocket(WebSocketsSansIOProtocol):
-    """A websocket in whose buffers little can wait, neither of what is sent nor of what comes."""
+    """A websocket with small buffers for sent and received bytes."""
 
     def connection_made(self, transport: BaseTransport) -> None:
+        """Bound the buffers of the new connection."""
         super().connection_made(transport)
         cast(Transport, transport).set_write_buffer_limits(high=MAX_UNSENT_BYTES)
-        line = transport.get_extra_info("socket")
-        if line is None:
+        sock = transport.get_extra_info("socket")
+        if sock is None:
             return
         if hasattr(transport, "max_size"):
-            # A smaller buffer of the machine would do as well, but what does not fit in it is
-            # dropped, the receipts of what was sent the other way with it, and both ends stall.
+            # A smaller receive buffer of the system is no alternative: it drops packets that do not
+            # fit, with the acknowledgements in them, and both ends stall.
             cast(Any, transport).max_size = READ_CHUNK_BYTES
         else:
-            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TLS_READ_CHUNK_BYTES)
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TLS_READ_CHUNK_BYTES)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
-            line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, MAX_UNSENT_BYTES)
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, MAX_UNSENT_BYTES)
 
     def handle_connect(self, event: Request) -> None:
+        """Accept the websocket, and let the application see when messages arrive."""
         super().handle_connect(event)
         if self.response.status_code == HTTPStatus.SWITCHING_PROTOCOLS:
-            # The socket itself knows when the newest message arrived.
-            line = self.transport.get_extra_info("socket")
-            cast(dict[str, Any], self.scope)[ARRIVAL] = Arrival(line)
+            # The socket knows when its newest message arrived.
+            sock = self.transport.get_extra_info("socket")
+            cast(dict[str, Any], self.scope)[ARRIVAL] = Arrival(sock)
 
 
 def _check_tls(settings: Settings) -> None:
     if (settings.tls_cert is None) != (settings.tls_key is None):
-        raise ConfigurationError("https takes both --tls-cert and --tls-key.")
+        raise ConfigurationError("https needs both --tls-cert and --tls-key.")
     if settings.tls_cert is None or settings.tls_key is None:
         return
     try:
@@ -259,7 +268,8 @@ def _check_tls(settings: Settings) -> None:
         context.load_cert_chain(settings.tls_cert, settings.tls_key)
     except OSError as error:
         raise ConfigurationError(
-            f"{settings.tls_cert} and {settings.tls_key} are no certificate and its key: {error}."
+            f"{settings.tls_cert} and {settings.tls_key} are not a certificate and its key: "
+            f"{error}."
         ) from error
 
 
@@ -270,7 +280,7 @@ def _access(settings: Settings, listening: socket.socket) -> AccessFile | None:
         raise ConfigurationError(
             f"On {settings.host} other machines can reach the arm. Make a link for each person "
             "with `katana450 access give --file access.json --name NAME --role operator` and "
-            "start with --access access.json; or say --insecure, and everybody can drive it."
+            "start with --access access.json. Or add --insecure; then everybody can drive the arm."
         )
     return None
 

@@ -1,4 +1,4 @@
-"""Log lines that nobody can forge: what came from outside can start no line and colour nothing."""
+"""Log lines that clients cannot forge: their texts can neither begin a line nor colour one."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import sys
 FORMAT = "%(asctime)s %(levelname)s %(message)s"
 
 CONTINUED = "    | "
-"""Begins every further line of an entry: those of a traceback."""
+"""Begins each further line of an entry, as in a traceback."""
 
 
 def printable(text: str) -> str:
-    """``text`` with every character escaped that is not printable: line breaks of any kind,
-    control and format characters, lone surrogates.
+    """Return ``text`` with every character escaped that is not printable.
+
+    These are line breaks of any kind, control and format characters, and lone surrogates.
     """
     if text.isprintable():
         return text
@@ -21,22 +22,24 @@ def printable(text: str) -> str:
 
 
 class LineFormatter(logging.Formatter):
-    """One line an entry, whatever its message holds; tracebacks follow on marked lines."""
+    """Formats each entry as one line, whatever its message; tracebacks follow on marked lines."""
 
     def __init__(self) -> None:
         super().__init__(FORMAT)
 
     def formatMessage(self, record: logging.LogRecord) -> str:
+        """Return the message as one line."""
         record.message = printable(record.message)
         return super().formatMessage(record)
 
     def format(self, record: logging.LogRecord) -> str:
+        """Return the entry with its further lines marked."""
         first, *rest = super().format(record).split("\n")
         return "\n".join([printable(first), *(CONTINUED + printable(line) for line in rest)])
 
 
 def start_log() -> None:
-    """Write what goes wrong, and who drove, to standard error."""
+    """Log errors, warnings and changes of the driver to standard error."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(LineFormatter())
     logging.basicConfig(handlers=[handler])

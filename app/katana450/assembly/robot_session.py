@@ -1,4 +1,4 @@
-"""The parts of a running app, put together: the arm in one process, what people see in another."""
+"""Assembly of the arm's process: the robot, its session and its control loop."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 
 class DescribedRobot(NamedTuple):
-    """A robot as its files describe it, the rules for it, and sentences on what they leave open."""
+    """A robot as its files describe it, its session, and sentences on what the files lack."""
 
     robot: Robot
     session: Session
@@ -42,7 +42,7 @@ class DescribedRobot(NamedTuple):
 def describe_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
     """Return the robot with an arm in the file ``urdf``.
 
-    ``tool``: the link its targets are set for; see ``load``. Raises RobotDescriptionError for a
+    ``tool``: the link to which targets refer; see ``load``. Raises RobotDescriptionError for a
     robot without an arm.
     """
     return arm_session(settings, load(urdf, tool))
@@ -51,8 +51,8 @@ def describe_robot(settings: Settings, urdf: Path, tool: str | None) -> Describe
 def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
     """Return the robot in the file ``urdf``: with all its arm can do, or driven joint by joint.
 
-    Raises RobotDescriptionError for a robot that is neither, and for one without an arm where a
-    ``tool`` or an arm without gripper was asked for.
+    Raises RobotDescriptionError for a robot that is neither. A robot without an arm also raises it
+    if a ``tool`` or an arm without gripper is requested.
     """
     robot = load(urdf, tool)
     try:
@@ -68,7 +68,7 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
 
 
 def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
-    """Return ``robot`` with the rules for its arm. Raises RobotDescriptionError without an arm."""
+    """Return ``robot`` with the session of its arm. Raises RobotDescriptionError without an arm."""
     if settings.bare:
         robot = bare(robot)
     arm = robot.require_arm()
@@ -94,12 +94,15 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
 
 
 class RunningArm:
-    """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
+    """A simulated arm with its control loop, driven by the front end at the end of a pipe."""
 
     def __init__(
         self, settings: Settings, found: DescribedRobot, scene: InitialScene | None = None
     ) -> None:
-        """``scene``: what stands around in place of the robot's own, and where the arm stands."""
+        """Prepare the arm; it does not run yet.
+
+        ``scene``: scene in place of the robot's own, and initial joint angles.
+        """
         robot, session, self.notes = found
         arm = robot.joint_group if robot.arm is None else robot.arm
         start = session.ready if scene is None or scene.joints is None else scene.joints
@@ -114,12 +117,12 @@ class RunningArm:
         self._link: ArmEnd | None = None
 
     def start(self) -> None:
-        """Run the control loop in a thread of its own."""
+        """Run the control loop in a separate thread."""
         _be_prompt()
         self._loop.start()
 
     def attach(self, pipe: Connection) -> None:
-        """Obey who is at the other end of ``pipe``, in place of anybody before."""
+        """Execute the commands from the other end of ``pipe``, in place of any previous pipe."""
         if self._link is not None:
             self._link.close()
         self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence)
@@ -127,30 +130,29 @@ class RunningArm:
 
     @property
     def running(self) -> bool:
-        """Whether its control loop runs."""
+        """True while the control loop runs."""
         return self._loop.running
 
     @property
     def unheard(self) -> float:
-        """[s] Since whoever it obeys was heard of."""
+        """[s] Time since the last message of the front end."""
         return 0.0 if self._link is None else self._link.unheard
 
     def stop(self) -> None:
-        """Cut the pipe, and end the loop."""
+        """Close the pipe, and end the loop."""
         if self._link is not None:
             self._link.close()
         self._loop.stop()
 
     def join(self) -> None:
-        """After ``stop``, once the other end of the pipe is gone too: let nothing of it run on."""
+        """Wait for the threads of the link; call it after ``stop``, when the front end ended."""
         if self._link is not None:
             self._link.join()
 
 
 def _be_prompt() -> None:
-    """Let nothing that can wait come between the ticks."""
-    # What is there by now stays: looking through it for garbage takes longer than a tick may be
-    # late.
+    """Keep garbage collection and other processes from delaying the ticks."""
+    # Exempt all present objects from garbage collection, which would delay a tick too much.
     gc.collect()
     gc.freeze()
     raise_priority()

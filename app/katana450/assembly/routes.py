@@ -1,4 +1,4 @@
-"""The routes: our page, its files, viser behind its message filter, and what programs may ask."""
+"""The routes: the page, its files, viser behind its message filter, and the API for programs."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ from katana450.server.web.token_bucket import TokenBucket
 log = logging.getLogger(__name__)
 
 MAX_BODY_BYTES = 1024
-"""Bytes of what is sent by POST."""
+"""Maximum size of the body of a POST request [bytes]."""
 
 BAD_LINKS_PER_SECOND, BAD_LINKS_BURST = 2.0, 20.0
-"""Bad links that are answered a second, and at once, of everybody together."""
+"""Invalid links that are answered per second, and in a burst, for all clients together."""
 
 
 class _Entry(msgspec.Struct, forbid_unknown_fields=True):
@@ -54,13 +54,13 @@ def application(
     acceptor: Acceptor,
     provided: Sequence[RouteProvider] = (),
 ) -> ASGIApp:
-    """Everything that answers at the port; ``provided``: routes of the extensions."""
+    """Return the application with all routes of the port; ``provided``: those of the extensions."""
     static = static_files.load()
     index = static.pop("index.html")
     viser = viser_page.load()
     viser_file = static_files.File.of(viser.html, static_files.TYPES[".html"])
     page_policy, viser_policy = security.page_policy(), viser_page.policy(viser.script_hashes)
-    tries = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, hub.clock())
+    bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, hub.clock())
 
     async def page(request: Request) -> Response:
         return index.answer(request, page_policy)
@@ -69,11 +69,11 @@ def application(
         found = static.get(request.path_params["name"])
         if found is None:
             raise HTTPException(404)
-        # A worker is under the policy of its own file.
+        # A web worker has the policy of its own file.
         return found.answer(request, page_policy)
 
     async def viser_index(request: Request) -> Response:
-        _known(authenticator, request)
+        _signed_in(authenticator, request)
         scheme = "wss" if address.cookies_are_secure else "ws"
         origin = f"{scheme}://{request.headers['host']}"
         why = viser_page.objection(request.query_params, origin)
@@ -82,25 +82,25 @@ def application(
         return viser_file.answer(request, viser_policy)
 
     async def enter(request: Request) -> Response:
-        """Come in: with the token of a link where the server asks for one."""
+        """Sign in, with the token of an access link if the server requires one."""
         try:
             entry = msgspec.json.decode(await body_of(request, MAX_BODY_BYTES), type=_Entry)
         except msgspec.MsgspecError as error:
-            raise HTTPException(400, "A token is asked for.") from error
+            raise HTTPException(400, "A token is required.") from error
         if not entry.token and authenticator.identity(request.cookies) is not None:
             return Response(status_code=204)
         response = Response(status_code=204)
         if not authenticator.welcome(entry.token, response):
-            # Who has a good link is let in, however many others guess.
-            if entry.token and not tries.take(hub.clock()):
-                raise HTTPException(429, "Too many tries. Wait a moment.")
-            log.warning("Somebody came with a link that is no good (any more).")
-            raise HTTPException(401, "This link is no good, or no good any more. Ask for another.")
+            # A valid link is accepted even while others guess.
+            if entry.token and not bad_links.take(hub.clock()):
+                raise HTTPException(429, "Too many attempts. Wait a moment.")
+            log.warning("A client used a link that is invalid or has expired.")
+            raise HTTPException(401, "This link is invalid or has expired. Ask for another.")
         return response
 
     async def stop(request: Request) -> Response:
-        """The same as the button, for a page whose socket is gone."""
-        identity = _known(authenticator, request)
+        """Stop the arm, like the button, for a page whose socket is closed."""
+        identity = _signed_in(authenticator, request)
         press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
         actor = actor_of(identity, CommandChannel.PAGE)
         if PAGE.fullmatch(name := request.query_params.get("page", "")):
@@ -109,8 +109,10 @@ def application(
         return Response(status_code=204)
 
     async def health(_request: Request) -> Response:
-        wrong = status.health(hub)
-        return PlainTextResponse("ok\n" if wrong is None else f"{wrong}\n", 503 if wrong else 200)
+        problem = status.health(hub)
+        return PlainTextResponse(
+            "ok\n" if problem is None else f"{problem}\n", 503 if problem else 200
+        )
 
     async def control(socket: WebSocket) -> None:
         await control_socket.serve(hub, authenticator, budgets, socket)
@@ -130,8 +132,8 @@ def application(
     return security.SecurityMiddleware(admission, address)
 
 
-def _known(authenticator: Authenticator, request: Request) -> Identity:
+def _signed_in(authenticator: Authenticator, request: Request) -> Identity:
     identity = authenticator.identity(request.cookies)
     if identity is None:
-        raise HTTPException(401, "Come in by the front page.")
+        raise HTTPException(401, "Sign in at the start page first.")
     return identity

@@ -1,4 +1,4 @@
-"""``katana450 access``: give people links to the arm, list them, take them back."""
+"""``katana450 access``: give people links to the arm, list links, revoke links."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from katana450.server.web.authenticator import public_origin
 
 
 def access(options: Namespace) -> int:
-    """Do it; returns the exit status."""
+    """Run ``katana450 access`` and return the exit status."""
     now = time.time()
     if options.act == "give":
         file = AccessFile.create(options.file)
         origin = public_origin(options.url)
         token = file.give(options.name, Role(options.role), now + options.duration)
-        # Behind the # it is sent to no server and stands in no log.
+        # Browsers send the part after the # to no server, so no log contains it.
         print(f"{origin}/#{token}")
         return 0
     file = AccessFile.open(options.file)
     if options.act == "revoke":
         grant = file.revoke(options.number)
-        print(f"The link of {grant.name} is no good any more.")
+        print(f"The link of {grant.name} is revoked.")
         return 0
     for number, grant in file.grants.items():
         until = time.strftime("%Y-%m-%d %H:%M", time.localtime(grant.expires))

@@ -1,4 +1,4 @@
-"""The options of ``katana450 access``, apart from its work: reading them must load nothing."""
+"""Options of ``katana450 access``, separate from its work: reading them must load nothing heavy."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ MAX_DAYS = 366
 
 
 def add_access_options(parser: argparse.ArgumentParser) -> None:
-    """The three things that can be done with links."""
+    """Add the subcommands give, list and revoke to ``parser``."""
     acts = parser.add_subparsers(dest="act", required=True, metavar="give | list | revoke")
     give = acts.add_parser("give", help="print a link for one person")
-    give.add_argument("--name", required=True, help="what the others see them called")
+    give.add_argument("--name", required=True, help="name that other people see")
     give.add_argument(
         "--role",
         choices=[role.value for role in Role],
@@ -32,22 +32,22 @@ def add_access_options(parser: argparse.ArgumentParser) -> None:
         type=_duration,
         default=DEFAULT_DURATION,
         metavar="TIME",
-        help="how long it is good, such as 30m, 12h or 7d (default: %(default)s)",
+        help="how long it is valid, such as 30m, 12h or 7d (default: %(default)s)",
     )
     give.add_argument(
         "--url",
         default="http://127.0.0.1:8080",
-        help="where people find the server (default: %(default)s)",
+        help="address of the server (default: %(default)s)",
     )
-    acts.add_parser("list", help="say who was given one")
-    revoke = acts.add_parser("revoke", help="take one back; who came in by it is sent out")
-    revoke.add_argument("number", help="as `list` shows it")
+    acts.add_parser("list", help="list the links and their holders")
+    revoke = acts.add_parser("revoke", help="revoke a link and disconnect its holder")
+    revoke.add_argument("number", help="number of the link in `list`")
     for act in acts.choices.values():
         act.add_argument(
             "--file",
             type=Path,
             default=DEFAULT_FILE,
-            help="where links are kept; secret, never in version control (default: %(default)s)",
+            help="file of the links; secret, never in version control (default: %(default)s)",
         )
 
 

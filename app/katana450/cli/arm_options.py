@@ -1,4 +1,4 @@
-"""The options by which commands are given another arm."""
+"""Options of the commands that select another arm."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ def add_arm_options(parser: argparse.ArgumentParser) -> None:
         "by joint (default: the Katana450)",
     )
     parser.add_argument(
-        "--tool", metavar="LINK", help="link that targets are for (default: the last one)"
+        "--tool", metavar="LINK", help="link to which targets refer (default: the last one)"
     )

@@ -1,4 +1,4 @@
-"""The commands of the core: those that are there without any extension."""
+"""The commands of the core, which work without any extension."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from katana450.cli.lines_options import add_fk_options, add_ik_options
 from katana450.cli.serve_options import add_serve_options
 from katana450.extension import CliCommand
 
-# Each function imports what it needs when it is called: fk and ik answer without waiting for the
-# libraries of the view.
+# Each function imports its modules when it is called, so that fk and ik do not load the libraries
+# of the view.
 
 
 def _serve(options: Namespace) -> int:
@@ -29,9 +29,11 @@ def _fk(options: Namespace) -> int:
 def _ik(options: Namespace) -> int:
     from katana450.cli.lines import Kinematics, answer_lines
 
-    in_base_frame, metrics = options.frame == "base", options.metrics
+    in_base_frame, all_metrics = options.frame == "base", options.metrics
     return answer_lines(
-        Kinematics(options.urdf, options.tool, in_base_frame=in_base_frame, metrics=metrics).ik
+        Kinematics(
+            options.urdf, options.tool, in_base_frame=in_base_frame, all_metrics=all_metrics
+        ).ik
     )
 
 
@@ -46,17 +48,16 @@ CORE_COMMANDS = (
     CliCommand(
         "fk",
         "JSON lines from stdin to stdout, joints to poses: "
-        '{"q": [5 angles, rad], "tool": "tcp"} a line',
+        '{"q": [5 angles, rad], "tool": "tcp"} per line',
         add_fk_options,
         _fk,
     ),
     CliCommand(
         "ik",
-        'JSON lines from stdin to stdout, poses to joints: {"T": [[4x4, m]], "tool": "tcp"} a line',
+        "JSON lines from stdin to stdout, poses to joints: "
+        '{"T": [[4x4, m]], "tool": "tcp"} per line',
         add_ik_options,
         _ik,
     ),
-    CliCommand(
-        "access", "give people links by which they may come in", add_access_options, _access
-    ),
+    CliCommand("access", "give people links with which they sign in", add_access_options, _access),
 )

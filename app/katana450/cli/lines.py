@@ -1,4 +1,4 @@
-"""``katana450 fk`` and ``katana450 ik``: a JSON object a line in, one a line out."""
+"""``katana450 fk`` and ``katana450 ik``: one JSON object per line in, one per line out."""
 
 from __future__ import annotations
 
@@ -25,56 +25,60 @@ from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.projection import project
 
 MAX_SHOWN_CHARACTERS = 40
-"""Characters of a wrong value that an error repeats."""
+"""Maximum number of characters of a wrong value that an error message repeats."""
 
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 
 
 class Kinematics:
-    """Forward and inverse kinematics of the arm in the URDF, on plain JSON values."""
+    """Forward and inverse kinematics of the arm in a URDF, on plain JSON values."""
 
     def __init__(
-        self, urdf: Path, tool: str | None, *, in_base_frame: bool, metrics: bool = False
+        self, urdf: Path, tool: str | None, *, in_base_frame: bool, all_metrics: bool = False
     ) -> None:
-        """``in_base_frame``: poses are in the base frame on the table, else in {S}.
+        """Load the arm.
 
-        ``urdf``, ``tool``: the arm, and the link that is its default tool; see ``load``.
-        ``metrics``: solutions carry what they cost to take from the request's ``q``.
+        Args:
+            urdf: file of the arm.
+            tool: link that is its default tool; see ``load``.
+            in_base_frame: whether poses are in the base frame on the table, else in {S}.
+            all_metrics: whether solutions include the cost of moving there from the request's
+                ``q``.
         """
-        self._with_metrics = metrics
+        self._all_metrics = all_metrics
         robot = load(urdf, tool)
         self._arm = robot.require_arm()
         self._world = None
-        if metrics:
+        if all_metrics:
             world, _ = world_of(robot)
             self._world = world and world.with_obstacles(initial_objects(load_props()))
         self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """``{"q": [n rad], "tool"}`` to ``{"T": 4x4}`` [m]."""
+        """Answer ``{"q": [n rad], "tool"}`` with ``{"T": 4x4}`` [m]."""
         chain = self._chain(request, {"q", "tool"})
         q = chain.check_q(_numbers(request, "q", 1))
         return {"T": (self._T_frame_shoulder @ forward(chain, q)).tolist()}
 
     def ik(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """``{"T": 4x4, "tool"}`` to every solution for the nearest pose five axes can do.
+        """Answer ``{"T": 4x4, "tool"}`` with all solutions for the nearest pose of five axes.
 
-        A T that was printed with four decimals or more is taken for the nearest rotation;
-        ``rotation_misfit`` is how far its columns were off orthonormal.
+        A T printed with four decimals or more is replaced by the nearest rotation;
+        ``rotation_misfit`` is the deviation of its columns from orthonormal.
 
-        The residuals say how far that pose is from ``T``, limits of the joints left aside:
-        ``within_limits`` tells of each solution whether the arm can go there. With metrics there
-        are also its way from ``q`` ([n rad]; the zero posture if not given), its smallest singular
-        value, and the two parts in contact there, if any are, with the finger joint at 0 or the
-        limit next to it.
+        The residuals are the distance of that pose from ``T``, without regard to joint limits.
+        ``within_limits`` of each solution is True if the arm can go there. With all metrics each
+        solution also has its distance from ``q`` ([n rad]; the zero posture if not given), its
+        smallest singular value, and the two parts in contact there, if any. The finger joint is
+        then at 0 or at the limit nearest to it.
         """
-        chain = self._chain(request, {"T", "tool", "q"} if self._with_metrics else {"T", "tool"})
+        chain = self._chain(request, {"T", "tool", "q"} if self._all_metrics else {"T", "tool"})
         start = chain.check_q(_numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
         given = _numbers(request, "T", 2)
         T = se3.printed(given, "T")
         T_shoulder = se3.inverse(self._T_frame_shoulder) @ T
         nearest = project(chain, T_shoulder, within_limits=False).T
-        # With axes that do not cross, not every branch reaches every pose.
+        # If the axes do not cross, some branches do not reach every pose.
         solutions = [solution for solution in inverse(chain, nearest) if solution.exact]
         reached = [forward(chain, solution.q) for solution in solutions]
         return {
@@ -86,7 +90,7 @@ class Kinematics:
                 }
                 | (
                     self._metrics(BranchMetrics.of(chain, solution, start))
-                    if self._with_metrics
+                    if self._all_metrics
                     else {}
                 )
                 for solution in solutions
@@ -111,32 +115,32 @@ class Kinematics:
             raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(keys)}.")
         tool = request.get("tool", self._arm.default_tool)
         if not isinstance(tool, str):
-            raise InputError(f"'tool' is {_shown(tool)}; there is no tool of that name.")
+            raise InputError(f"'tool' is {_shown(tool)}; there is no tool with that name.")
         return self._arm.chain_to(tool)
 
 
 def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> int:
-    """Answer each line as it comes and return the exit status.
+    """Answer each line when it arrives and return the exit status.
 
-    A bad line gets ``{"error": ...}`` with its number, counted from 1, and the rest continue. The
-    status is 1 when there were requests and none could be answered, else 0.
+    A wrong line is answered by ``{"error": ...}`` with its number, counted from 1; the next lines
+    are answered as usual. The status is 1 if there were requests and all were wrong, else 0.
     """
     if source is None and isinstance(sys.stdin, io.TextIOWrapper):
-        # Bytes that are not UTF-8 spoil their own line, not the run.
+        # Bytes that are not UTF-8 make only their own line wrong.
         sys.stdin.reconfigure(encoding="utf-8", errors="replace")
     source, sink = source or sys.stdin, sink or sys.stdout
-    asked = answered = 0
+    requested = answered = 0
     for number, line in enumerate(source, start=1):
         if not line.strip():
             continue
-        asked += 1
+        requested += 1
         try:
             reply = answer(_request(line))
             answered += 1
         except InputError as error:
             reply = {"error": f"line {number}: {error}"}
         print(json.dumps(reply, allow_nan=False), file=sink, flush=True)
-    return int(asked > answered == 0)
+    return int(requested > answered == 0)
 
 
 def _request(line: str) -> Mapping[str, Any]:
@@ -161,7 +165,7 @@ def _request(line: str) -> Mapping[str, Any]:
 def _numbers(request: Mapping[str, Any], key: str, depth: int) -> Any:
     """Return the value of ``key``: lists of JSON numbers, nested ``depth`` deep.
 
-    Raises InputError with the place of what is none; shapes are left to the caller.
+    Raises InputError with the place of a value that is not a number. The caller checks shapes.
     """
     if key not in request:
         raise InputError(f"The key {key!r} is missing.")
@@ -185,7 +189,7 @@ def _check_numbers(value: Any, place: str, depth: int) -> None:
 
 
 def _shown(value: Any) -> str:
-    """Return how JSON calls ``value``, shortened."""
+    """Return ``value`` as JSON shows it, shortened."""
     if isinstance(value, dict | list):
         return "an object" if isinstance(value, dict) else "a list"
     text = json.dumps(value)

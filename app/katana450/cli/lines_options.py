@@ -1,4 +1,4 @@
-"""The options of ``katana450 fk`` and ``katana450 ik``; reading them loads nothing heavy."""
+"""Options of ``katana450 fk`` and ``katana450 ik``; reading them loads nothing heavy."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def add_ik_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--metrics",
         action="store_true",
-        help='each solution with its way from "q" in the line (default: the zero posture) '
-        "as distance_rad and time_s, its smallest_singular_value, and in contact the two "
-        "parts that would meet there, or null",
+        help='add to each solution its distance_rad and time_s from "q" in the line (default: the '
+        "zero posture), its smallest_singular_value, and as contact the two parts that would meet "
+        "there, or null",
     )
     add_arm_options(parser)
 

@@ -1,4 +1,4 @@
-"""The command line ``katana450``: commands of the core, and those of the extensions."""
+"""The command line ``katana450``: commands of the core and of the extensions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from katana450.extension import CliCommand, extensions, missing_extension
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status: 0 done, 1 could not, 2 not understood."""
+    """Run one command and return the exit status: 0 done, 1 failed, 2 wrong arguments."""
     options = _parser().parse_args(arguments)
     command: CliCommand = options.command
     try:
@@ -25,10 +25,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         missing = missing_extension(error)
         if missing is None:
             raise
-        print(f"katana450: The extension {missing} is needed and not installed.", file=sys.stderr)
+        print(f"katana450: The extension {missing} is needed but not installed.", file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # The reader has heard enough; say nothing more, not even at exit.
+        # The reader has closed the pipe; write nothing more, not even at exit.
         sys.stderr.close()
         return 0
     except KeyboardInterrupt:

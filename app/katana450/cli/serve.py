@@ -1,4 +1,4 @@
-"""``katana450 serve``: open the port, run the arm, and see to it that people can reach it."""
+"""``katana450 serve``: open the port, run the arm, and keep a front end running."""
 
 from __future__ import annotations
 
@@ -26,16 +26,17 @@ if TYPE_CHECKING:
     from katana450.assembly.robot_session import DescribedRobot
 
 WAKE_INTERVAL = 0.2
-"""[s] How soon a signal is heeded, and a front that ended."""
+"""[s] Interval at which signals and the end of a front end are checked."""
 
 RESTART_DELAYS = (0.0, 1.0, 5.0, 15.0)
-"""[s] Until it is started again, the longer the more often it ended at once."""
+"""[s] Delay before a front end is started again: after a stable run, then after the first, second
+and each further early end in a row."""
 
 STABLE_SECONDS = 30.0
-"""[s] A front that ran for so long did not end at once."""
+"""[s] A front end that ended after a longer time did not end early."""
 
 HANG_TIMEOUT = 10.0
-"""[s] A front that says nothing for so long has hung."""
+"""[s] A front end that sends nothing for so long has hung."""
 
 log = logging.getLogger(__name__)
 
@@ -54,7 +55,7 @@ def serve_with(options: Namespace) -> int:
         lines=options.lines,
         bare=options.bare,
     )
-    # Sent to another process, which has no use for the command itself.
+    # The options are sent to another process, which does not need the command itself.
     values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})
     return serve(settings, options.urdf, options.tool, values)
 
@@ -65,13 +66,16 @@ def serve(
     tool: str | None = None,
     options: Namespace | None = None,
 ) -> int:
-    """Run the app until SIGINT or SIGTERM; returns the exit status, 1 if the control loop ended.
+    """Run the app until SIGINT or SIGTERM; return the exit status, 1 if the control loop ended.
 
-    ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.loader.load``.
-    ``options``: those of the extensions; None where none takes part.
+    Args:
+        settings: settings of the server.
+        urdf: the file of the arm.
+        tool: the link to which targets refer; see ``robot.loader.load``.
+        options: options of the extensions; None if no extension takes part.
     """
     start_log()
-    # Read before anything runs: the front shows what it is given here, each time it is started.
+    # Read first: the front end gets this scene each time it is started.
     robot, scene = _with_scene(settings, urdf, tool, options)
     stopping = threading.Event()
 
@@ -80,54 +84,55 @@ def serve(
 
     for number in stop_signals():
         signal.signal(number, stop)
-    # Held here, so that nobody else takes it while the front is started again.
+    # Held by this process, so that the port stays taken while the front end is started again.
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
 
     meshes = () if scene is None else scene.meshes
     config = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
-    current, arm = Front(config), None
+    front, arm = Front(config), None
     try:
-        # The libraries that read the robot take most of a second; so does the front meanwhile.
+        # Importing the libraries that read the robot takes most of a second. The front end starts
+        # meanwhile.
         from katana450.assembly.robot_session import RunningArm, find_robot
 
         found = find_robot(settings, urdf, tool) if robot is None else robot
         arm = RunningArm(settings, found, scene)
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr)
-        current.wait_for(OPEN)
+        front.wait_for(OPEN)
         print(f"Open {url} in a browser.", flush=True)
         arm.start()
-        arm.attach(current.pipe)
-        current.wait_for(READY)
+        arm.attach(front.pipe)
+        front.wait_for(READY)
         if lines is not None:
             print(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.", flush=True)
         print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
-        ended, began = 0, time.monotonic()
-        # A signal that another thread is given does not wake this one from its wait.
+        early_ends, started = 0, time.monotonic()
+        # A signal that another thread receives does not wake this one from its wait.
         while arm.running and not stopping.wait(WAKE_INTERVAL):
-            if current.running:
-                if time.monotonic() - began > STABLE_SECONDS and arm.unheard > HANG_TIMEOUT:
-                    log.error("The page's server has not been heard of for %g s.", HANG_TIMEOUT)
-                    current.kill()
+            if front.running:
+                if time.monotonic() - started > STABLE_SECONDS and arm.unheard > HANG_TIMEOUT:
+                    log.error("The page's server has sent nothing for %g s.", HANG_TIMEOUT)
+                    front.kill()
                 continue
             log.error(
-                "The page's server ended with status %s; the arm holds. It is started again.",
-                current.exit_code,
+                "The page's server ended with status %s and is started again; the arm holds.",
+                front.exit_code,
             )
-            ended = 0 if time.monotonic() - began > STABLE_SECONDS else ended + 1
-            stopping.wait(RESTART_DELAYS[min(ended, len(RESTART_DELAYS) - 1)])
-            current.stop()
-            current, began = Front(config), time.monotonic()
-            arm.attach(current.pipe)
+            early_ends = 0 if time.monotonic() - started > STABLE_SECONDS else early_ends + 1
+            stopping.wait(RESTART_DELAYS[min(early_ends, len(RESTART_DELAYS) - 1)])
+            front.stop()
+            front, started = Front(config), time.monotonic()
+            arm.attach(front.pipe)
         if not stopping.is_set():
-            log.critical("The control loop has ended, so the server ends too: start it again.")
+            log.critical("The control loop has ended, so the server ends too. Start it again.")
     finally:
-        # The arm first: a front whose arm hangs up ends in peace.
+        # The arm first: a front end whose arm closes the link ends by itself.
         if arm is not None:
             arm.stop()
-        current.stop()
+        front.stop()
         if arm is not None:
             arm.join()
         listening.close()
@@ -137,17 +142,17 @@ def serve(
 def _with_scene(
     settings: Settings, urdf: Path, tool: str | None, options: Namespace | None
 ) -> tuple[DescribedRobot | None, InitialScene | None]:
-    """Return the scene that an extension starts with, and the robot if it had to be read for it."""
+    """Return the scene that an extension starts with, and the robot if it was read for that."""
     if options is None:
         return None, None
-    read: list[DescribedRobot] = []
+    found_robots: list[DescribedRobot] = []
 
     def session() -> Session:
         from katana450.assembly.robot_session import describe_robot
 
-        if not read:
-            read.append(describe_robot(settings, urdf, tool))
-        return read[0].session
+        if not found_robots:
+            found_robots.append(describe_robot(settings, urdf, tool))
+        return found_robots[0].session
 
     scene = None
     for part in serve_extensions():
@@ -155,7 +160,7 @@ def _with_scene(
             scene = part.initial_scene(options, session)
     for note in () if scene is None else scene.notes:
         print(f"katana450: {note}", flush=True)
-    return (read[0] if read else None), scene
+    return (found_robots[0] if found_robots else None), scene
 
 
 def _address(settings: Settings, port: int) -> str:
@@ -164,7 +169,7 @@ def _address(settings: Settings, port: int) -> str:
 
 
 def _shown(host: str) -> str:
-    """The address a person on this machine can open."""
+    """Return the address that a person on this machine can open."""
     if host in ("0.0.0.0", "::", ""):
         return "127.0.0.1"
     return f"[{host}]" if ":" in host else host

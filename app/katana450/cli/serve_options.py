@@ -1,4 +1,4 @@
-"""The options of ``katana450 serve``, apart from its work: reading them must load nothing."""
+"""Options of ``katana450 serve``, separate from its work: reading them must load nothing heavy."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from katana450.cli.arm_options import add_arm_options
 from katana450.extension import serve_extensions
 from katana450.settings import Settings
 
-MIN_SILENCE, LONGEST_SILENCE = 0.2, 2.0
-"""[s] Heartbeats are 0.1 s apart, and after 3 s the arm is anybody's."""
+MIN_SILENCE, MAX_SILENCE = 0.2, 2.0
+"""[s] Heartbeats are 0.1 s apart, and after 3 s the driver loses the lease."""
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
-    """Put them into `parser`."""
+    """Add the options of ``serve`` to ``parser``."""
     parser.add_argument(
         "--host",
         default=Settings.host,
-        help="address to listen on; one that other machines can reach asks for --access "
+        help="address to listen on; one that other machines can reach needs --access "
         "(default: %(default)s)",
     )
     parser.add_argument(
@@ -29,26 +29,26 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         type=_silence,
         default=Settings.silence,
         metavar="SECONDS",
-        help="without a heartbeat of whoever drives until a moving arm is stopped; the page "
-        f"gives ten a second ({MIN_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
+        help="heartbeat timeout of the driver, after which a moving arm is stopped; the page sends "
+        f"ten a second ({MIN_SILENCE:g} to {MAX_SILENCE:g}, default: %(default)s)",
     )
     parser.add_argument(
         "--access",
         type=Path,
         metavar="FILE",
-        help="let in only people with a link that `katana450 access give` wrote into this file",
+        help="admit only people with a link that `katana450 access give` wrote to this file",
     )
     parser.add_argument(
         "--insecure",
         action="store_true",
-        help="let other machines in without a link: everybody there can drive the arm",
+        help="admit other machines without a link: everybody there can drive the arm",
     )
     parser.add_argument("--tls-cert", type=Path, metavar="FILE", help="certificate, for https")
     parser.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key")
     parser.add_argument(
         "--public-url",
         metavar="URL",
-        help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
+        help="address of the reverse proxy in front of the server, e.g. https://arm.example.org",
     )
     parser.add_argument(
         "--bare",
@@ -59,7 +59,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         "--lines",
         type=_port,
         metavar="PORT",
-        help="a TCP port of this machine for programs that speak a line of JSON at a time",
+        help="a TCP port of this machine for programs that send JSON lines",
     )
     for part in serve_extensions():
         if part.add_options is not None:
@@ -68,11 +68,11 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _silence(text: str) -> float:
-    return heartbeat_timeout(text, LONGEST_SILENCE)
+    return heartbeat_timeout(text, MAX_SILENCE)
 
 
 def heartbeat_timeout(text: str, longest: float) -> float:
-    """Return the number of seconds in ``text``, from SHORTEST_SILENCE to ``longest``.
+    """Return the number of seconds in ``text``, from MIN_SILENCE to ``longest``.
 
     Raises ArgumentTypeError for any other text.
     """

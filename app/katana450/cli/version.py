@@ -1,4 +1,4 @@
-"""Which version of the program this is."""
+"""The version of the installed program."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from importlib.metadata import version as installed
 
 
 def version() -> str:
-    """Of the installed package."""
+    """Return the version of the installed package."""
     try:
         return installed("katana450")
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Programs that drive the arm begin here: ``from katana450.client import connect``."""
+"""Clients for programs that drive the arm: ``from katana450.client import connect``."""
 
 from katana450.client.asynchronous import AsyncClient, aconnect
 from katana450.client.client import Client, connect

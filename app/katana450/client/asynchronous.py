@@ -1,4 +1,4 @@
-"""A program's hand on the arm, for asyncio."""
+"""The client for asyncio programs that drive the arm."""
 
 from __future__ import annotations
 
@@ -23,163 +23,177 @@ from katana450.server.api.fields import ROOT, Id
 SOCKET = f"{ROOT}/socket"
 
 ANSWER_TIMEOUT = 5.0
-"""[s] An answer that takes longer does not come."""
+"""[s] Timeout for an answer of the server."""
 
 CLOSE_TIMEOUT = 1.0
-"""[s] For hanging up properly; then the connection is cut off."""
+"""[s] Timeout for a regular close of the connection, which is then aborted."""
 
 FOLLOW_RATE = 30.0
-"""[Hz] States while a motion is waited for."""
+"""[Hz] Rate of states while a motion is waited for."""
 
 A = TypeVar("A", bound=answers.Answer)
 
 
 class AsyncClient:
-    """One connection; made by ``aconnect``, which also gives heartbeats."""
+    """One connection, made by ``aconnect``. It sends the heartbeats of the program."""
 
     def __init__(self, socket: ClientConnection, welcome: answers.Welcome, site: Site) -> None:
         self._socket = socket
         self._site = site
         self.welcome = welcome
-        self._asked = 0
+        self._last_id = 0
         self._waiting: dict[Id, asyncio.Future[answers.Answer]] = {}
         self._states: list[asyncio.Queue[answers.State | None]] = []
         self._lost: str | None = None
         self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._heartbeat())]
 
     async def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await close_quietly(self._socket)
 
     async def ask(self, request: requests.Request) -> answers.Answer:
-        """The answer to any request. Raises RefusedError with the reason, LostError."""
-        self._asked += 1
-        request = msgspec.structs.replace(request, id=self._asked)
+        """Send a request and return its answer.
+
+        Raises RefusedError with the reason, or LostError if the connection is lost.
+        """
+        self._last_id += 1
+        request = msgspec.structs.replace(request, id=self._last_id)
         future: asyncio.Future[answers.Answer] = asyncio.get_running_loop().create_future()
-        self._waiting[self._asked] = future
+        self._waiting[self._last_id] = future
         try:
-            await self._say(request)
+            await self._send(request)
             async with asyncio.timeout(ANSWER_TIMEOUT):
                 return await future
         except TimeoutError as error:
-            raise LostError(f"No answer has come in {ANSWER_TIMEOUT:g} s.") from error
+            raise LostError(f"The server has not answered for {ANSWER_TIMEOUT:g} s.") from error
         finally:
             self._waiting.pop(request.id, None)
 
     async def tell(self, request: requests.Request) -> None:
-        """Say ``request`` and wait for no answer: for streams, Servo and Jog."""
-        await self._say(request)
+        """Send ``request`` without waiting for an answer: for streams, Servo and Jog."""
+        await self._send(request)
 
     async def query(self, kind: type[A]) -> A:
-        """One of answers.State, Arm, EventLog, Branches, Loop, Objects, World, Links."""
+        """Return a current value of the server.
+
+        ``kind``: one of answers.State, Arm, EventLog, Branches, Loop, Objects, World, Links.
+        """
         answer = await self.ask(requests.Query(at=kind.__struct_config__.tag))  # type: ignore[arg-type]
         if not isinstance(answer, kind):
-            raise LostError(f"{kind.__name__} was asked for, and {answer} came.")
+            raise LostError(f"The answer to a query for {kind.__name__} is {answer}.")
         return answer
 
     async def states(self, hz: float = FOLLOW_RATE) -> AsyncGenerator[answers.State, None]:
-        """The state, so many times a second; the newest, when it is asked for more slowly.
+        """Yield the state ``hz`` times per second; a slow reader gets only the newest state.
 
-        Raises LostError when the server has hung up or sends no more.
+        Raises LostError if the server closes the connection or sends no more states.
         """
         queue: asyncio.Queue[answers.State | None] = asyncio.Queue(1)
         self._states.append(queue)
         try:
             await self.ask(requests.Watch(hz=hz))
-            patience = ANSWER_TIMEOUT + 1.0 / hz
-            while (state := await _next_of(queue, patience)) is not None:
+            timeout = ANSWER_TIMEOUT + 1.0 / hz
+            while (state := await _next_of(queue, timeout)) is not None:
                 yield state
-            raise LostError(self._lost or "The server has hung up.")
+            raise LostError(self._lost or "The server has closed the connection.")
         finally:
             self._states.remove(queue)
             if self._lost is None and not self._states:
-                # A client that is closed meanwhile has nothing left to say.
+                # The client may have been closed meanwhile.
                 with suppress(LostError):
                     await self.tell(requests.Watch(hz=0.0))
 
     async def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
-        """Ask for a motion and wait until the arm is at rest; return its state then.
+        """Request a motion and wait until the arm is at rest; return its state then.
 
-        Its ``why`` is empty if the target was reached. Raises RefusedError if the motion was
-        refused, stopped or taken over, even where the stop is cleared already; TimeoutError after
-        ``seconds``.
+        Its ``why`` is empty if the target was reached.
+
+        Args:
+            request: the motion.
+            seconds: timeout [s].
+
+        Raises:
+            RefusedError: the motion was refused, stopped or taken over by another driver, even if
+                the stop was cleared since.
+            TimeoutError: the arm was not at rest after ``seconds``.
         """
         done = await self.ask(request)
         ticket = revocations = None
         if isinstance(done, answers.Done):
             ticket = done.ticket
-            # A program that is resumed ends by itself, which changes the driver too.
+            # A resumed program ends by itself, which also changes the driver.
             revocations = None if request.traits.for_program else done.revocations
         async with asyncio.timeout(seconds):
             async for state in self.states():
                 if state.stopped is not None:
                     raise RefusedError(state.stopped)
                 if revocations is not None and state.revocations != revocations:
-                    raise RefusedError("The arm was stopped or changed hands on the way.")
+                    raise RefusedError("The arm was stopped or changed its driver on the way.")
                 if state.ticket >= (ticket or 0) and not state.moving:
                     return state
-        raise LostError("The server has hung up.")
+        raise LostError("The server has closed the connection.")
 
     async def joints(self, q: npt.ArrayLike) -> answers.State:
         """Drive all joints to ``q`` (n,) [rad]; see ``go``."""
         return await self.go(requests.Joints(q=np.asarray(q, dtype=float).tolist()))
 
     async def nudge(self, axis: int, by: float) -> answers.State:
-        """Drive the joint ``axis``, from 1, on by the angle ``by`` [rad]; see ``go``.
+        """Turn the joint ``axis``, counted from 1, by the angle ``by`` [rad]; see ``go``.
 
-        ``why`` of the state says so where the joint's range limits it.
+        ``why`` of the state says if a limit of the joint shortened the motion.
         """
         return await self.go(requests.Nudge(axis=axis, by=by))
 
     async def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
-        """Bring the mesh in ``file`` to the server, to be placed by its key.
+        """Upload the mesh in ``file``; scene objects refer to it by its key.
 
-        unit: mm, cm, in or m; None to have it guessed. Raises RefusedError with what is wrong.
+        ``unit``: mm, cm, in or m; None to let the server guess it. Raises RefusedError with what is
+        wrong.
         """
         data = await asyncio.to_thread(file.read_bytes)
         return await asyncio.to_thread(self._site.mesh, data, file.name, unit)
 
     async def save_scene(self) -> bytes:
-        """What stands around, as a .zip."""
+        """Return the current scene as the contents of a .zip file."""
         return await asyncio.to_thread(self._site.saved)
 
     async def load_scene(self, data: bytes) -> answers.Scene:
-        """Have what stands around in the .zip ``data``, in place of all there is."""
+        """Replace the scene by the one in the .zip file contents ``data``."""
         scene = await asyncio.to_thread(self._site.scene, data)
         await self.ask(requests.Load(scene=scene.key))
         return scene
 
-    async def _say(self, request: requests.Request) -> None:
+    async def _send(self, request: requests.Request) -> None:
         if self._lost is not None:
             raise LostError(self._lost)
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT):
                 await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
         except ConnectionClosed as error:
-            raise LostError(f"The server has hung up: {error}.") from error
+            raise LostError(f"The server has closed the connection: {error}.") from error
         except TimeoutError as error:
             self._lose(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.")
             raise LostError(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.") from error
 
     async def _heartbeat(self) -> None:
         while True:
-            await self._say(requests.Heartbeat())
+            await self._send(requests.Heartbeat())
             await asyncio.sleep(self.welcome.heartbeat)
 
     async def _listen(self) -> None:
         try:
             async for text in self._socket:
-                self._take(answers.decoded(text))
-            self._lose("The server has hung up.")
+                self._dispatch(answers.decoded(text))
+            self._lose("The server has closed the connection.")
         except ConnectionClosed as error:
-            self._lose(f"The server has hung up: {error}.")
+            self._lose(f"The server has closed the connection: {error}.")
         except msgspec.MsgspecError as error:
-            self._lose(f"The server speaks another language: {error}.")
+            self._lose(f"The server sent an unknown message: {error}.")
 
-    def _take(self, answer: answers.AnyAnswer) -> None:
+    def _dispatch(self, answer: answers.AnyAnswer) -> None:
         future = self._waiting.get(answer.id)
         if future is not None and not future.done():
             if isinstance(answer, answers.Refused):
@@ -190,7 +204,7 @@ class AsyncClient:
             self._pass_on(answer)
 
     def _pass_on(self, state: answers.State | None) -> None:
-        """To all who watch; what one has not read yet gives way to what is newer."""
+        """Put the state into all queues, in place of a state that was not read yet."""
         for queue in self._states:
             if queue.full():
                 queue.get_nowait()
@@ -211,13 +225,13 @@ async def _next_of(
         async with asyncio.timeout(seconds):
             return await queue.get()
     except TimeoutError as error:
-        raise LostError(f"No state has come for {seconds:.1f} s.") from error
+        raise LostError(f"The server has sent no state for {seconds:.1f} s.") from error
 
 
 async def close_quietly(socket: ClientConnection) -> None:
-    """Close ``socket``, at the latest after GOODBYE.
+    """Close ``socket``, after CLOSE_TIMEOUT at the latest.
 
-    ``close`` alone first sends all that is left: it never ends if the server reads nothing.
+    ``close`` alone first sends all waiting bytes, so it never ends if the server reads nothing.
     """
     with suppress(TimeoutError):
         async with asyncio.timeout(CLOSE_TIMEOUT):
@@ -226,21 +240,26 @@ async def close_quietly(socket: ClientConnection) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers and arrays of numpy's, as JSON has them."""
+    """Return a number or an array of numpy as JSON values."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is nothing that can be sent: {value!r}")
+    raise TypeError(f"A value of type {type(value).__name__} cannot be sent: {value!r}")
 
 
 @asynccontextmanager
 async def aconnect(
     url: str = "http://127.0.0.1:8080", name: str = "Program", token: str = ""
 ) -> AsyncIterator[AsyncClient]:
-    """A connection to the server at ``url``, for as long as the context lasts.
+    """Connect to the server at ``url``, for as long as the context lasts.
 
-    name: how others see it. token: of an access link, where the server asks for one; what stands
-    behind the ``#`` of the link. Raises LostError when there is no server, RefusedError when it
-    does not let us in.
+    Args:
+        url: address of the server.
+        name: name that other people see.
+        token: token of an access link, the part after its ``#``, if the server requires one.
+
+    Raises:
+        LostError: there is no server.
+        RefusedError: the server does not admit the program.
     """
     address = url.rstrip("/").replace("http", "ws", 1) + f"{SOCKET}?name={quote(name)}"
     headers = {"Authorization": f"Bearer {token}"} if token else {}
@@ -261,7 +280,7 @@ async def aconnect(
         raise LostError(f"There is no katana450 server at {url}: {error}.") from error
     if not isinstance(welcome, answers.Welcome):
         await close_quietly(socket)
-        raise LostError(f"The server at {url} speaks another language: {welcome}.")
+        raise LostError(f"The server at {url} sent an unknown greeting: {welcome}.")
     client = AsyncClient(socket, welcome, Site(url, token))
     try:
         yield client

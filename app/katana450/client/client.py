@@ -1,4 +1,4 @@
-"""A program's hand on the arm, for programs that know no asyncio: the same, one call at a time."""
+"""The client for programs without asyncio that drive the arm. Each call waits for its result."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ A = TypeVar("A", bound=answers.Answer)
 
 
 class Client:
-    """One connection; made by ``connect``. It gives its heartbeats in a thread of its own."""
+    """One connection, made by ``connect``. A separate thread sends its heartbeats."""
 
     def __init__(self, client: AsyncClient, loop: asyncio.AbstractEventLoop) -> None:
         self._client = client
@@ -27,7 +27,7 @@ class Client:
 
     @property
     def welcome(self) -> answers.Welcome:
-        """Who we are there."""
+        """Greeting of the server, which contains the identity of this client."""
         return self._client.welcome
 
     def ask(self, request: requests.Request) -> answers.Answer:
@@ -80,7 +80,7 @@ class Client:
         try:
             return future.result()
         except BaseException:
-            # Ctrl-C: nobody waits for it any more.
+            # After Ctrl-C nothing waits for the result.
             future.cancel()
             raise
 
@@ -93,7 +93,7 @@ async def _next(states: AsyncGenerator[answers.State, None]) -> answers.State:
 def connect(
     url: str = "http://127.0.0.1:8080", name: str = "Program", token: str = ""
 ) -> Iterator[Client]:
-    """A connection to the server at ``url``, for as long as the context lasts; see ``aconnect``."""
+    """Connect to the server at ``url``, for as long as the context lasts; see ``aconnect``."""
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever, name="katana450 client", daemon=True)
     thread.start()

@@ -1,4 +1,4 @@
-"""Files to and from the server, over HTTP: they are too large for a message."""
+"""Upload and download of files over HTTP; they are too large for a message."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 
 REQUEST_TIMEOUT = 60.0
-"""[s]"""
+"""[s] Timeout of a transfer."""
 
 
 class RefusedError(KatanaError):
-    """The server did not do what was asked; the message says why, and what to do."""
+    """The server refused the request; the message says why, and what to do."""
 
 
 class LostError(KatanaError):
-    """The line to the server is gone. A moving arm is stopped then."""
+    """The connection to the server is lost. A moving arm is then stopped."""
 
 
 @dataclass(frozen=True)
 class Site:
-    """Where the server is, and the token of a link where it asks for one."""
+    """The address of the server, and the token of an access link if it requires one."""
 
     url: str
     token: str = ""
@@ -51,9 +51,9 @@ class Site:
 
     def _ask(self, path: str, data: bytes | None) -> bytes:
         headers = {"Authorization": f"Bearer {self.token}"} if self.token else {}
-        asked = urllib.request.Request(self.url.rstrip("/") + path, data=data, headers=headers)
+        request = urllib.request.Request(self.url.rstrip("/") + path, data=data, headers=headers)
         try:
-            with urllib.request.urlopen(asked, timeout=REQUEST_TIMEOUT) as answer:
+            with urllib.request.urlopen(request, timeout=REQUEST_TIMEOUT) as answer:
                 content: bytes = answer.read()
                 return content
         except urllib.error.HTTPError as error:

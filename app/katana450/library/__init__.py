@@ -1,1 +1,1 @@
-"""The library behind ``import katana450``: arms, plans and pictures of them, for other programs."""
+"""The library behind ``import katana450``: arms, plans and their plots, for other programs."""

@@ -35,18 +35,19 @@ Priority = Literal["pose", "pitch", "position"]
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A 5-axis arm with its tool, made by `katana450.load`. It never changes; it plans for one
-    thread at a time.
+    """A 5-axis arm with its tool, made by `katana450.load`.
+
+    It is immutable. Only one thread at a time may plan with it.
 
     Lengths are in m, angles in rad, times in s. ``T`` is a pose (4, 4): it maps coordinates of the
-    tool into the frame chosen in `load`. ``q`` are the n = 5 joint angles. Wherever an argument has
-    the wrong shape, is not finite or is no rotation, InputError says so; every error of the library
-    is a `katana450.KatanaError`.
+    tool into the frame chosen in `load`. ``q`` are the n = 5 joint angles. An argument that has the
+    wrong shape, is not finite or is no rotation raises InputError. Every error of the library is a
+    `katana450.KatanaError`.
 
     Attributes:
-        robot: what the URDF says, as the app has it.
-        session: the rules of motion: limits, collision bodies, what stands around.
-        notes: sentences on what was taken for granted in the file.
+        robot: contents of the URDF, as the app uses it.
+        session: the rules of motion: limits, collision bodies, environment.
+        notes: sentences on assumptions about the file.
         pose_frame: the frame of poses and points.
         objects: objects that plans keep clear of.
     """
@@ -74,7 +75,7 @@ class Arm:
 
     @property
     def tool(self) -> str:
-        """Link that poses are of."""
+        """Link to which poses refer."""
         return self._mounted.default_tool
 
     @property
@@ -99,7 +100,7 @@ class Arm:
 
     @property
     def ready(self) -> FloatArray:
-        """(n,) posture with room to move [rad]; where plans begin by default."""
+        """(n,) posture with room to move [rad]; plans begin there by default."""
         return self.session.ready
 
     @property
@@ -117,6 +118,7 @@ class Arm:
         return self._mounted.T_base_shoulder @ se3.inverse(self.pose_frame.T_frame_shoulder)
 
     def __repr__(self) -> str:
+        """Return a short description."""
         return f"<katana450 arm {self.name!r}, tool {self.tool!r}, poses in frame {self.frame!r}>"
 
     def fk(self, q: npt.ArrayLike) -> FloatArray:
@@ -141,16 +143,18 @@ class Arm:
     def ik(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> IKSolutions:
         """Return all four solutions for the pose (4, 4), or for poses (N, 4, 4), in closed form.
 
-        Each carries whether it is inside the joint limits, and by how much it misses the pose: five
-        axes cannot take every pose. `nearest` gives the best the arm can do.
+        Each solution states whether it is inside the joint limits, and its distance from the pose,
+        because five axes cannot take every pose. `nearest` returns the best that the arm can do.
 
         Args:
             T: pose or poses of the tool [m].
-            q_hint: (n,) angles [rad]; joints that turn by more than a turn, and joints that the
-                pose leaves free, are put nearest to it. For a single pose.
+            q_hint: (n,) angles [rad], for a single pose. Joints with a range of more than a turn,
+                and joints that the pose leaves free, are put nearest to it.
 
-        Raises InputError for another shape, NaN, or a matrix that is no pose. Source: the paper's
-        eq. (12) to (29).
+        Raises:
+            InputError: another shape, NaN, or a matrix that is no pose.
+
+        Source: the paper's eq. (12) to (29).
 
         >>> T = arm.fk([0.3, -1.0, 1.4, 0.3, 0.2])
         >>> for solution in arm.ik(T).feasible:
@@ -173,19 +177,21 @@ class Arm:
         q_hint: npt.ArrayLike | None = None,
         within_limits: bool = True,
     ) -> NearestPose:
-        """Return the feasible pose nearest to ``T`` (4, 4), with the reason for what is missed.
+        """Return the feasible pose nearest to ``T`` (4, 4), with the reason for its errors.
 
         Args:
             T: pose of the tool [m].
-            priority: what counts most when five axes cannot satisfy all of it. "pose": position,
-                then the whole orientation. "pitch": pitch, then position, then roll. "position":
-                position, then pitch, then roll. The last two take the yaw from the arm.
+            priority: which part of the pose is kept when five axes cannot satisfy all of it.
+                "pose": position, then the whole orientation. "pitch": pitch, then position, then
+                roll. "position": position, then pitch, then roll. In the last two the arm
+                determines the yaw.
             branch: "front-up", "front-down", "back-up" or "back-down" to stay on it; None for the
                 one that comes nearest.
-            q_hint: (n,) angles [rad]; of equally good postures the one nearest to it is taken.
-            within_limits: keep every joint inside its limits.
+            q_hint: (n,) angles [rad]; of equally good postures the nearest to it is returned.
+            within_limits: whether to keep every joint inside its limits.
 
-        Raises InputError for a pose, priority, branch or hint that cannot be used.
+        Raises:
+            InputError: a pose, priority, branch or hint is invalid.
 
         >>> T = arm.fk(arm.ready)
         >>> T[0, 3] += 0.5
@@ -209,8 +215,8 @@ class Arm:
         """Return the (6, n) Jacobian at joint angles ``q`` (n,) [rad].
 
         ``J @ qd`` is the tool's twist (omega, v) [rad/s, m/s] in the frame of poses, or in the
-        tool's own frame if ``body``. Raises InputError for a ``q`` that cannot be used. Source:
-        Lynch & Park, Modern Robotics (2017), ch. 5.1.
+        tool's own frame if ``body``. Raises InputError for an invalid ``q``. Source: Lynch & Park,
+        Modern Robotics (2017), ch. 5.1.
 
         >>> arm.jacobian(arm.ready).shape
         (6, 5)
@@ -227,16 +233,17 @@ class Arm:
     ) -> MotionPlan:
         """Plan a timed, collision-free motion from ``start`` to ``goal``.
 
-        The joints go straight where that is clear, else round what is in the way.
+        The joints follow a straight line if that is clear, else a path around the obstacles.
 
         Args:
             goal: (n,) joint angles [rad], or a pose (4, 4) of the tool.
             start: (n,) joint angles where the arm rests [rad]; None for `ready`.
-            seed: of the random search for a way round; the same seed gives the same plan.
+            seed: seed of the random search for a path; the same seed gives the same plan.
 
-        Raises BlockedError, an InputError, if no clear path was found: which bodies would meet and
-        where; InputError for a goal beyond the limits or a pose the arm cannot take, with the
-        reason.
+        Raises:
+            BlockedError: no clear path was found; the message names the bodies that would meet and
+                the place. It is an InputError.
+            InputError: the goal is outside the limits or a pose that the arm cannot take.
 
         >>> plan = arm.plan([1.2, -1.0, 1.4, 0.3, 0.0])
         >>> plan.end.tolist()
@@ -257,18 +264,19 @@ class Arm:
         pitch: float | None = None,
         roll: float | None = None,
     ) -> MotionPlan:
-        """Plan a straight line of the tool point, pitch and roll turning evenly.
+        """Plan a straight line of the tool point, on which pitch and roll change evenly.
 
         Args:
             to: (3,) end of the line [m].
-            by: (3,) vector from its start to its end [m], instead of ``to``. With neither the tool
-                turns on the spot.
+            by: (3,) vector from its start to its end [m], instead of ``to``. Without either the
+                tool turns on the spot.
             start: (n,) joint angles where it begins [rad]; None for `ready`.
             pitch: pitch of the tool at the end [rad], positive downwards; None to keep it.
             roll: roll of the tool at the end [rad]; None to keep it.
 
-        Raises InputError where the line leaves the arm's reach or its limits, and BlockedError
-        where bodies would meet: how far along, where, and what to do.
+        Raises:
+            InputError: the line leaves the arm's reach or its limits.
+            BlockedError: bodies would meet; the message says where on the line, and what to do.
 
         >>> plan = arm.line(by=(0.05, 0.0, -0.05))
         >>> round(plan.length, 6)
@@ -291,17 +299,21 @@ class Arm:
         """Plan a circle of the tool point, from its highest point.
 
         Args:
-            centre: (3,) [m]. radius: [m].
-            normal: (3,) direction about which the tool goes round; of any length but 0.
+            centre: (3,) [m].
+            radius: [m].
+            normal: (3,) direction of its axis; of any length but 0.
             pitch: of the tool [rad]; "roomiest" keeps the joints farthest from their limits, None
                 keeps the present one.
             roll: of the tool [rad]; None keeps the present one.
-            turns: how often, negative for the other way round, up to 20.
+            turns: number of turns, negative for the opposite direction, at most 20.
             branch: as in `nearest`; None for the first on which the circle is possible.
-            start: (n,) joint angles [rad] where the plan begins, then going to the circle. None to
-                begin on the circle, as the arm would come to it from `ready`.
+            start: (n,) joint angles [rad] where the plan begins; it then leads to the circle. None
+                to begin on the circle, in the posture that the arm would have after moving there
+                from `ready`.
 
-        Raises InputError and BlockedError as `line`.
+        Raises:
+            InputError: the circle leaves the arm's reach or its limits.
+            BlockedError: bodies would meet; the message says where on the circle.
 
         >>> plan = arm.circle((0.15, 0.0, -0.11), 0.1)
         >>> bool(abs(plan.length - 2.0 * np.pi * 0.1) < 1e-5)
@@ -322,22 +334,24 @@ class Arm:
     ) -> ReachabilityMap:
         """Map where the tool can be, and which fraction of orientations it can have there.
 
-        Joint limits count, and elbow, wrist and tool point stay above the table; collisions do not
-        count.
+        The map respects joint limits and keeps elbow, wrist and tool point above the table. It
+        ignores collisions.
 
         Args:
-            voxel: edge of a voxel [m]; half of it takes eight times as long.
+            voxel: edge of a voxel [m]; half the edge takes eight times as long.
             table: height of the table in the base frame [m].
-            pitches: number of pitches that are tried.
-            rolls: number of rolls that are tried.
+            pitches: number of pitches to try.
+            rolls: number of rolls to try.
             samples: number of random postures whose tool points are returned as ``cloud``.
             seed: seed of these postures.
 
-        Returns a map with ``points`` (N, 3) [m] in the base frame whatever the frame of poses,
-        ``fraction`` (N,), the fraction of orientations, and ``cloud`` (K, 3) [m].
+        Returns:
+            a map with ``points`` (N, 3) [m], always in the base frame, ``fraction`` (N,), the
+            fraction of orientations, and ``cloud`` (K, 3) [m].
 
-        Raises InputError for numbers that make no map, RobotDescriptionError for an arm whose axis
-        1 is not upright.
+        Raises:
+            InputError: the numbers are invalid.
+            RobotDescriptionError: axis 1 of the arm is not upright.
 
         >>> map = arm.reachability(0.1, pitches=12, rolls=8)
         >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())
@@ -358,14 +372,17 @@ class Arm:
     ) -> Viewer:
         """Open a 3D scene of the arm for a browser; in a notebook it is shown below the cell.
 
-        Args:
-            what: a plan to be shown again and again, or joint angles (n,) [rad]; None for `ready`.
-            port: TCP port of the scene, or the next free one above it.
-            host: address to listen on. Nobody is asked for a password: leave it at this machine
-                unless the network is yours.
+        The scene is open until the viewer is closed or the program ends; ``arm.show(plan).wait()``
+        keeps a script from ending.
 
-        Raises ConfigurationError if no port could be opened. The scene is open until the viewer is
-        closed or the program ends; ``arm.show(plan).wait()`` keeps a script from ending.
+        Args:
+            what: a plan to show repeatedly, or joint angles (n,) [rad]; None for `ready`.
+            port: TCP port of the scene, or the next free one above it.
+            host: address to listen on. There is no password: use only this machine, unless you
+                trust the network.
+
+        Raises:
+            ConfigurationError: no port could be opened.
 
         >>> with arm.show([0.3, -1.0, 1.4, 0.3, 0.0]) as viewer:
         ...     viewer.url.startswith("http://127.0.0.1:")
@@ -376,7 +393,7 @@ class Arm:
         return opened(self, what, port, host)
 
     def standing(self, q: npt.ArrayLike) -> State:
-        """Return the state of the arm at rest at ``q`` (n,) [rad], among its objects."""
+        """Return the state of the arm at rest at ``q`` (n,) [rad], with its scene objects."""
         angles = self.chain.check_q(q)
         state = self.session.begin(angles, self._mounted.gripper.clamp(0.0), 0.0)
         return replace(state, objects=self.objects)

@@ -28,14 +28,15 @@ def load(
 
     Args:
         urdf: the file; None for the Katana450.
-        tool: link that poses are of; None for the arm's own choice (``tcp`` for the Katana450).
+        tool: link to which poses refer; None for the default (``tcp`` for the Katana450).
         frame: coordinates of all poses and points: "shoulder", the paper's frame {S} where axes 1
             and 2 cross, parallel to the base; or "base", the root link of the URDF.
-        scene: YAML file of the objects that plans keep clear of besides the arm itself and the
-            table (docs/scenes.md); None for those of the app, a cup and a basin.
+        scene: YAML file of further obstacles for plans, beside the arm itself and the table
+            (docs/scenes.md); None for those of the app, a cup and a basin.
 
-    Raises RobotDescriptionError if the file cannot be read or is of another kind of mechanism, and
-    InputError for an unknown frame or an unusable scene; the message says what to do.
+    Raises:
+        RobotDescriptionError: the file cannot be read or describes another kind of mechanism.
+        InputError: the frame is unknown or the scene is invalid; the message says what to do.
 
     >>> arm = katana450.load()
     >>> arm.name, arm.tool, arm.n

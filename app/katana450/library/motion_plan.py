@@ -1,4 +1,4 @@
-"""A plan of the arm as a program uses it: sampled, plotted, shown or run."""
+"""A plan of the arm, for use in programs: it can be sampled, plotted, shown or run."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class MotionPlan:
     """A timed, collision-free path of the joints, from rest to rest.
 
     Made by `Arm.plan`, `Arm.line` and `Arm.circle`. Speed, acceleration and jerk of the joints and
-    the speed of the tool point (0.5 m/s) keep their limits; bodies keep 6 mm from one another.
+    the speed of the tool point (0.5 m/s) keep their limits. Bodies keep a distance of 6 mm.
 
     Attributes:
-        arm: the arm it is for.
+        arm: the arm for which it was planned.
         core: the plan as the controller follows it.
     """
 
@@ -31,6 +31,7 @@ class MotionPlan:
     core: Plan
 
     def __repr__(self) -> str:
+        """Return a short description."""
         return f"<katana450 plan, {self.duration:.2f} s, {1e3 * self.length:.0f} mm>"
 
     @property
@@ -55,16 +56,16 @@ class MotionPlan:
 
     @property
     def clearance(self) -> float | None:
-        """Smallest distance between two bodies on the whole path [m].
+        """Minimum distance between two bodies on the whole path [m].
 
-        None if the arm's description has no collision shapes: then nothing was checked.
+        None if the arm's description has no collision shapes; the path is then not checked.
         """
         return None if self.core.nearest is None else self.core.nearest.contact.distance
 
     def sample(self, dt: float = 0.01) -> Trajectory:
         """Return the motion every ``dt`` [s], from start to end.
 
-        Raises InputError if ``dt`` is not a number above 0, or makes a million samples.
+        Raises InputError if ``dt`` is not a number above 0, or gives a million samples or more.
 
         >>> samples = arm.line(by=(0.0, 0.0, -0.05)).sample(0.01)
         >>> samples.q.shape == samples.qd.shape == (len(samples), 5)
@@ -77,7 +78,7 @@ class MotionPlan:
     def plot(self) -> Any:
         """Draw the tool's path and the joints over time; return the matplotlib ``Figure``.
 
-        matplotlib is loaded by this call. Raises ConfigurationError if it is not installed.
+        This call loads matplotlib. Raises ConfigurationError if it is not installed.
 
         >>> figure = arm.circle((0.15, 0.0, -0.11), 0.1).plot()
         >>> figure.savefig("circle.png")  # doctest: +SKIP
@@ -97,8 +98,10 @@ class MotionPlan:
             client: a connection, from `katana450.connect`.
             dt: time from one command to the next [s].
 
-        Raises RefusedError if the server refuses a command or the arm is stopped, LostError if the
-        connection is lost, InputError as `sample`.
+        Raises:
+            RefusedError: the server refuses a command, or the arm is stopped.
+            LostError: the connection is lost.
+            InputError: as `sample`.
         """
         from katana450.library.streaming import stream
 

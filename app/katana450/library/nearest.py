@@ -1,4 +1,4 @@
-"""Projection of a pose onto those that the arm can take, with the reason for what is missed."""
+"""Projection of a pose onto the feasible poses, with the reason for the remaining error."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ PRIORITIES = {"pose": Priority.POSE, "pitch": Priority.PITCH, "position": Priori
 
 @dataclass(frozen=True, eq=False)
 class NearestPose(Projection):
-    """The feasible pose nearest to the one asked for, and what is missed; every figure is measured.
+    """The feasible pose nearest to the target, and the remaining errors; all of them are measured.
 
     Attributes:
         T: (4, 4) the feasible pose, in the frame of the arm object [m].
         q: (n,) joint angles that take it [rad].
-        branch: how the arm stands.
-        position_error: distance from the pose asked for [m].
-        rotation_error: angle from it [rad].
-        yaw_error: angle between the tool's roll axis asked for and the arm's plane, which a 5-axis
-            arm cannot leave [rad].
+        branch: the branch of ``q``.
+        position_error: distance from the target [m].
+        rotation_error: angle from the target [rad].
+        yaw_error: angle between the target's roll axis and the arm's plane, which a 5-axis arm
+            cannot leave [rad].
         pitch_error: angle between the two roll axes within that plane [rad].
         roll_error: missing roll where the pitch has priority [rad].
         limits: indices, from 0, of the axes whose limit keeps the arm from coming nearer.
-        axis1: whether axis 1 is in the way.
-        reach: whether the links reach no farther.
-        reason: the same in words; empty if the pose is met to what the arm is precise to.
+        axis1: whether axis 1 keeps the arm from coming nearer.
+        reach: whether the links are too short to come nearer.
+        reason: the same in words; empty if the target is met within the precision of the arm.
     """
 
     reason: str
@@ -65,8 +65,8 @@ def nearest(
         priority=chosen,
     )
     findings = of_projection(chain, best, chosen, yaw_was_given=chosen is Priority.POSE)
-    said = "; ".join(REASONS[finding.reason](finding) for finding in findings)
+    reason = "; ".join(REASONS[finding.reason](finding) for finding in findings)
     best = replace(best, T=frame.from_shoulder(best.T))
     return NearestPose(
-        **{each.name: getattr(best, each.name) for each in fields(best)}, reason=said
+        **{each.name: getattr(best, each.name) for each in fields(best)}, reason=reason
     )

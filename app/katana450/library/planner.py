@@ -1,4 +1,4 @@
-"""Plans of the arm, made by the steps of scripts from a posture at rest."""
+"""Planning for the library: it builds the steps of scripts, from a posture at rest."""
 
 from __future__ import annotations
 
@@ -29,7 +29,11 @@ MAX_TURNS = 20.0
 class Planner:
     """Makes plans in coordinates of ``frame``; see `katana450.Arm`.
 
-    standing: the state of an arm at rest at joint angles (n,) [rad].
+    Attributes:
+        session: the rules of motion.
+        T_base_shoulder: (4, 4) frame {S} in the base [m].
+        frame: frame of poses and points.
+        standing: returns the state of an arm at rest at joint angles (n,) [rad].
     """
 
     session: Session
@@ -58,7 +62,7 @@ class Planner:
     ) -> Plan:
         """Plan a straight line of the tool point."""
         if to is not None and by is not None:
-            raise InputError("A line has either `to`, its end, or `by`, its length and direction.")
+            raise InputError("Give a line either `to`, its end, or `by`, its length and direction.")
         step = Line(
             None if to is None else finite_array(to, (3,), "The end of the line"),
             None if by is None else finite_array(by, (3,), "The vector `by` of the line"),
@@ -81,7 +85,7 @@ class Planner:
         turns: float,
         branch: Branch | str | None,
     ) -> Plan:
-        """Plan a circle of the tool point, with the way to it from ``start``, if given."""
+        """Plan a circle of the tool point, with the path to it from ``start``, if given."""
         axis = finite_array(normal, (3,), "The normal of the circle")
         length = math.hypot(*axis)
         if length == 0.0:
@@ -92,24 +96,24 @@ class Planner:
         count = _number(turns, "The number of turns")
         if not 0.0 < abs(count) <= MAX_TURNS:
             raise InputError(
-                f"The number of turns is {count:g}; it must be up to {MAX_TURNS:g} and not 0."
+                f"The number of turns is {count:g}; it must be at most {MAX_TURNS:g} and not 0."
             )
-        turn = ArcGeometry(
+        arc = ArcGeometry(
             finite_array(centre, (3,), "The centre of the circle"),
             axis / length,
             pitch if pitch == ROOMIEST else _angle(pitch, "pitch"),
             _angle(roll, "roll"),
             self.frame.in_base,
         )
-        wanted = None if branch is None else Branch.parse(str(branch))
+        chosen_branch = None if branch is None else Branch.parse(str(branch))
         builder = self._builder(start)
-        Circle(turn, size, count, wanted).build(builder)
+        Circle(arc, size, count, chosen_branch).build(builder)
         if start is None:
             del builder.orders[:-1]
         return _timed(builder)
 
     def _to_pose(self, builder: PlanBuilder, goal: npt.ArrayLike) -> None:
-        """Go to the nearest posture that takes the pose ``goal`` (4, 4) and can be reached."""
+        """Plan to the nearest reachable posture that takes the pose ``goal`` (4, 4)."""
         chain = builder.chain
         found = IKSolutions.of_pose(chain, self.frame.to_shoulder(goal), builder.q).feasible
         if not found:
@@ -124,7 +128,8 @@ class Planner:
             )
             why = best.reason or "only the nearest pose is"
             raise InputError(
-                f"The arm cannot take this pose: {why}. `Arm.nearest` gives the nearest it can."
+                f"The arm cannot take this pose: {why}. `Arm.nearest` returns the nearest feasible "
+                "pose."
             )
         q = builder.q
         nearest_first = sorted(found, key=lambda each: float(np.abs(each.q - q).max()))
@@ -138,14 +143,14 @@ class Planner:
 
 
 def _timed(builder: PlanBuilder) -> Plan:
-    """Time the paths that ``bench`` has, one after another."""
-    drafts = [order for _, order in builder.orders if isinstance(order, UntimedPath)]
-    paths = tuple(path for draft in drafts for path in draft.paths)
-    return replace(drafts[0], paths=paths).timed().plan
+    """Time the paths of ``builder``, one after another."""
+    untimed_paths = [order for _, order in builder.orders if isinstance(order, UntimedPath)]
+    paths = tuple(path for untimed in untimed_paths for path in untimed.paths)
+    return replace(untimed_paths[0], paths=paths).timed().plan
 
 
 def _number(value: float, name: str) -> float:
-    """Return ``value`` as a float. Raises InputError, which calls it ``name``."""
+    """Return ``value`` as a float. Raises InputError, whose message names it ``name``."""
     number = float(real_array(value, (), name))
     if not math.isfinite(number):
         raise InputError(f"{name} is {number}; give a finite number.")

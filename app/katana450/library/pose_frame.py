@@ -1,4 +1,4 @@
-"""Coordinates that a program gives poses in, and receives them in."""
+"""The frame in which a program gives and receives poses."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PoseFrame:
     """One of two frames: "shoulder", the paper's {S}, or "base", the root link of the URDF.
 
     Attributes:
-        name: of the frame.
+        name: name of the frame.
         T_frame_shoulder: (4, 4) maps coordinates in {S} into the frame [m].
     """
 
@@ -37,14 +37,14 @@ class PoseFrame:
 
     @staticmethod
     def of(arm: MountedArm, name: str) -> PoseFrame:
-        """Return the frame called ``name``. Raises InputError for another name."""
+        """Return the frame with that ``name``. Raises InputError for an unknown name."""
         if name not in NAMES:
             raise InputError(f"There is no frame {name!r}; choose from {', '.join(NAMES)}.")
         return PoseFrame(name, frozen(np.eye(4)) if name == "shoulder" else arm.T_base_shoulder)
 
     @property
     def in_base(self) -> bool:
-        """Whether it is the base frame."""
+        """True for the base frame."""
         return self.name == "base"
 
     def from_shoulder(self, T: FloatArray) -> FloatArray:
@@ -54,7 +54,7 @@ class PoseFrame:
     def to_shoulder(self, T: npt.ArrayLike) -> npt.ArrayLike:
         """Return poses ``T`` (..., 4, 4) in this frame as poses in {S} [m].
 
-        Anything else is returned as it is; the kinematics refuse it with the reason.
+        Any other value is returned unchanged; the kinematics refuse it with the reason.
         """
         if not self.in_base or dimensions(T) < 2:
             return T

@@ -20,16 +20,16 @@ from katana450.maths.kinematics.inverse import Solution, inverse
 class IKSolutions:
     """The four solutions of a pose, one for each branch, in the order of `branches`.
 
-    For N poses every array has a leading dimension N. For a single pose the solutions can also be
-    taken one by one, as ``for solution in arm.ik(T)``; each has ``q``, ``branch``,
+    For N poses every array has a leading dimension N. The solutions of a single pose can be
+    iterated over, as in ``for solution in arm.ik(T)``. Each has ``q``, ``branch``,
     ``within_limits``, ``position_error``, ``rotation_error`` and ``exact``.
 
     Attributes:
         q: (4, n) or (N, 4, n) joint angles [rad].
         within_limits: (4,) or (N, 4) whether every joint is inside its limits.
-        position_error: (4,) or (N, 4) distance between the pose asked for and the pose that forward
-            kinematics gives of ``q`` [m].
-        rotation_error: (4,) or (N, 4) angle between the same two [rad].
+        position_error: (4,) or (N, 4) distance between the target and the pose that forward
+            kinematics gives for ``q`` [m].
+        rotation_error: (4,) or (N, 4) angle between the same two poses [rad].
     """
 
     q: FloatArray
@@ -40,7 +40,7 @@ class IKSolutions:
 
     @staticmethod
     def of_pose(chain: Chain, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> IKSolutions:
-        """Solve the pose ``T`` (4, 4) in {S}; errors as of `maths.kinematics.inverse.inverse`."""
+        """Solve the pose ``T`` (4, 4) in {S}; errors as in `maths.kinematics.inverse.inverse`."""
         found = tuple(inverse(chain, T, q_hint=q_hint))
         return IKSolutions(
             q=np.array([each.q for each in found]),
@@ -52,7 +52,7 @@ class IKSolutions:
 
     @staticmethod
     def of_poses(chain: Chain, T: npt.ArrayLike) -> IKSolutions:
-        """Solve the poses ``T`` (N, 4, 4) in {S}; errors as of `inverse_batch`."""
+        """Solve the poses ``T`` (N, 4, 4) in {S}; errors as in `inverse_batch`."""
         found = inverse_batch(chain, T, residuals=True)
         assert found.position_error is not None
         assert found.rotation_error is not None

@@ -1,4 +1,4 @@
-"""A plan driven on a server, as a stream of joint angles."""
+"""Execution of a plan on a server, as a stream of joint angles."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from katana450.server.api.answers import State
 
 
 def stream(samples: Trajectory, client: Client) -> State:
-    """Go to the first of ``samples``, follow the others in their time, and wait for rest.
+    """Go to the first of ``samples``, follow the others at their times, and wait for rest.
 
-    Each command is answered before the next is sent, so that a refusal ends the stream. The server
-    refuses each command that is newer than a stop or a change of driver since the beginning, even
-    where the stop was cleared at once.
+    Each command is answered before the next is sent, so that a refusal ends the stream. After a
+    stop or a change of driver the server refuses all further commands, even if the stop was cleared
+    at once.
     """
     revocations = client.query(State).revocations
     client.go(requests.Joints(q=samples.q[0].tolist(), revocations=revocations))
-    begun = time.monotonic()
+    started = time.monotonic()
     for t, q, qd in zip(samples.t.tolist(), samples.q, samples.qd, strict=True):
-        time.sleep(max(begun + t - time.monotonic(), 0.0))
+        time.sleep(max(started + t - time.monotonic(), 0.0))
         client.ask(requests.Servo(q=q.tolist(), qd=qd.tolist(), revocations=revocations))
     return client.go(requests.Joints(q=samples.q[-1].tolist(), revocations=revocations))

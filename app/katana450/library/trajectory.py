@@ -1,4 +1,4 @@
-"""Samples of a plan, evenly in time."""
+"""Samples of a plan at equal time steps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.plan import Plan, Segment
 
 MAX_SAMPLES = 1_000_000
-"""Their poses take 128 MB."""
+"""Maximum number of samples; their poses take 128 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Trajectory:
     """Samples of a plan. Every sample is evaluated on the plan; nothing is interpolated.
 
     Attributes:
-        t: (N,) times from the start, evenly but for the last, which is the end [s].
+        t: (N,) times from the start [s], at equal steps except the last, which is the end.
         q, qd, qdd: (N, n) joint angles and their derivatives [rad, rad/s, rad/s^2].
         T: (N, 4, 4) poses of the tool in the frame of the arm object [m].
     """
@@ -35,6 +35,7 @@ class Trajectory:
     T: FloatArray
 
     def __len__(self) -> int:
+        """Return the number of samples."""
         return len(self.t)
 
     @property
@@ -44,21 +45,21 @@ class Trajectory:
 
 
 def sampled(plan: Plan, dt: float, chain: Chain, frame: PoseFrame) -> Trajectory:
-    """Sample ``plan`` every ``dt`` [s] and at its end. Raises InputError for no such ``dt``."""
+    """Sample ``plan`` every ``dt`` [s] and at its end. Raises InputError for an invalid ``dt``."""
     if not (isinstance(dt, int | float) and math.isfinite(dt) and dt > 0.0):
-        raise InputError(f"A sampling time is a number of seconds above 0, not {dt!r}.")
+        raise InputError(f"The sampling time must be a number of seconds above 0, not {dt!r}.")
     count = math.ceil(plan.duration / dt - 1e-9)
     if count >= MAX_SAMPLES:
         raise InputError(
-            f"A sampling time of {dt:g} s makes {count} samples of this plan; "
-            f"choose one that makes fewer than {MAX_SAMPLES}."
+            f"A sampling time of {dt:g} s gives {count} samples of this plan; "
+            f"choose one that gives fewer than {MAX_SAMPLES}."
         )
     t = np.append(dt * np.arange(count), plan.duration)
-    begins = np.cumsum([0.0, *(segment.scaling.duration for segment in plan.segments)])
-    numbers = np.searchsorted(begins[1:-1], t, side="right")
+    starts = np.cumsum([0.0, *(segment.scaling.duration for segment in plan.segments)])
+    numbers = np.searchsorted(starts[1:-1], t, side="right")
     moved = np.array(
         [
-            _motion(plan.segments[number], time - float(begins[number]))
+            _motion(plan.segments[number], time - float(starts[number]))
             for number, time in zip(numbers.tolist(), t.tolist(), strict=True)
         ]
     )
@@ -67,7 +68,7 @@ def sampled(plan: Plan, dt: float, chain: Chain, frame: PoseFrame) -> Trajectory
 
 
 def _motion(segment: Segment, t: float) -> FloatArray:
-    """(3, n) angles, speeds and accelerations ``t`` [s] after the start of ``segment``."""
+    """Return (3, n) angles, speeds and accelerations ``t`` [s] after the start of ``segment``."""
     tau, speed, acceleration = segment.scaling.motion_after(t)
     moving = segment.at(tau)
     return np.array(

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from katana450.library.arm import Arm
 
 FRAME_TIME = 1.0 / 60.0
-"""[s]"""
+"""[s] Time from one frame to the next."""
 
 PAUSE = 1.0
-"""[s] At the end of a plan, before it is shown again."""
+"""[s] Pause at the end of a plan, before it is shown again."""
 
 PATH_POINTS = 400
 
@@ -39,16 +39,16 @@ PATH_COLOUR = (64, 156, 255)
 
 
 class Viewer:
-    """A viser server with the arm and what stands around it; made by `Arm.show`.
+    """A viser server that shows the arm and its environment; made by `Arm.show`.
 
-    In a notebook the last line of a cell shows the scene below it. It is a picture of the arm, not
-    a control of any: nothing in it moves a simulated or real arm.
+    In a notebook the last line of a cell shows the scene below it. The scene is only a picture:
+    nothing in it moves a simulated or real arm.
     """
 
     def __init__(self, arm: Arm, port: int, host: str) -> None:
         """Serve a scene of ``arm`` at ``host``, on ``port`` or the next free one above it.
 
-        Raises ConfigurationError if no port could be opened.
+        Raises ConfigurationError if no port can be opened.
         """
         self._arm = arm
         try:
@@ -73,7 +73,7 @@ class Viewer:
         self._stopped = threading.Event()
         self._closed = threading.Event()
         self._show(session.ready)
-        # Before viser's own: the player shows nothing on a server that has stopped.
+        # Runs before viser's own exit handler, so that the player never uses a stopped server.
         atexit.register(self.close)
 
     def move(self, q: npt.ArrayLike) -> None:
@@ -86,9 +86,9 @@ class Viewer:
         self._show(angles)
 
     def play(self, plan: MotionPlan, speed: float = 1.0) -> None:
-        """Draw the tool's path and show the motion again and again, in a thread of its own.
+        """Draw the tool's path and show the motion repeatedly, in a separate thread.
 
-        ``speed``: factor on real time, above 0.
+        ``speed``: factor on real time, above 0. Raises InputError for another ``speed``.
         """
         if not (np.isfinite(speed) and speed > 0.0):
             raise InputError(f"The speed is {speed!r}; give a number above 0.")
@@ -109,7 +109,7 @@ class Viewer:
         self._player.start()
 
     def pause(self) -> None:
-        """End `play`; the arm stays where it is shown."""
+        """End `play`; the arm stays where it is."""
         self._stopped.set()
         if self._player is not None:
             self._player.join()
@@ -131,6 +131,7 @@ class Viewer:
             self._server.stop()
 
     def __enter__(self) -> Self:
+        """Return the viewer, which is closed at the end of the context."""
         return self
 
     def __exit__(
@@ -139,9 +140,11 @@ class Viewer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """Close the viewer."""
         self.close()
 
     def __repr__(self) -> str:
+        """Return a short description."""
         return f"<katana450 viewer at {self.url}>"
 
     def _repr_html_(self) -> str:
@@ -151,10 +154,10 @@ class Viewer:
 
     def _run(self, t: FloatArray, q: FloatArray, stopped: threading.Event) -> None:
         while not stopped.is_set():
-            begun = time.monotonic()
+            started = time.monotonic()
             passed = 0.0
             while passed < t[-1] and not stopped.wait(FRAME_TIME):
-                passed = time.monotonic() - begun
+                passed = time.monotonic() - started
                 self._show(q[min(int(np.searchsorted(t, passed)), len(q) - 1)])
             stopped.wait(PAUSE)
 

@@ -1,1 +1,1 @@
-"""From a URDF file to the arm the controller knows and the bodies the view draws."""
+"""Reading a URDF file: the arm for the controller and the bodies for the view."""

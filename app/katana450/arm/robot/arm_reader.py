@@ -22,24 +22,25 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.exact_member import exact_member
 
 SHOULDER_FRAME = "shoulder_frame"
-"""The link that is the paper's frame {S}."""
+"""Name of the link whose frame is the paper's frame {S}."""
 
 CONDUITS = "conduits.json"
-"""File beside the URDF that says where its conduit is held."""
+"""File beside the URDF that describes where the conduit is held."""
 
 
 def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> MountedArm:
     """Return the arm that ``urdf`` describes.
 
     Args:
+        urdf: the robot description.
         links: the tree made of it.
-        path: of the file, for error messages; its conduits are described beside it.
-        tool: link that targets are set for by default; None for the first of TOOL_FRAMES there
-            is, else the outermost link the arm carries.
+        path: path of the file, for error messages; the file of its conduits is beside it.
+        tool: link to which targets refer by default; None for the first of TOOL_FRAMES that exists,
+            else the outermost link that the arm carries.
 
     Raises:
-        RobotDescriptionError: it is none that the kinematics accept, or its conduits are not
-            described rightly; says what is wrong.
+        RobotDescriptionError: the kinematics do not support the arm, or its conduits are described
+            wrongly. The message says what is wrong.
     """
     frames = urdf.frames()
     structure = structure_of(urdf, path, tool)
@@ -63,7 +64,7 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
     fingers = fingers_of(structure.hand, structure.others, frames)
     notes = [*notes, *fingers.notes]
     if structure.chosen and fingers.driven:
-        notes.append(_taken_for_gripper(fingers, structure.tools[0]))
+        notes.append(_gripper_note(fingers, structure.tools[0]))
     return MountedArm(
         chain=chain,
         tools=tools,
@@ -80,18 +81,18 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
     )
 
 
-def _taken_for_gripper(fingers: Fingers, tool: str) -> str:
+def _gripper_note(fingers: Fingers, tool: str) -> str:
     names = ", ".join(map(repr, fingers.driven))
     if len(fingers.driven) == 1:
-        return f"Joint {names} is taken for that of a gripper; {tool!r} is the tool."
+        return f"Joint {names} is assumed to be a gripper joint; {tool!r} is the tool."
     return (
-        f"Joints {names} are taken for those of a gripper and driven together; "
+        f"Joints {names} are assumed to be gripper joints and driven together; "
         f"{tool!r} is the tool."
     )
 
 
 def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[UrdfJoint]) -> FloatArray:
-    """{S}: the link of that name, else parallel to the root where axis 1 passes axis 2."""
+    """Return {S}: the link of that name, else parallel to the root where axis 1 passes axis 2."""
     if SHOULDER_FRAME in frames:
         return frames[SHOULDER_FRAME]
     one, two = (_screw(joint, frames[joint.child]) for joint in joints[:2])
@@ -104,13 +105,13 @@ def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[UrdfJoint
 
 
 def _screw(joint: UrdfJoint, T_shoulder_child: FloatArray) -> FloatArray:
-    """The joint's screw axis (6,) in {S}; a URDF joint turns about an axis of its child's frame."""
+    """Return the joint's screw axis (6,) in {S}; the axis passes through its child's origin."""
     direction = T_shoulder_child[:3, :3] @ joint.axis
     try:
         return screws.revolute(direction, T_shoulder_child[:3, 3])
     except InputError as error:
         raise RobotDescriptionError(
-            f"Joint {joint.name!r} is not described rightly. {error}"
+            f"The description of joint {joint.name!r} is wrong. {error}"
         ) from error
 
 
@@ -126,13 +127,13 @@ def _limit(joint: UrdfJoint, which: str) -> float:
 def _hinge(
     links: Sequence[Link], chain: Chain, resting: Mapping[str, float], start: str, end: str
 ) -> Hinge:
-    """The one joint between two links; KeyError when there is not one."""
+    """Return the one joint between two links. Raises KeyError if there is not exactly one."""
     by_name = {link.name: link for link in links}
     path: list[Link] = []
     name: str | None = end
     while name != start:
         if name is None:
-            raise KeyError(f"{end} does not hang on {start}")
+            raise KeyError(f"{end} is not a descendant of {start}")
         path.insert(0, by_name[name])
         name = path[0].parent
     joints = [link.joint.name if link.joint is not None else "" for link in path]

@@ -1,4 +1,4 @@
-"""The same robot without its gripper, as the paper's experiments have it."""
+"""The robot without its gripper, as in the paper's experiments."""
 
 from __future__ import annotations
 
@@ -9,37 +9,37 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
 
 FLANGE = "flange"
-"""The tool frame that is left."""
+"""The tool frame that remains."""
 
 
 def bare(robot: Robot) -> Robot:
-    """Return ``robot`` without the links that carry its fingers, the flange its only tool.
+    """Return ``robot`` without the links that carry its fingers; the flange is its only tool.
 
-    Raises RobotDescriptionError where it has no arm, or no link of that name.
+    Raises RobotDescriptionError if it has no arm, or no link of that name.
     """
     arm = robot.require_arm()
     if FLANGE not in arm.tools:
         raise RobotDescriptionError(
-            f"{robot.name} has no link {FLANGE!r}, so nobody can say where its gripper begins."
+            f"{robot.name} has no link {FLANGE!r}, which marks where its gripper begins."
         )
     chain = arm.chain_to(FLANGE)
     parents = {link.name: link.parent for link in robot.links}
     fingers = {link.name for link in robot.links if link.joint and link.joint.name in arm.fingers}
-    # What carries the fingers, down to the last axis of the arm.
+    # The links between the fingers and the last axis of the arm are removed too.
     carried = {link.name for link in robot.links if link.joint and link.joint.name in chain.names}
-    gone = set(fingers)
+    removed = set(fingers)
     for name in fingers:
         above = parents[name]
         while above is not None and above not in carried:
-            gone.add(above)
+            removed.add(above)
             above = parents[above]
-    left = []
+    kept = []
     for link in robot.links:
-        if link.name in gone or link.parent in gone:
-            gone.add(link.name)
+        if link.name in removed or link.parent in removed:
+            removed.add(link.name)
         else:
-            left.append(link)
-    plain = replace(
+            kept.append(link)
+    bare_arm = replace(
         arm,
         chain=chain,
         tools={FLANGE: arm.tools[FLANGE]},
@@ -47,4 +47,4 @@ def bare(robot: Robot) -> Robot:
         gripper=NO_GRIPPER,
         fingers={},
     )
-    return replace(robot, links=tuple(left), arm=plain)
+    return replace(robot, links=tuple(kept), arm=bare_arm)

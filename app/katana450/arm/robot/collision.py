@@ -1,4 +1,4 @@
-"""The bodies that a robot description gives its links, as the collision core takes them."""
+"""Conversion of the collision shapes of a robot description to bodies of the collision core."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 def world_of(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
     """Return the arm's own collision bodies, and sentences for a person on what they leave out.
 
-    Every shape counts as its convex hull. x is the arm's joint angles (n,) and the driven finger
-    joint [rad, or m where it slides]. The world is None when no link has a shape. Raises
-    RobotDescriptionError where there is no arm.
+    Every shape is replaced by its convex hull. x is the arm's joint angles (n,) followed by the
+    driven finger joint [rad, or m if it slides]. The world is None if no link has a shape. Raises
+    RobotDescriptionError if there is no arm.
     """
     arm = robot.require_arm()
-    movers: list[RigidGroup] = []
-    # Of each body the piece it moves with, and where it is in the frame of that.
+    groups: list[RigidGroup] = []
+    # For each link: the number of its rigid group, and its pose in the frame of that group.
     places: dict[str | None, tuple[int, FloatArray]] = {None: (GROUND, np.eye(4))}
     parts: list[Part] = []
     notes: list[str] = []
     for link in robot.links:
-        piece, T = places[link.parent]
+        group, T = places[link.parent]
         T = T @ link.at_rest(arm.resting)
         joint = link.joint
         drive = None if joint is None else _drive(arm, joint)
         if joint is not None and drive is not None:
-            movers.append(RigidGroup(piece, T, joint.axis, *drive, slides=joint.slides))
-            piece, T = len(movers), np.eye(4)
-        places[link.name] = piece, T
+            groups.append(RigidGroup(group, T, joint.axis, *drive, slides=joint.slides))
+            group, T = len(groups), np.eye(4)
+        places[link.name] = group, T
         shapes, refused = _shapes(link)
         notes += refused
         if shapes:
-            parts.append(Part(link.name, piece, (frozen(T),) * len(shapes), shapes))
+            parts.append(Part(link.name, group, (frozen(T),) * len(shapes), shapes))
     if not parts:
         return None, tuple(notes)
     bare = [link.name for link in robot.links if link.visuals and not link.collisions]
     if bare:
-        notes.append(f"Without collision shapes, and so not checked: {', '.join(bare)}.")
-    linkage = Linkage(movers)
+        notes.append(f"Not checked, because they have no collision shapes: {', '.join(bare)}.")
+    linkage = Linkage(groups)
     chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
     return CollisionWorld(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(
@@ -58,12 +58,12 @@ def world_of(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
 
 
 def table() -> Part:
-    """What everything stands on, as a half-space."""
+    """Return the table as a half-space."""
     return obstacle("table", np.eye(4), half_space())
 
 
 def scene_objects_of(props: Props) -> tuple[SceneObject, ...]:
-    """Cup and basin where they stand at first, as the cylinders round them."""
+    """Return cup and basin at their initial places, as the cylinders around them."""
     return tuple(
         SceneObject(
             name,
@@ -77,7 +77,7 @@ def scene_objects_of(props: Props) -> tuple[SceneObject, ...]:
 
 
 def initial_objects(props: Props) -> tuple[Part, ...]:
-    """The table and ``scene_objects_of`` as obstacles that stay where they are."""
+    """Return the table and ``scene_objects_of`` as fixed obstacles."""
     objects = scene_objects_of(props)
     return (
         table(),
@@ -86,9 +86,9 @@ def initial_objects(props: Props) -> tuple[Part, ...]:
 
 
 def hand_of(robot: Robot, world: CollisionWorld) -> Hand:
-    """Return the fingers and what they hang on; without any, what the last joint turns.
+    """Return the fingers and the group that carries them; without fingers, that of the last joint.
 
-    Raises RobotDescriptionError where there is no arm.
+    Raises RobotDescriptionError if there is no arm.
     """
     arm = robot.require_arm()
     driven = {link.name for link in robot.links if link.joint and link.joint.name in arm.fingers}
@@ -104,7 +104,7 @@ def hand_of(robot: Robot, world: CollisionWorld) -> Hand:
 
 
 def _drive(arm: MountedArm, joint: Joint) -> tuple[int, float, float] | None:
-    """The entry of x that moves ``joint``, with factor and offset; None for a joint at rest."""
+    """Return index in x, factor and offset that drive ``joint``; None for a joint at rest."""
     if joint.name in arm.chain.names:
         return arm.chain.names.index(joint.name), 1.0, 0.0
     if joint.name in arm.fingers:

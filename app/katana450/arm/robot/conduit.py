@@ -1,7 +1,7 @@
 """The conduit that carries the arm's cables from link to link, as curves between its fittings.
 
-A stretch of it hangs between two links with one joint between them, so its shape follows from that
-joint's angle alone: it is worked out once for a row of angles and read off in between.
+Each stretch hangs between two links with one joint between them, so its shape depends on that
+joint's angle alone. It is computed once for a row of angles and interpolated linearly between them.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 ANGLES = 49
-"""Angles a stretch is worked out for: some five degrees apart."""
+"""Number of angles for which a stretch is computed, about five degrees apart."""
 
 PIECES = 24
-"""Of each half of a curve: shorter than its ribs are apart."""
+"""Pieces of each half of a curve; a piece is shorter than the distance of the ribs."""
 
 FULLNESS = 1.15
-"""How long the tangents at the ends of a half are to its chord: between taut and slack."""
+"""Ratio of the tangents at the ends of a half to its chord: between taut and slack."""
 
 HALVINGS = 24
-"""Of the way the middle may bulge: to less than a micrometre."""
+"""Steps of the bisection for the bulge of the middle; the error is less than a micrometre."""
 
 
 SLACK_EXPONENT = 6.0
-"""How sharply a slack curve becomes a taut one: the length is a norm of both, of this order."""
+"""Order of the norm of slack and taut length: how sharply a slack curve becomes a taut one."""
 
 STRETCH_FRACTION = 0.25
-"""Fraction of its length by which a conduit with ribs can be drawn out or pushed together."""
+"""Fraction of its length by which a conduit with ribs can be stretched or compressed."""
 
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """Where a stretch is held: point (3,) [m] and unit tangent (3,) in the frame of a link."""
+    """The fixed end of a stretch: point (3,) [m] and unit tangent (3,) in the frame of a link."""
 
     link: str
     point: FloatArray
@@ -52,8 +52,12 @@ class End:
 class Hinge(NamedTuple):
     """The one joint between two links.
 
-    joint: its name. axis: (3,) in its own frame. lower, upper: [rad]. T_start_joint, T_joint_end:
-    (4, 4) from the first link's frame to the joint's at zero, and from that to the second's [m].
+    Attributes:
+        joint: its name.
+        axis: (3,) in its own frame.
+        lower, upper: limits [rad].
+        T_start_joint: (4, 4) from the first link's frame to the joint's at zero [m].
+        T_joint_end: (4, 4) from the joint's frame to the second link's [m].
     """
 
     joint: str
@@ -68,9 +72,12 @@ class Hinge(NamedTuple):
 class ConduitStretch:
     """One free run of conduit.
 
-    start, end: its ends; the tangents lead from the first to the second. radius, length: [m], the
-    length at rest. hinge: between the two links. winds: whether the conduit lies about the axis of
-    that, where its ribs are pushed together and drawn apart, by no more than GIVE.
+    Attributes:
+        start, end: its ends; the tangents lead from the first to the second.
+        radius, length: [m], the length at rest.
+        hinge: the joint between the two links.
+        winds: whether the conduit lies around the axis of that joint. Its ribs are then stretched
+            and compressed, by at most STRETCH_FRACTION.
     """
 
     start: End
@@ -82,12 +89,13 @@ class ConduitStretch:
 
     @property
     def angles(self) -> FloatArray:
-        """(ANGLES,) [rad] of its joint that it is worked out for; in between it is led linearly."""
+        """(ANGLES,) angles [rad] of the joint for which the stretch is computed."""
         return np.linspace(self.hinge.lower, self.hinge.upper, ANGLES)
 
     def between(self, angle: float) -> tuple[int, float]:
-        """The number of the last of ``angles`` before ``angle`` [rad], and the fraction beyond
-        it.
+        """Return the index of the last of ``angles`` before ``angle`` [rad], and the remainder.
+
+        The remainder is a fraction 0..1 of the step to the next angle.
         """
         lower, upper = self.hinge.lower, self.hinge.upper
         row = (min(max(angle, lower), upper) - lower) / (upper - lower) * (ANGLES - 1)
@@ -95,22 +103,23 @@ class ConduitStretch:
         return low, row - low
 
     def courses(self, angles: Iterable[float], count: int) -> tuple[FloatArray, FloatArray]:
-        """``count`` points (A, n, 3) [m] evenly along it and unit tangents (A, n, 3).
+        """Return ``count`` points (A, n, 3) [m] evenly along the stretch, and unit tangents.
 
-        With its joint at each of the A ``angles`` [rad]; in the frame of the first end's link.
+        One row for each of the A ``angles`` [rad] of its joint, in the frame of the first end's
+        link. Tangents have the same shape as points.
         """
         rows = np.array([sum(self.between(angle)) for angle in angles])
         curves = _between(self._curves, rows, 0)
         spots = np.linspace(0.0, curves.shape[1] - 1.0, 2 * count + 1)[1::2]
         steps = np.diff(curves, axis=1)
-        # Between the middles of pieces, or the ribs would stand on edge where pieces meet.
+        # Interpolate between the middles of pieces; otherwise the ribs tilt where pieces meet.
         leading = _between(steps, np.clip(spots - 0.5, 0.0, steps.shape[1] - 1.0), 1)
         leading /= np.linalg.norm(leading, axis=2, keepdims=True)
         return _between(curves, spots, 1), leading
 
     @cached_property
     def _curves(self) -> FloatArray:
-        """(ANGLES, n, 3) points evenly along the conduit, for each of its angles."""
+        """(ANGLES, n, 3) points evenly along the conduit [m], for each of ``angles``."""
         hinge, angles = self.hinge, self.angles
         turns = [se3.from_rotation_translation(so3.exp(hinge.axis * a), ZERO) for a in angles]
         T = hinge.T_start_joint @ np.array(turns) @ hinge.T_joint_end
@@ -126,7 +135,7 @@ class ConduitStretch:
     def _wound(
         self, p: FloatArray, a: FloatArray, q: FloatArray, b: FloatArray, angles: FloatArray
     ) -> FloatArray:
-        """The same about the joint's axis: unrolled, a plain curve in radius, arc and height."""
+        """Return curves around the joint's axis: plain curves in radius, arc and height."""
         frame = _frame_along(self.hinge.T_start_joint[:3, :3] @ self.hinge.axis)
         origin = self.hinge.T_start_joint[:3, 3]
         mean = float(np.linalg.norm(((p[0] - origin) @ frame)[:2]))
@@ -136,15 +145,15 @@ class ConduitStretch:
             r = np.hypot(local[:, 0], local[:, 1])
             phi = np.arctan2(local[:, 1], local[:, 0])
             x, y = local[:, 0] / r, local[:, 1] / r
-            lead = (x * along[:, 0] + y * along[:, 1], x * along[:, 1] - y * along[:, 0])
-            return np.stack((r, phi, local[:, 2]), 1), np.stack((*lead, along[:, 2]), 1)
+            direction = (x * along[:, 0] + y * along[:, 1], x * along[:, 1] - y * along[:, 0])
+            return np.stack((r, phi, local[:, 2]), 1), np.stack((*direction, along[:, 2]), 1)
 
         def rolled(curve: FloatArray) -> FloatArray:
             r, phi, z = curve[..., 0], curve[..., 1] / mean, curve[..., 2]
             return origin + np.stack((r * np.cos(phi), r * np.sin(phi), z), -1) @ frame.T
 
         (first, a_lead), (last, b_lead) = unrolled(p, a), unrolled(q, b)
-        # The angle follows the joint's over more than half a turn either way.
+        # The angle follows that of the joint for more than half a turn in both directions.
         start = last[:, 1] - angles
         last[:, 1] = start - math.tau * np.round((start - first[:, 1]) / math.tau) + angles
         first[:, 1] *= mean
@@ -166,22 +175,22 @@ def _of_length(
     outward: FloatArray,
     shown: Callable[[FloatArray], FloatArray],
 ) -> FloatArray:
-    """Curves (A, n, 3) from p to q whose middle bulges outward so far that they are as long.
+    """Return curves (A, n, 3) from p to q whose middle bulges outward until they have ``length``.
 
-    One that would be taut is drawn out a little before it is, or its belly would vanish at a snap.
-    shown: maps the curves to where their length is measured.
+    An almost taut curve is lengthened a little, so that its bulge does not vanish abruptly.
+    ``shown`` maps the curves to the coordinates in which their length is measured.
     """
 
-    def long(bulge: FloatArray) -> FloatArray:
+    def length_with(bulge: FloatArray) -> FloatArray:
         curve = shown(_arch(p, a, q, b, bulge[:, None] * outward))
         return np.asarray(np.linalg.norm(np.diff(curve, axis=1), axis=2).sum(axis=1))
 
-    taut = long(np.zeros(len(p)))
+    taut = length_with(np.zeros(len(p)))
     wanted = (taut**SLACK_EXPONENT + length**SLACK_EXPONENT) ** (1.0 / SLACK_EXPONENT)
     low, high = np.zeros(len(p)), wanted
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        short = long(middle) < wanted
+        short = length_with(middle) < wanted
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return _arch(p, a, q, b, low[:, None] * outward)
 
@@ -189,14 +198,14 @@ def _of_length(
 def _arch(
     p: FloatArray, a: FloatArray, q: FloatArray, b: FloatArray, bulge: FloatArray
 ) -> FloatArray:
-    """Two cubic Hermite pieces (A, n, 3) that meet at the middle, moved by ``bulge``."""
+    """Return two cubic Hermite pieces (A, n, 3) that meet at the middle, moved by ``bulge``."""
     middle = 0.5 * (p + q) + bulge
     chord = q - p
-    lead = chord / np.linalg.norm(chord, axis=1, keepdims=True)
+    direction = chord / np.linalg.norm(chord, axis=1, keepdims=True)
     first = FULLNESS * np.linalg.norm(middle - p, axis=1, keepdims=True)
     last = FULLNESS * np.linalg.norm(q - middle, axis=1, keepdims=True)
-    one = _hermite(p, first * a, middle, first * lead)
-    two = _hermite(middle, last * lead, q, last * b)
+    one = _hermite(p, first * a, middle, first * direction)
+    two = _hermite(middle, last * direction, q, last * b)
     return np.concatenate((one[:, :-1], two), axis=1)
 
 
@@ -212,7 +221,7 @@ def _hermite(p: FloatArray, a: FloatArray, q: FloatArray, b: FloatArray) -> Floa
 
 
 def _even(curves: FloatArray) -> FloatArray:
-    """The same curves with their points evenly spaced."""
+    """Return the same curves with their points evenly spaced."""
     n = curves.shape[1]
     result = np.empty_like(curves)
     for curve, even in zip(curves, result, strict=True):
@@ -224,7 +233,7 @@ def _even(curves: FloatArray) -> FloatArray:
 
 
 def _between(rows: FloatArray, spots: FloatArray, axis: int) -> FloatArray:
-    """What ``rows`` come to at ``spots`` (n,), which count them along ``axis`` from 0."""
+    """Interpolate ``rows`` linearly at ``spots`` (n,), which are indices along ``axis`` from 0."""
     low = np.minimum(spots.astype(int), rows.shape[axis] - 2)
     fraction = np.expand_dims(spots - low, (1, 2) if axis == 0 else (0, 2))
     first, second = rows.take(low, axis), rows.take(low + 1, axis)
@@ -232,14 +241,14 @@ def _between(rows: FloatArray, spots: FloatArray, axis: int) -> FloatArray:
 
 
 def _across(v: FloatArray, chord: FloatArray) -> FloatArray:
-    """Unit vectors (A, 3): ``v`` without what of it is along ``chord``."""
+    """Return unit vectors (A, 3): the components of ``v`` perpendicular to ``chord``."""
     along = chord / np.linalg.norm(chord, axis=1, keepdims=True)
     rest = v - (v * along).sum(axis=1, keepdims=True) * along
     return np.asarray(rest / np.linalg.norm(rest, axis=1, keepdims=True))
 
 
 def _frame_along(axis: FloatArray) -> FloatArray:
-    """(3, 3) whose columns are a frame with z along ``axis``."""
+    """Return a rotation matrix (3, 3) whose z axis is along ``axis``."""
     x = np.eye(3)[int(np.abs(axis).argmin())]
     y = np.cross(axis, x)
     y /= np.linalg.norm(y)
@@ -247,11 +256,14 @@ def _frame_along(axis: FloatArray) -> FloatArray:
 
 
 def read_stretches(path: Path, find: Callable[[str, str], Hinge]) -> tuple[ConduitStretch, ...]:
-    """The stretches in a file of conduits, JSON with lengths in m; none when there is no file.
+    """Read the stretches in a file of conduits, JSON with lengths in m.
 
-    find: the one joint between two links; KeyError when there is not one.
+    Args:
+        path: the file; without it there are no stretches.
+        find: returns the one joint between two links; raises KeyError if there is not exactly one.
 
-    Raises RobotDescriptionError when the file is broken or of another arm; says what is wrong.
+    Raises:
+        RobotDescriptionError: the file is invalid or describes another arm.
     """
     if not path.is_file():
         return ()
@@ -274,5 +286,5 @@ def _stretch(each: Any, find: Callable[[str, str], Hinge]) -> ConduitStretch:
     hinge = find(start.link, end.link)
     radius, length = float(each["radius"]), float(each["length"])
     if not 0.0 < radius < length < math.inf:
-        raise ValueError(f"a conduit {length} m long and {radius} m thick is none")
+        raise ValueError(f"the radius {radius} m is not between 0 and the length {length} m")
     return ConduitStretch(start, end, radius, length, hinge, winds=each["winds"] == hinge.joint)

@@ -1,4 +1,4 @@
-"""Triangles for drawing: smooth where they bend a little, apart at creases and between colours."""
+"""Triangles for drawing: smooth over small bends, split at creases and between colours."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Colours = npt.NDArray[np.uint8]
 """(m, 4) sRGB and opacity."""
 
 CREASE = math.radians(40.0)
-"""Faces that meet at a larger angle are shaded apart."""
+"""Faces that meet at a larger angle have separate normals."""
 
 FLOAT, UINT = 5126, 5125
 ARRAY, ELEMENT = 34962, 34963
@@ -28,9 +28,12 @@ ROUGHNESS = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """vertices: (n, 3) [m], each with one normal. faces: (m, 3) indices of them.
+    """Triangles with shared vertices.
 
-    colours: (n, 4) sRGB and opacity a vertex; None where the file says none.
+    Attributes:
+        vertices: (n, 3) [m], each with one normal.
+        faces: (m, 3) indices of them.
+        colours: (n, 4) sRGB and opacity of each vertex; None if the file has no colours.
     """
 
     vertices: FloatArray
@@ -39,8 +42,10 @@ class Drawn:
 
 
 def drawn(vertices: FloatArray, faces: IntArray, colours: Colours | None = None) -> Drawn:
-    """``vertices`` (n, 3), ``faces`` (m, 3) and their ``colours`` (m, 4), apart where they are to
-    be: corners of one vertex stay one where smooth edges of one colour lead from face to face.
+    """Return the triangles with vertices split at creases and between colours.
+
+    Corners of one vertex stay together if smooth edges of one colour connect their faces.
+    ``vertices``: (n, 3). ``faces``: (m, 3). ``colours``: (m, 4) of each face.
     """
     normals = np.cross(
         vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
@@ -59,7 +64,7 @@ def drawn(vertices: FloatArray, faces: IntArray, colours: Colours | None = None)
     if colours is not None:
         smooth &= (colours[one // 3] == colours[other // 3]).all(axis=1)
     one, other = one[smooth], other[smooth]
-    # The ends of the one are those of the other, the other way round or not.
+    # Both half-edges have the same ends, in the same or in the opposite order.
     turned = flat[start[one]] != flat[start[other]]
     first = np.where(turned, end[other], start[other])
     last = np.where(turned, start[other], end[other])
@@ -75,7 +80,7 @@ def drawn(vertices: FloatArray, faces: IntArray, colours: Colours | None = None)
 
 
 def _joined(count: int, one: IntArray, other: IntArray) -> IntArray:
-    """The lowest number among those that each of ``count`` hangs together with."""
+    """Return for each of ``count`` corners the lowest number in its connected component."""
     label = np.arange(count)
     while True:
         lowest = label.copy()
@@ -88,10 +93,10 @@ def _joined(count: int, one: IntArray, other: IntArray) -> IntArray:
 
 
 def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
-    """A binary glTF file of it in its own colours, for viser, which takes its axes as they are."""
+    """Return a binary glTF file of ``shape`` in its own colours, for viser, with unchanged axes."""
     assert shape.colours is not None
     alpha = shape.colours[:, 3:] / 255.0 * opacity
-    # Colours of vertices are linear there.
+    # glTF stores vertex colours as linear light.
     linear = to_light(shape.colours[:, :3] / 255.0)
     blocks = (
         (shape.vertices, np.float32, FLOAT, "VEC3", ARRAY),
@@ -149,7 +154,7 @@ def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
 
 
 def _normals(shape: Drawn) -> FloatArray:
-    """(n, 3) of each vertex, its faces weighed by their areas."""
+    """Return the normals (n, 3) of the vertices, weighted by the areas of their faces."""
     a, b, c = shape.vertices[shape.faces].transpose(1, 0, 2)
     faces = np.cross(b - a, c - a)
     sums = np.zeros_like(shape.vertices)

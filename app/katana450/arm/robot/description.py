@@ -1,4 +1,4 @@
-"""Checks of a URDF file before its robot is read, so that every fault is named with its line."""
+"""Checks of a URDF file before its robot is read, so that each fault is reported with its line."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from xml.parsers import expat
 from katana450.errors import RobotDescriptionError
 
 XACRO = re.compile(r"^https?://(www\.)?ros\.org/(wiki/)?xacro")
-"""The namespaces of xacro, the macro language that most URDF files are written in."""
+"""Namespaces of xacro, the macro language in which most URDF files are written."""
 
 UNEXPANDED = re.compile(r"\$[({]")
-"""What begins an expression of xacro."""
+"""Beginning of an expression of xacro."""
 
 COUNTS: Mapping[tuple[str, str], tuple[int, ...]] = {
     ("origin", "xyz"): (3,),
@@ -31,13 +31,13 @@ COUNTS: Mapping[tuple[str, str], tuple[int, ...]] = {
     **{("mimic", name): (1,) for name in ("multiplier", "offset")},
     **{("inertia", name): (1,) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")},
 }
-"""How many numbers an attribute of an element may have."""
+"""Allowed counts of numbers in an attribute of an element."""
 
 BOUNDS = ("limit", "mass", "inertia")
 """Elements whose numbers may be infinite."""
 
 COMMAS = ("box", "mesh")
-"""Elements whose numbers may stand between commas."""
+"""Elements whose numbers may be separated by commas."""
 
 NEEDED: Mapping[str, tuple[str, ...]] = {
     "link": ("name",),
@@ -50,7 +50,7 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
     "sphere": ("radius",),
     "mesh": ("filename",),
 }
-"""Attributes that an element must have."""
+"""Required attributes of an element."""
 
 PARTS = ("link", "joint", "material")
 """Elements of a robot that are read."""
@@ -61,7 +61,7 @@ JOINTS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
 def checked(path: Path) -> bytes:
-    """Return the contents of the URDF file at ``path``, whose every part is sound.
+    """Check the URDF file at ``path`` and return its contents.
 
     Raises RobotDescriptionError that names the file, the line and what to do.
     """
@@ -77,10 +77,7 @@ def checked(path: Path) -> bytes:
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Turn every unexpected failure while the file at ``path`` is read into a sentence.
-
-    Raises RobotDescriptionError.
-    """
+    """Turn each unexpected error in reading the file at ``path`` into RobotDescriptionError."""
     try:
         yield
     except RobotDescriptionError:
@@ -88,12 +85,12 @@ def explained(path: Path) -> Iterator[None]:
     except Exception as error:
         raise RobotDescriptionError(
             f"{path} cannot be read as a robot description, and the reader does not say where it "
-            f"fails ({type(error).__name__}). Test the file with check_urdf, or export it anew."
+            f"fails ({type(error).__name__}). Test the file with check_urdf, or export it again."
         ) from error
 
 
 class _Checks:
-    """The checks of one file; links and joints as they are found, with their lines."""
+    """Checks of one file, with the line of each element."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -113,7 +110,7 @@ class _Checks:
         except RobotDescriptionError as error:
             if trace is None:
                 raise
-            # Whatever is wrong, what has not been expanded comes first.
+            # An unexpanded template is reported before any other fault.
             raise self._refuse(
                 trace,
                 "this is xacro, a template that has not been expanded. Expand it first, "
@@ -154,7 +151,7 @@ class _Checks:
         return RobotDescriptionError(f"{self._path}, line {self._line[element]}: {what}")
 
     def _xacro(self, root: Element) -> Element | None:
-        """The first element that xacro should have replaced, if any is left."""
+        """Return the first element that xacro should have replaced, if any is left."""
         for element in root.iter():
             values = element.attrib.values()
             if XACRO.match(element.tag) or any(UNEXPANDED.search(value) for value in values):
@@ -201,7 +198,7 @@ class _Checks:
                 raise self._refuse(
                     element,
                     f"there is a {tag} {name!r} in line {self._line[found[name]]} already; "
-                    "give each a name of its own.",
+                    "give each a different name.",
                 )
             found[name] = element
         return found
@@ -222,8 +219,8 @@ class _Checks:
             if link not in links:
                 raise self._refuse(
                     element,
-                    f"the {end} of joint {name!r} is {link!r}, and there is no such link. "
-                    f'Add <link name="{link}"/>, or mend the name.',
+                    f"the {end} of joint {name!r} is {link!r}, but there is no such link. "
+                    f'Add <link name="{link}"/>, or correct the name.',
                 )
 
     def _refuse_loops(self, links: Mapping[str, Element], joints: Mapping[str, Element]) -> None:
@@ -250,20 +247,21 @@ class _Checks:
             if name is not None:
                 joint = above[name][0]
                 raise self._refuse(
-                    joint, f"link {name!r} hangs on itself, by joint {joint.get('name')!r}. {tree}"
+                    joint,
+                    f"link {name!r} is its own ancestor, by joint {joint.get('name')!r}. {tree}",
                 )
         if not links:
             raise RobotDescriptionError(f"{self._path} describes no link.")
         roots = [name for name in links if name not in parent]
         if len(roots) != 1:
             raise RobotDescriptionError(
-                f"{self._path} must have one link that hangs on no other, not {len(roots)} "
+                f"{self._path} must have one link without a parent, not {len(roots)} "
                 f"({', '.join(roots)}): every other link must be the child of a joint."
             )
 
 
 def _numbers(tag: str, text: str, counts: tuple[int, ...]) -> bool:
-    """Whether an attribute of an element `tag` is as many numbers as it may be."""
+    """Return whether ``text`` has an allowed count of numbers, all valid for an element ``tag``."""
     if tag in COMMAS:
         text = text.replace(",", " ")
     try:

@@ -1,4 +1,4 @@
-"""The fingers behind the last axis of an arm, driven together by one number."""
+"""The fingers behind the last axis of an arm, all driven by one number."""
 
 from __future__ import annotations
 
@@ -9,17 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control.arm import NO_GRIPPER, GripperModel
+from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
 from katana450.arm.robot.urdf import UrdfJoint
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray
 
 SLIDING = "prismatic"
 
-SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
-"""[rad/s, m/s] Of a finger whose file names no speed."""
-
-ACROSS = 0.5
-"""Cosine between two axes up to which neither their sense nor its opposite is meant."""
+PERPENDICULAR = 0.5
+"""Cosine between two axes up to which they point neither in the same nor in opposite directions."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +25,12 @@ class Fingers:
     """The joints of a gripper.
 
     Attributes:
-        gripper: limits and speed of the number that drives them: the value of the first.
-        follow: of each finger joint (factor, offset): its value is factor * driven + offset
+        gripper: limits and speed of the number that drives them: the value of the first joint.
+        follow: (factor, offset) of each finger joint: its value is factor * driven + offset
             [rad or m]. The first is the driven one itself.
         driven: the finger joints that mimic no other.
-        resting: the value [rad or m] of each joint that stays where it is.
-        notes: sentences for a person on the joints that stay where they are.
+        resting: the value [rad or m] of each joint that does not move.
+        notes: sentences for a person on the joints that do not move.
     """
 
     gripper: GripperModel
@@ -45,26 +43,31 @@ class Fingers:
 def fingers_of(
     hand: Sequence[UrdfJoint], others: Sequence[UrdfJoint], frames: Mapping[str, FloatArray]
 ) -> Fingers:
-    """The gripper made of the movable joints ``hand``; those and ``others`` that are none rest.
+    """Return the gripper made of the movable joints ``hand``.
 
-    frames: (4, 4) of every link in the root at zero. Driven fingers without `mimic` each go from
-    one of their limits to the other together.
+    Joints of ``hand`` that cannot be fingers rest, and so do ``others``. Driven fingers without
+    `mimic` move together, each from one of its limits to the other.
+
+    Args:
+        hand: movable joints behind the last axis.
+        others: all other movable joints.
+        frames: (4, 4) of every link in the root at zero.
     """
-    able = [j for j in hand if j.mimic is None and _range(j)]
-    # The one that opens towards positive numbers drives the rest.
-    able.sort(key=lambda joint: -sum(_range(joint)))
+    drivable = [j for j in hand if j.mimic is None and _range(j)]
+    # The joint that opens towards positive numbers drives the others.
+    drivable.sort(key=lambda joint: -sum(_range(joint)))
     follow: dict[str, tuple[float, float]] = {}
     gripper = NO_GRIPPER
-    if able:
-        lead, *rest = able
-        follow = {lead.name: (1.0, 0.0)} | {j.name: _beside(lead, j, frames) for j in rest}
-        speed = min(_speed(j) / abs(follow[j.name][0]) for j in able)
+    if drivable:
+        lead, *rest = drivable
+        follow = {lead.name: (1.0, 0.0)} | {j.name: _with_lead(lead, j, frames) for j in rest}
+        speed = min(_speed(j) / abs(follow[j.name][0]) for j in drivable)
         lower, upper = _range(lead)
         gripper = GripperModel(lower, upper, speed, slides=lead.type == SLIDING)
     by_name = {joint.name: joint for joint in (*hand, *others)}
     notes = []
     for joint in hand:
-        found = _led(joint, by_name, follow) if joint.mimic is not None else None
+        found = _following(joint, by_name, follow) if joint.mimic is not None else None
         if found is not None:
             follow[joint.name] = found
     resting = {}
@@ -74,20 +77,20 @@ def fingers_of(
             resting[joint.name] = value
             place = "zero" if value == 0.0 else f"{value:g} {_unit(joint)}"
             notes.append(f"Joint {joint.name!r} is {joint.type} and stays at {place}.")
-    return Fingers(gripper, follow, tuple(j.name for j in able), resting, tuple(notes))
+    return Fingers(gripper, follow, tuple(j.name for j in drivable), resting, tuple(notes))
 
 
 def _range(joint: UrdfJoint) -> tuple[float, ...]:
-    """Lower and upper limit [rad or m] of a joint that has room between them; else nothing."""
+    """Return both limits [rad or m] of a joint with a range between them, else an empty tuple."""
     if joint.type not in ("revolute", SLIDING) or joint.limit is None:
         return ()
-    # As URDF has it, a limit that is not named is 0.
+    # In URDF a limit that is not stated is 0.
     lower, upper = float(joint.limit.lower or 0.0), float(joint.limit.upper or 0.0)
     return (lower, upper) if -math.inf < lower < upper < math.inf else ()
 
 
 def _speed(joint: UrdfJoint) -> float:
-    """[rad/s or m/s]"""
+    """Return the speed of ``joint`` [rad/s or m/s]."""
     speed = None if joint.limit is None else joint.limit.velocity
     if speed is None or not 0.0 < speed < math.inf:
         return SLOW_SLIDE if joint.type == SLIDING else SLOW_TURN
@@ -99,24 +102,24 @@ def _unit(joint: UrdfJoint) -> str:
 
 
 def _at_rest(joint: UrdfJoint) -> float:
-    """Zero, or the limit next to it."""
+    """Return zero, or the limit nearest to it."""
     if joint.mimic is not None or not _range(joint):
         return 0.0
     lower, upper = _range(joint)
     return min(max(0.0, lower), upper)
 
 
-def _beside(
+def _with_lead(
     lead: UrdfJoint, joint: UrdfJoint, frames: Mapping[str, FloatArray]
 ) -> tuple[float, float]:
-    """Factor and offset of a driven finger that closes when ``lead`` does."""
+    """Return factor and offset of a driven finger that closes when ``lead`` does."""
     low, high = _range(lead)
     lower, upper = _range(joint)
     same, mirrored = (math.dist((low, high), each) for each in ((lower, upper), (-upper, -lower)))
     if same == mirrored:
-        # Fingers that close on each other move in opposite senses.
+        # Fingers that close on each other move in opposite directions.
         one, other = (frames[j.child][:3, :3] @ np.asarray(j.axis) for j in (lead, joint))
-        turned = bool(one @ other > ACROSS * np.linalg.norm(one) * np.linalg.norm(other))
+        turned = bool(one @ other > PERPENDICULAR * np.linalg.norm(one) * np.linalg.norm(other))
     else:
         turned = mirrored < same
     if turned:
@@ -125,12 +128,12 @@ def _beside(
     return factor, lower - factor * low
 
 
-def _led(
+def _following(
     joint: UrdfJoint, joints: Mapping[str, UrdfJoint], follow: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float] | None:
-    """Factor and offset of a joint that mimics another; None where no finger is behind it.
+    """Return factor and offset of a joint that mimics another; None if it follows no finger.
 
-    Raises RobotDescriptionError where it mimics itself in the end.
+    Raises RobotDescriptionError if it mimics itself, directly or through others.
     """
     factor, offset = 1.0, 0.0
     passed = [joint.name]
@@ -142,8 +145,7 @@ def _led(
             return None
         if above.name in passed:
             raise RobotDescriptionError(
-                f"Joint {passed[0]!r} mimics {joint.mimic.joint!r}, which no driven joint stands "
-                "behind."
+                f"Joint {passed[0]!r} mimics {joint.mimic.joint!r}, which follows no driven joint."
             )
         passed.append(above.name)
         joint = above

@@ -1,4 +1,4 @@
-"""The camera that exported files of a robot come with."""
+"""The initial camera of the exported files of a robot."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
 
 FIELD_OF_VIEW = math.radians(40.0)
-"""Of the cameras that files come with, between the top and the bottom of a picture."""
+"""[rad] Vertical field of view of the cameras in exported files."""
 
 VIEW_DIRECTION = (-0.55, 0.75, -0.37)
-"""The direction they look in, in the root's frame."""
+"""Direction of view, in the root's frame."""
 
 
 DISTANCE_FACTOR = 0.7
-"""Of the distance at which a ball round all of it would fill the picture; nothing fills that."""
+"""Fraction of the distance at which a ball around the robot fills the picture. No robot fills its
+ball."""
 
 
 class InitialCamera(NamedTuple):
-    """Where a picture is taken from: eye and target (3,) in the root's frame [m]; z is up."""
+    """A camera: eye and target (3,) in the root's frame [m]; z is up."""
 
     eye: FloatArray
     target: FloatArray
@@ -33,7 +34,7 @@ def camera(robot: Robot) -> InitialCamera:
     low, high = robot.bounds
     target = (low + high) / 2.0
     radius = max(float(np.linalg.norm(high - low)) / 2.0, 1e-3)
-    way = np.array(VIEW_DIRECTION) / float(np.linalg.norm(VIEW_DIRECTION))
+    direction = np.array(VIEW_DIRECTION) / float(np.linalg.norm(VIEW_DIRECTION))
     return InitialCamera(
-        target - way * DISTANCE_FACTOR * radius / math.sin(FIELD_OF_VIEW / 2.0), target
+        target - direction * DISTANCE_FACTOR * radius / math.sin(FIELD_OF_VIEW / 2.0), target
     )

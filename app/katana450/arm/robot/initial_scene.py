@@ -1,4 +1,4 @@
-"""What stands around the arm when the server starts."""
+"""The scene around the arm when the server starts."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class InitialScene(NamedTuple):
     """A scene in place of the robot's own.
 
     Attributes:
-        command: Puts its objects and its water there.
-        joints: (n,) where the arm stands [rad]; None for the ready posture.
-        meshes: Those of its objects.
-        notes: Sentences to print, on what was read.
+        command: Places its objects and its water.
+        joints: (n,) initial joint angles [rad]; None for the ready posture.
+        meshes: Meshes of its objects.
+        notes: Sentences to print about the files that were read.
     """
 
     command: cmd.ReplaceScene

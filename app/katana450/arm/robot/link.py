@@ -1,4 +1,4 @@
-"""A link of a robot and the joint it hangs on."""
+"""A link of a robot and the joint that connects it to its parent."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 
+SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
+"""[rad/s, m/s] Speed of a joint if its file states none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Joint:
@@ -23,10 +26,10 @@ class Joint:
         name: of the joint.
         slides: whether it is prismatic; else it turns.
         axis: (3,) unit direction in the frame of its link.
-        lower, upper: limits [rad] or [m], infinite where there are none.
-        leader: the joint whose value it follows; its own name when it is driven itself.
+        lower, upper: limits [rad] or [m], infinite if there are none.
+        leader: the joint whose value it follows; its own name if it is driven itself.
         factor, offset: value = factor * leader + offset.
-        speed: maximum [rad/s] or [m/s], infinite where the file states none.
+        speed: maximum [rad/s] or [m/s], infinite if the file states none.
     """
 
     name: str
@@ -51,12 +54,14 @@ class Link:
     """A rigid body of a robot.
 
     Attributes:
-        parent: name of the link it hangs on; the root has none.
+        name: of the link.
+        parent: name of its parent link; None for the root.
         T_parent_link: (4, 4) pose in its parent at zero [m].
-        joint: None when it is fixed.
+        joint: None if it is fixed.
         visuals: its shapes as the file has them.
-        collisions: the shapes that stand for it where contacts are looked for.
-        mass: [kg], 0 where the file states none. center: (3,) of mass in its own frame [m].
+        collisions: the shapes that represent it in collision checks.
+        mass: [kg], 0 if the file states none.
+        center: (3,) centre of mass in its own frame [m].
     """
 
     name: str
@@ -69,9 +74,9 @@ class Link:
     center: FloatArray
 
     def at_rest(self, resting: Mapping[str, float]) -> FloatArray:
-        """Return its pose (4, 4) in its parent with its joint at its value of ``resting``.
+        """Return the link's pose (4, 4) in its parent with its joint at the value in ``resting``.
 
-        At zero where ``resting`` [rad or m] has none.
+        Values are in rad or m. A joint without a value there is at zero.
         """
         if self.joint is None or not (value := resting.get(self.joint.name, 0.0)):
             return self.T_parent_link
@@ -79,7 +84,7 @@ class Link:
 
     @cached_property
     def shapes(self) -> tuple[VisualMesh, ...]:
-        """The surfaces of its visuals, read on first use.
+        """Surfaces of the link's visuals, read on first use.
 
         Raises RobotDescriptionError for a mesh file that cannot be read.
         """
@@ -87,5 +92,5 @@ class Link:
 
     @cached_property
     def colour(self) -> tuple[float, float, float]:
-        """SRGB 0..1 of most of its surface; PLAIN without shapes."""
+        """Colour (sRGB, 0..1) of the largest part of the link's surface; PLAIN without shapes."""
         return main_colour(self.shapes)

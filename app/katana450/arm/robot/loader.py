@@ -1,4 +1,4 @@
-"""Reads a robot from its URDF file, once for everything that is made of it."""
+"""Reading a robot from its URDF file."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ from katana450.maths.geometry.arrays import frozen
 from katana450.resources import URDF_PATH
 
 MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
-"""Types of joint that are understood, and whether each slides."""
+"""Supported types of movable joints, and whether each slides."""
 
 
 def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
     """Read the robot in a URDF file.
 
-    Thin rods stand for a link without shapes that others hang on. Meshes are read on first use.
+    A link without shapes that has child links is drawn as thin rods. Meshes are read on first use.
 
     Args:
-        tool: link that targets are set for by default; None for the first of TOOL_FRAMES there
-            is, else the last link that hangs on five turning joints.
+        path: the URDF file.
+        tool: link to which targets refer by default; None for the first of TOOL_FRAMES that exists,
+            else the last link behind five turning joints.
 
     Raises:
-        RobotDescriptionError: the file cannot be read, or there is no arm with that ``tool``;
-            names what is wrong and its line.
+        RobotDescriptionError: the file cannot be read, or there is no arm with that ``tool``. The
+            message says what is wrong, and in which line.
     """
     data = checked(path)
     with explained(path):
@@ -54,7 +55,7 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
 
 
 def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]]:
-    """The tree, parents first, and sentences on the joints in it that cannot be moved."""
+    """Return the tree, parents first, and sentences on its joints that cannot be moved."""
     above = {joint.child: joint for joint in urdf.joints.values()}
     joints: dict[str, Joint] = {}
     faults: list[str] = []
@@ -64,22 +65,22 @@ def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]
                 joints[described.name] = _joint(path, described)
         except RobotDescriptionError as error:
             faults.append(str(error))
-    led: dict[str, Joint] = {}
+    following: dict[str, Joint] = {}
     for name, joint in joints.items():
         try:
-            led[name] = _led(path, joint, joints)
+            following[name] = _following(path, joint, joints)
         except RobotDescriptionError as error:
             faults.append(str(error))
     links = []
     for name in urdf.parents_first():
-        link, hung_by = urdf.links[name], above.get(name)
+        link, parent_joint = urdf.links[name], above.get(name)
         below = [joint.origin[:3, 3] for joint in urdf.joints.values() if joint.parent == name]
         links.append(
             Link(
                 name=name,
-                parent=None if hung_by is None else hung_by.parent,
-                T_parent_link=frozen(np.eye(4)) if hung_by is None else hung_by.origin,
-                joint=None if hung_by is None else led.get(hung_by.name),
+                parent=None if parent_joint is None else parent_joint.parent,
+                T_parent_link=frozen(np.eye(4)) if parent_joint is None else parent_joint.origin,
+                joint=None if parent_joint is None else following.get(parent_joint.name),
                 visuals=link.visuals or rods(below),
                 collisions=link.collisions,
                 mass=link.mass,
@@ -122,15 +123,15 @@ def _joint(path: Path, joint: UrdfJoint) -> Joint:
     )
 
 
-def _led(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> Joint:
-    """``joint`` tied to the driven joint at the end of the row it follows."""
+def _following(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> Joint:
+    """Return ``joint`` with the driven joint at the end of its chain of leaders as its leader."""
     passed = [joint.name]
     while joint.leader != passed[-1]:
         above = joints.get(joint.leader)
         if above is None or above.name in passed:
             raise RobotDescriptionError(
                 f"Joint {joint.name!r} of {path.name} mimics {joint.leader!r}, "
-                "which no driven joint stands behind."
+                "which follows no driven joint."
             )
         passed.append(above.name)
         factor, offset = joint.factor * above.factor, joint.factor * above.offset + joint.offset

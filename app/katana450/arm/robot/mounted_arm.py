@@ -14,22 +14,23 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.turns import in_limits_turn
 
 READY_ROOM = 0.05
-"""Fraction of a joint's range that the ready posture keeps from its limits."""
+"""Minimum distance of the ready posture from the limits of a joint, as a fraction of its range."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MountedArm(ArmModel):
     """A five-axis arm as part of a robot.
 
-    The control core takes it as the ``ArmModel`` that it is: ``ArmModel`` is a class of its own
-    because the core knows neither base frames nor links nor conduits.
+    The control core uses it as an ``ArmModel``. ``ArmModel`` is a separate class because the core
+    knows neither base frames nor links nor conduits.
 
     Attributes:
-        T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table.
-        fingers: finger joints, the driven one first: value = factor * driven + offset [rad or m].
+        T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table [m].
+        fingers: (factor, offset) of the finger joints, the driven one first:
+            value = factor * driven + offset [rad or m].
         resting: value [rad or m] of every movable joint that the arm does not drive.
         stretches: the free runs of the conduit, if it has one.
-        notes: sentences for a person on what was assumed about the file.
+        notes: sentences for a person on assumptions about the file.
     """
 
     T_base_shoulder: FloatArray
@@ -43,9 +44,9 @@ class MountedArm(ArmModel):
         return joint in self.chain.names or joint in self.fingers
 
     def ready(self, posture: Sequence[float]) -> FloatArray:
-        """The joint angles (5,) [rad] nearest inside the limits to a posture of the canonical arm.
+        """Return the joint angles (5,) [rad] inside limits, nearest to a canonical posture.
 
-        ``posture``: (5,) [rad]; for the Katana these are its joint angles.
+        ``posture``: (5,) [rad] of the canonical arm; for the Katana these are its joint angles.
         """
         chain = self.chain
         q = in_limits_turn(chain, arm_of(chain).joints(posture))
@@ -55,7 +56,9 @@ class MountedArm(ArmModel):
     def joint_values(self, q: FloatArray, gripper: float) -> dict[str, float]:
         """Return the value of every movable joint of the robot [rad or m].
 
-        q: (n,) of the axes [rad]. gripper: of the driven finger joint [rad or m].
+        Args:
+            q: (n,) angles of the axes [rad].
+            gripper: value of the driven finger joint [rad or m].
         """
         values = dict(zip(self.chain.names, (float(angle) for angle in q), strict=True))
         for joint, (factor, offset) in self.fingers.items():

@@ -1,4 +1,4 @@
-"""Meshes of objects by their content: their files, their triangles, and their collision bodies."""
+"""Meshes of scene objects, found by their content: files, triangles and collision bodies."""
 
 from __future__ import annotations
 
@@ -15,25 +15,26 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 MAX_MESHES = 64
-"""Meshes kept."""
+"""Maximum number of stored meshes."""
 
 MAX_BYTES = 200_000_000
-"""Of all of them together."""
+"""[bytes] Maximum size of all stored meshes together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A file as it came, and what it shows.
+    """A mesh file as it was received, and its triangles.
 
     Attributes:
-        file, format, unit, up: The file and how it was read: the ending of its name, the sign of
-            its unit, and its upward axis, None where that of the format was taken.
-        name: from the file's, fit for an object.
+        file, format, unit, up: The file and how it was read: the extension of its name, the symbol
+            of its unit, and its upward axis, None for the default of the format.
+        name: Name derived from that of the file, valid as the name of an object.
         vertices: (n, 3) [m]; z = 0 is their underside, and the z axis goes through the middle of
-            the box along the axes that holds them.
-        faces: (m, 3) indices of them. colours: (m, 4) a face; None where the file says none.
-        solid: what it counts as where contacts are looked for.
-        said: for people: what was read, and how it counts.
+            their axis-aligned bounding box.
+        faces: (m, 3) indices of them.
+        colours: (m, 4) of each face; None if the file has no colours.
+        solid: The solid that represents it in collision checks.
+        text: Sentences for people on what was read and how collisions are checked.
     """
 
     file: bytes
@@ -49,27 +50,27 @@ class Mesh:
 
     @property
     def key(self) -> str:
-        """By which it is asked for."""
+        """Key under which the mesh is stored and requested."""
         return self.solid.key
 
     @property
     def sha256(self) -> str:
-        """Of its file."""
+        """SHA-256 checksum of the mesh file, as a hexadecimal text."""
         return hashlib.sha256(self.file).hexdigest()
 
     @property
     def bytes(self) -> int:
-        """That it takes."""
+        """Memory that the mesh takes [bytes]."""
         return len(self.file) + self.vertices.nbytes + self.faces.nbytes
 
     @cached_property
     def drawn(self) -> creases.Drawn:
-        """Its triangles, for drawing."""
+        """Triangles of the mesh, for drawing."""
         return creases.drawn(self.vertices, self.faces, self.colours)
 
 
 class Meshes:
-    """A bounded store, for all threads. What is in use is never given up."""
+    """A bounded, thread-safe store of meshes. Meshes in use are never removed."""
 
     def __init__(self, maximum: int = MAX_MESHES, max_bytes: int = MAX_BYTES) -> None:
         self._limit = maximum
@@ -78,21 +79,21 @@ class Meshes:
         self._kept: dict[str, Mesh] = {}
 
     def get(self, key: str) -> Mesh | None:
-        """That of the key, if it is kept."""
+        """Return the mesh with ``key``, or None if it is not stored."""
         with self._lock:
             return self._kept.get(key)
 
     def need(self, key: str) -> Mesh:
-        """The same. Raises InputError where it is not kept."""
+        """Return the mesh with ``key``. Raises InputError if it is not stored."""
         found = self.get(key)
         if found is None:
-            raise InputError("There is no mesh of that key, or no more: upload its file again.")
+            raise InputError("There is no mesh with this key any more. Upload its file again.")
         return found
 
     def put(self, meshes: Collection[Mesh], used: Collection[str]) -> None:
-        """Keep ``meshes``, at one go; the oldest that is not ``used`` gives way.
+        """Store all ``meshes`` at once, in place of the oldest ones that are not ``used``.
 
-        Raises InputError, and keeps none of them, where there is no room.
+        Raises InputError, and stores none of them, if there is no room.
         """
         new = {mesh.key: mesh for mesh in meshes}
         with self._lock:
@@ -105,7 +106,7 @@ class Meshes:
             if not self._fits(kept):
                 raise InputError(
                     f"There is room for {self._limit} meshes of {self._max_bytes // 1_000_000} MB "
-                    "together: take objects away."
+                    "in total. Remove objects first."
                 )
             self._kept = kept
 

@@ -1,4 +1,4 @@
-"""Cup, basin and table: the objects of the paper's second experiment, as their file tells them."""
+"""Cup, basin and table: the objects of the paper's second experiment, read from their file."""
 
 from __future__ import annotations
 
@@ -15,15 +15,21 @@ Point = tuple[float, float, float]
 
 CUP_AT: Point = (0.34, -0.26, 0.0)
 BASIN_AT: Point = (0.22, 0.36, 0.0)
-"""[m] On the table in the base frame: in reach, and out of the way until wanted."""
+"""[m] Places on the table in the base frame: within reach, and clear of the arm's usual paths."""
 
 
 @dataclass(frozen=True)
 class Vessel:
-    """Something to hold water, about its own axis z, on z = 0; all [m] and [kg].
+    """A vessel for water about its own axis z, standing on z = 0.
 
-    mesh: its GLB file. outer_radius: of its widest part. inner_radius: at the rim. floor: its
-    thickness. floor_radius: of the inside over the floor.
+    Attributes:
+        mesh: its GLB file.
+        mass: [kg].
+        inner_radius: at the rim [m].
+        outer_radius: of its widest part [m].
+        height: [m].
+        floor: thickness of the floor [m].
+        floor_radius: of the inside above the floor [m].
     """
 
     mesh: Path
@@ -47,7 +53,7 @@ class TableProp:
 
 @dataclass(frozen=True)
 class Props:
-    """All of them."""
+    """Cup, basin and table."""
 
     cup: Vessel
     basin: Vessel
@@ -55,7 +61,7 @@ class Props:
 
 
 def load_props(path: Path = PROPS_PATH) -> Props:
-    """Read them; RobotDescriptionError when the file is missing or broken, and how."""
+    """Read the props. Raises RobotDescriptionError if the file is missing or invalid."""
     try:
         described = json.loads(path.read_text(encoding="utf-8"))
         table = described["table"]
@@ -74,7 +80,7 @@ def load_props(path: Path = PROPS_PATH) -> Props:
 
 
 def _vessel(path: Path, described: Any) -> Vessel:
-    # A vessel that names none has a straight inside.
+    # A vessel without this entry has a straight inside.
     floor_radius = "floor_radius" if "floor_radius" in described else "inner_radius"
     lengths = ("mass", "inner_radius", "outer_radius", "height", "floor", floor_radius)
     vessel = Vessel(_mesh(path, described), *(_length(described, key) for key in lengths))
@@ -100,5 +106,5 @@ def _length(described: Any, key: str) -> float:
 def _span(ends: Any) -> tuple[float, float]:
     low, high = (float(end) for end in ends)
     if not -math.inf < low < high < math.inf:
-        raise ValueError(f"{ends} is no span")
+        raise ValueError(f"{ends} is not an interval")
     return low, high

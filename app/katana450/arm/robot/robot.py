@@ -1,4 +1,4 @@
-"""The robot: a tree of links and joints, with an arm where the kinematics accept one."""
+"""The robot: a tree of links and joints, with an arm if the kinematics support one."""
 
 from __future__ import annotations
 
@@ -10,19 +10,16 @@ from functools import cached_property
 import numpy as np
 
 from katana450.arm.control.joints import JointSet
-from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN, Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 LIMIT_TOLERANCE = 1e-9
-"""[rad, m] By which a joint may seem to be beyond its limits."""
-
-SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
-"""[rad/s, m/s] Speed of a joint whose file states none."""
+"""[rad, m] Excess over a limit that is accepted."""
 
 SEARCHED_RANGE = math.pi / 2.0
-"""[rad, m] Range of a joint that is searched for the room a robot takes."""
+"""[rad, m] Limit of a joint's range in the search for the bounds of a robot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +27,13 @@ class Robot:
     """A robot as its URDF file describes it.
 
     Attributes:
+        name: of the robot.
         links: parents first; the first is the root.
-        arm: the part of it that brings a tool to poses; None where it can only be driven joint by
+        arm: the part that brings a tool to poses; None if the robot can only be driven joint by
             joint.
-        why: the reason for that in a sentence; empty where there is an arm.
-        notes: sentences for a person on what its files lack.
-        faults: sentences on joints that the tree holds at zero because it cannot move them.
+        why: the reason for that as a sentence; empty if there is an arm.
+        notes: sentences for a person on what is missing in its files.
+        faults: sentences on joints that stay at zero because they cannot be moved.
     """
 
     name: str
@@ -46,7 +44,7 @@ class Robot:
     faults: tuple[str, ...] = ()
 
     def require_arm(self) -> MountedArm:
-        """Return the arm. Raises RobotDescriptionError with the reason where there is none."""
+        """Return the arm. Raises RobotDescriptionError with the reason if there is none."""
         if self.arm is None:
             raise RobotDescriptionError(self.why)
         return self.arm
@@ -57,39 +55,40 @@ class Robot:
             raise RobotDescriptionError(self.faults[0])
 
     def read_shapes(self) -> None:
-        """Read the meshes of every link now. Raises RobotDescriptionError for an unreadable one."""
+        """Read the meshes of all links now. Raises RobotDescriptionError for an unreadable one."""
         for link in self.links:
             len(link.shapes)
 
     @cached_property
     def joints(self) -> Mapping[str, Joint]:
-        """Every movable joint by its name."""
+        """All movable joints by name."""
         return {link.joint.name: link.joint for link in self.links if link.joint is not None}
 
     @cached_property
     def driven(self) -> tuple[str, ...]:
-        """The joints that follow no other, in the order of the links."""
+        """Names of the joints that follow no other, in the order of the links."""
         return tuple(name for name, joint in self.joints.items() if joint.leader == name)
 
     def children(self, link: Link) -> tuple[Link, ...]:
-        """The links that hang on it."""
+        """Return the links whose parent is ``link``."""
         return tuple(other for other in self.links if other.parent == link.name)
 
     @cached_property
     def home(self) -> Mapping[str, FloatArray]:
-        """(4, 4) of each link in the root at zero, where every joint adds nothing."""
+        """Pose (4, 4) of each link in the root with every joint at zero [m]."""
         return self.frames({})
 
     def axis(self, joint: Joint) -> FloatArray:
-        """(3,) unit direction of ``joint`` in the root's frame at zero."""
+        """Return the unit direction (3,) of ``joint`` in the root's frame at zero."""
         link = next(link for link in self.links if link.joint is joint)
         return self.home[link.name][:3, :3] @ joint.axis
 
     def values(self, pose: Sequence[float]) -> dict[str, float]:
-        """The value of every joint [rad] or [m] for those of the first driven ones.
+        """Return the value of every joint [rad] or [m] from those of the first driven joints.
 
-        Driven joints that `pose` is too short for stay at zero, or at the limit next to it.
-        Raises InputError for more numbers than joints, no numbers, and values beyond the limits.
+        Driven joints beyond the length of `pose` stay at zero, or at the limit nearest to it.
+        Raises InputError for too many values, values that are no numbers, and values beyond the
+        limits.
         """
         driven = self.driven
         if len(pose) > len(driven):
@@ -104,17 +103,17 @@ class Robot:
         return self.every(given)
 
     def check(self, name: str, value: float) -> None:
-        """InputError when `value` [rad] or [m] is beyond the limits of the driven joint `name`."""
+        """Raise InputError if `value` [rad] or [m] is outside the limits of joint `name`."""
         joint = self.joints[name]
         if not joint.lower - LIMIT_TOLERANCE <= value <= joint.upper + LIMIT_TOLERANCE:
             unit = "m" if joint.slides else "rad"
             raise InputError(
                 f"{name} cannot be at {value:g} {unit}; "
-                f"it goes from {joint.lower:g} to {joint.upper:g} {unit}."
+                f"its range is {joint.lower:g} to {joint.upper:g} {unit}."
             )
 
     def every(self, given: Mapping[str, float]) -> dict[str, float]:
-        """The value of every joint, from those of some driven ones."""
+        """Return the value of every joint, from those of some driven joints."""
         leaders = {name: self.joints[name] for name in self.driven}
         at = {
             name: given.get(name, min(max(0.0, joint.lower), joint.upper))
@@ -126,7 +125,7 @@ class Robot:
         }
 
     def frames(self, values: Mapping[str, float]) -> dict[str, FloatArray]:
-        """(4, 4) of each link in the root; joints without a value add nothing."""
+        """Return the pose (4, 4) of each link in the root [m]; joints without a value are at 0."""
         found: dict[str, FloatArray] = {}
         for link in self.links:
             T = link.T_parent_link
@@ -141,7 +140,7 @@ class Robot:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest corner (3,) [m] of all shapes in the root.
 
-        At zero, and with one driven joint at a limit or between both.
+        Searched at zero, and with each driven joint in turn at its limits and in their middle.
         """
         poses = [self.every({})]
         for name in self.driven:
@@ -158,12 +157,12 @@ class Robot:
 
     @property
     def collides(self) -> bool:
-        """Whether any link has a shape to look for contacts with."""
+        """True if any link has a collision shape."""
         return any(link.collisions for link in self.links)
 
     @cached_property
     def moving(self) -> frozenset[str]:
-        """The links that a driven joint moves, directly or through their parents."""
+        """Names of the links that a driven joint moves, directly or through their parents."""
         found: set[str] = set()
         for link in self.links:
             joint = link.joint
@@ -175,29 +174,30 @@ class Robot:
     def joint_values(self, q: FloatArray, gripper: float) -> dict[str, float]:
         """Return the value of every movable joint [rad] or [m].
 
-        q: (n,) values of the axes of the arm, or without an arm of the driven joints.
-        gripper: value of the driven finger joint of the arm.
+        Args:
+            q: (n,) values of the axes of the arm; without an arm, of the driven joints.
+            gripper: value of the driven finger joint of the arm.
         """
         if self.arm is None:
             return self.every(dict(zip(self.driven, q.tolist(), strict=True)))
         return self.arm.joint_values(q, gripper)
 
     def distance(self, q: FloatArray, to: FloatArray) -> float:
-        """Return how far the origin of any link is between two vectors of driven joints [m]."""
+        """Return the maximum distance of a link's origin between two postures of the joints [m]."""
         here, there = (self.frames(self.joint_values(each, 0.0)) for each in (q, to))
         return max(math.dist(here[name][:3, 3], there[name][:3, 3]) for name in here)
 
     @cached_property
     def joint_group(self) -> JointSet:
-        """The driven joints within limits that their followers keep too.
+        """The driven joints, with limits that keep their followers inside their limits too.
 
-        An endless joint is given half a turn either way. Raises RobotDescriptionError where there
-        is no joint to drive, or one that the tree cannot move or has no room.
+        An endless joint gets half a turn in each direction. Raises RobotDescriptionError if there
+        is no joint to drive, a joint that cannot be moved, or a joint without range.
         """
         self.check_complete()
         driven = [self.joints[name] for name in self.driven]
         if not driven:
-            raise RobotDescriptionError(f"{self.name} has no joint that could be driven.")
+            raise RobotDescriptionError(f"{self.name} has no joint that can be driven.")
         ranges = np.array([self._range(joint) for joint in driven])
         return JointSet(
             names=self.driven,
@@ -210,16 +210,16 @@ class Robot:
 
     @property
     def joint_notes(self) -> tuple[str, ...]:
-        """Sentences for a person on what was assumed about the driven joints."""
+        """Sentences for a person on assumptions about the driven joints."""
         return tuple(
-            f"Joint {joint.name!r} has no speed of its own: {_speed(joint):g} "
+            f"Joint {joint.name!r} has no speed in its file; it gets {_speed(joint):g} "
             f"{'m/s' if joint.slides else 'rad/s'}."
             for joint in map(self.joints.__getitem__, self.driven)
             if _speed(joint) != joint.speed
         )
 
     def _range(self, driven: Joint) -> tuple[float, float]:
-        """Where ``driven`` [rad, m] and all that follow it are inside their limits."""
+        """Return the range [rad, m] where ``driven`` and its followers are inside their limits."""
         low, high = -math.inf, math.inf
         for joint in self.joints.values():
             if joint.leader != driven.name or joint.factor == 0.0:
@@ -233,14 +233,14 @@ class Robot:
             )
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise RobotDescriptionError(
-                f"Joint {driven.name!r} of {self.name} cannot be driven: with all that follows it "
-                f"it goes from {low:g} to {high:g}. Give it limits with room between them."
+                f"Joint {driven.name!r} of {self.name} cannot be driven: together with the joints "
+                f"that follow it, its range is {low:g} to {high:g}. Set lower below upper limits."
             )
         return low, high
 
 
 def _speed(joint: Joint) -> float:
-    """[rad/s] or [m/s], slow where none is stated."""
+    """Return the speed of ``joint`` [rad/s] or [m/s], a slow one if none is stated."""
     if 0.0 < joint.speed < math.inf:
         return joint.speed
     return SLOW_SLIDE if joint.slides else SLOW_TURN

@@ -1,4 +1,4 @@
-"""The joints of a URDF told apart: the axes that carry the tool, the fingers behind them."""
+"""Classification of the joints of a URDF: the axes that carry the tool, the fingers behind them."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from katana450.arm.robot.urdf import Urdf, UrdfJoint
 from katana450.errors import RobotDescriptionError
 
 TOOL_FRAMES = ("tcp", "grasp", "flange")
-"""Links that targets can be set for where the file has them; the first is the default."""
+"""Links to which targets can refer, if the file has them; the first is the default."""
 
 TURNING = ("revolute", "continuous")
-"""Types of joint an arm is made of; a continuous one is given half a turn either way."""
+"""Types of joints of an arm; a continuous one gets half a turn in each direction."""
 
 ARM_JOINTS = 5
 
 MIN_ARM_DEPTH = 3
-"""Joints in a row from which a branch of the tree is an arm, and not a finger or a wheel."""
+"""Minimum number of consecutive joints of a branch that is an arm, not a finger or a wheel."""
 
 FINGER = re.compile(r"finger|gripper|jaw|claw|knuckle|grasp|clamp|pincer|rh_[lr]\d", re.IGNORECASE)
-"""In the name of a joint or of its link: it may be that of a finger."""
+"""Words in the name of a joint or of its link that suggest a finger."""
 
 WRIST = re.compile("wrist|roll|rot|yaw|pitch|twist|tilt|flex", re.IGNORECASE)
-"""In the name of a joint: it turns the gripper and is none of its fingers."""
+"""Words in the name of a joint that turns the gripper and is not a finger."""
 
 JAW_RANGE = 3.0
-"""[rad] A joint that turns farther is that of a wrist, if an arm has none without it."""
+"""[rad] A joint with a larger range is a wrist, if the arm would be incomplete without it."""
 
 TIP = re.compile(r"tcp|tool|tip|grasp|end_?effector|(^|[_/])ee([_/]|$)", re.IGNORECASE)
-"""In the name of a frame: it is the tool, and what moves beside it is a finger."""
+"""Words in the name of a frame that is the tool; a joint that moves beside it is a finger."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Structure:
     Attributes:
         axes: the five turning joints that carry the tool, from the root.
         tools: the tool links, the default one first.
-        chosen: whether the default tool is only the outermost link, named by nobody.
+        chosen: whether the default tool is only the outermost link, because no tool is named.
         hand: every movable joint behind the last axis, parents first.
         others: every other movable joint.
     """
@@ -54,15 +54,16 @@ class Structure:
 
 
 def structure_of(urdf: Urdf, path: Path, tool: str | None) -> Structure:
-    """The structure of the arm in a URDF.
+    """Return the structure of the arm in a URDF.
 
     Args:
-        path: of the file, for error messages.
-        tool: link that targets are set for by default; else the arm is looked for in the tree, and
-            its tool is the first of TOOL_FRAMES there is, else the outermost link it carries.
+        urdf: the robot description.
+        path: path of the file, for error messages.
+        tool: link to which targets refer by default. None to search the tree for the arm; its tool
+            is the first of TOOL_FRAMES that exists, else the outermost link that it carries.
 
     Raises:
-        RobotDescriptionError: there is no such link, or the arm has not five turning axes.
+        RobotDescriptionError: there is no such link, or the arm does not have five turning axes.
     """
     tree = _Tree(urdf)
     if tool is not None and tool not in urdf.links:
@@ -104,7 +105,7 @@ class _Tree:
             )
 
     def joints_to(self, link: str) -> list[UrdfJoint]:
-        """The joints from the root to ``link``, in that order."""
+        """Return the joints from the root to ``link``, in that order."""
         joints: list[UrdfJoint] = []
         while link in self._above:
             joints.append(self._above[link])
@@ -112,18 +113,18 @@ class _Tree:
         return joints[::-1]
 
     def movable_to(self, link: str) -> list[UrdfJoint]:
-        """Those of them that are not fixed."""
+        """Return the joints from the root to ``link`` that are not fixed."""
         return [joint for joint in self.joints_to(link) if _moves(joint)]
 
     def order(self, link: str) -> list[str]:
-        """``link`` and all that hang on it, parents first."""
+        """Return ``link`` and all its descendants, parents first."""
         found = [link]
         for name in found:
             found.extend(joint.child for joint in self.below.get(name, ()))
         return found
 
     def next_joints(self, link: str) -> list[UrdfJoint]:
-        """The first movable joints behind ``link``, on every branch."""
+        """Return the first movable joints behind ``link``, on every branch."""
         found, waiting = [], list(self.below.get(link, ()))
         for joint in waiting:
             if _moves(joint):
@@ -133,19 +134,19 @@ class _Tree:
         return found
 
     def depth(self, joint: UrdfJoint) -> int:
-        """How many driven joints are in a row from ``joint`` on, at most."""
+        """Return the maximum number of consecutive driven joints, beginning with ``joint``."""
         return self._depth[joint.child] + _drives(joint)
 
     def leader(self, joint: UrdfJoint) -> UrdfJoint | None:
-        """The driven joint that ``joint`` follows, directly or not; None if there is none."""
+        """Return the driven joint that ``joint`` follows, directly or not; None without one."""
         passed: list[str] = []
-        led: UrdfJoint | None = joint
-        while led is not None and led.mimic is not None:
-            if led.name in passed:
+        leader: UrdfJoint | None = joint
+        while leader is not None and leader.mimic is not None:
+            if leader.name in passed:
                 return None
-            passed.append(led.name)
-            led = self.joints.get(led.mimic.joint)
-        return led
+            passed.append(leader.name)
+            leader = self.joints.get(leader.mimic.joint)
+        return leader
 
 
 def _moves(joint: UrdfJoint) -> bool:
@@ -161,9 +162,9 @@ def _carries(joint: UrdfJoint) -> bool:
 
 
 def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
-    """The five axes of the arm in a tree, where fingers and wheels branch off.
+    """Return the five axes of the arm in a tree from which fingers and wheels branch off.
 
-    Raises RobotDescriptionError that says how many axes there are.
+    Raises RobotDescriptionError with the number of axes if it is not five.
     """
     axes: list[UrdfJoint] = []
     link = tree.root
@@ -171,17 +172,17 @@ def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
         deepest, *rest = sorted(branches, key=tree.depth, reverse=True)
         if rest:
             depth = tree.depth(deepest)
-            rivals = [joint.name for joint in branches if tree.depth(joint) == depth]
-            if len(rivals) > 1 and depth >= MIN_ARM_DEPTH > len(axes):
+            candidates = [joint.name for joint in branches if tree.depth(joint) == depth]
+            if len(candidates) > 1 and depth >= MIN_ARM_DEPTH > len(axes):
                 hint = ""
                 if len(axes) + depth >= ARM_JOINTS:
                     hint = " Name the link that is the tool of one of them with --tool."
                 raise RobotDescriptionError(
-                    f"{path.name} has {len(rivals)} arms of {len(axes) + depth} joints each, which "
-                    f"begin at {', '.join(rivals)}; the closed-form kinematics need one arm of "
-                    f"five turning axes.{hint}"
+                    f"{path.name} has {len(candidates)} arms of {len(axes) + depth} joints each, "
+                    f"which begin at {', '.join(candidates)}; the closed-form kinematics need one "
+                    f"arm of five turning axes.{hint}"
                 )
-            if len(rivals) > 1 or depth < MIN_ARM_DEPTH or len(axes) >= ARM_JOINTS:
+            if len(candidates) > 1 or depth < MIN_ARM_DEPTH or len(axes) >= ARM_JOINTS:
                 break
         axes.append(deepest)
         link = deepest.child
@@ -192,7 +193,7 @@ def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
     _refuse_followers(axes, "the tool")
     if not axes:
         raise RobotDescriptionError(
-            f"{path.name} has no joints in a row that carry a tool; the closed-form kinematics "
+            f"{path.name} has no series of joints that carries a tool; the closed-form kinematics "
             f"need five turning axes. Its joints are {_listed(tree.joints.values()) or 'none'}."
         )
     if len(axes) != ARM_JOINTS:
@@ -213,19 +214,19 @@ def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
 
 
 def _listed(joints: Iterable[UrdfJoint]) -> str:
-    """The names of ``joints``, with the type of each that does not turn."""
+    """Return the names of ``joints``, with the type of each that does not turn."""
     return ", ".join(j.name if j.type in TURNING else f"{j.name} ({j.type})" for j in joints)
 
 
 def _branches(tree: _Tree, link: str, axes: Sequence[UrdfJoint]) -> list[UrdfJoint]:
-    """The next joints behind ``link``, without the bars that ``axes`` move and that carry none."""
+    """Return the next joints behind ``link``, without bars of ``axes`` that carry nothing."""
     found = tree.next_joints(link)
     own = [j for j in found if j.mimic is None or tree.leader(j) not in axes or tree.depth(j)]
     return own or found[:1]
 
 
 def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:
-    """Whether the last joint of a row of ``number`` opens a gripper instead of turning one."""
+    """Return whether the last of ``number`` joints opens a gripper instead of turning it."""
     if joint.mimic is not None or joint.type == "prismatic":
         return True
     fixed = [j.child for j in tree.below[joint.parent] if not _moves(j)]
@@ -240,7 +241,7 @@ def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:
 
 
 def _axes_to(tree: _Tree, tool: str) -> list[UrdfJoint]:
-    """The five axes that carry the link ``tool``; RobotDescriptionError where they are not."""
+    """Return the axes that carry the link ``tool``. Raises RobotDescriptionError if not five."""
     axes = tree.movable_to(tool)
     _refuse_followers(axes, repr(tool))
     for joint in axes:
@@ -250,9 +251,9 @@ def _axes_to(tree: _Tree, tool: str) -> list[UrdfJoint]:
             )
     if len(axes) != ARM_JOINTS:
         raise RobotDescriptionError(
-            f"Link {tool!r} hangs on {len(axes)} turning joints "
+            f"Link {tool!r} is carried by {len(axes)} turning joints "
             f"({', '.join(joint.name for joint in axes)}); "
-            "the tool of a five-axis arm hangs on five. Name another link with --tool."
+            "the tool of a five-axis arm is carried by five. Name another link with --tool."
         )
     return axes
 

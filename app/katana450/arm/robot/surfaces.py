@@ -18,11 +18,11 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.srgb import to_srgb
 
 EDGE = math.radians(30.0)
-"""Between two triangles, from which on they are shaded apart."""
+"""[rad] Minimum angle between two triangles with separate normals."""
 
 
 class Material(NamedTuple):
-    """Optical properties: sRGB color 0..1, glTF's factors metallic and rough 0..1."""
+    """Optical properties: sRGB colour 0..1, and the glTF factors metallic and rough 0..1."""
 
     name: str
     colour: tuple[float, float, float]
@@ -31,7 +31,7 @@ class Material(NamedTuple):
 
     @property
     def gleam(self) -> float:
-        """Grey of the highlight 0..1, in formats that know no metal: smooth metal has the most."""
+        """Grey value 0..1 of the highlight, for formats without metal; largest for smooth metal."""
         return (1.0 - self.rough) * (0.3 + 0.5 * self.metallic)
 
 
@@ -39,8 +39,10 @@ class Material(NamedTuple):
 class VisualMesh:
     """Triangles of one material.
 
-    vertices, normals: (n, 3), [m] and of unit length, in the frame of their link. faces: (m, 3)
-    indices of both, counter-clockwise seen from outside.
+    Attributes:
+        material: of all triangles.
+        vertices, normals: (n, 3), [m] and of unit length, in the frame of their link.
+        faces: (m, 3) indices of both, counter-clockwise seen from outside.
     """
 
     material: Material
@@ -50,23 +52,23 @@ class VisualMesh:
 
     @cached_property
     def area(self) -> float:
-        """[m^2]"""
+        """Area of all triangles [m^2]."""
         a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
         return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
 
     @cached_property
     def corners(self) -> FloatArray:
-        """(8, 3) of the box round it."""
+        """(8, 3) corners of the bounding box [m]."""
         ends = (self.vertices.min(axis=0), self.vertices.max(axis=0))
         return np.array(list(itertools.product(*np.transpose(ends).tolist())))
 
 
 PLAIN = (0.8, 0.8, 0.8)
-"""The colour that VRML gives what says none."""
+"""Default colour of VRML."""
 
 
 def main_colour(shapes: Sequence[VisualMesh]) -> tuple[float, float, float]:
-    """SRGB 0..1 of most of their surface; PLAIN where there are none."""
+    """Return the colour (sRGB, 0..1) of the largest part of the surface; PLAIN without shapes."""
     areas: dict[Material, float] = {}
     for shape in shapes:
         areas[shape.material] = areas.get(shape.material, 0.0) + shape.area
@@ -103,7 +105,7 @@ def shapes_of(visual: Visual) -> Sequence[VisualMesh]:
 
 
 def _edged(mesh: Any) -> Any:
-    """A mesh that brings no normals of its own, with those of a smooth surface up to an edge."""
+    """Return a mesh without normals, with those of a surface that is smooth up to an edge."""
     import trimesh
 
     return trimesh.graph.smooth_shade(mesh, angle=EDGE)
@@ -115,7 +117,7 @@ def _shape(mesh: Any, T: FloatArray, material: Material) -> VisualMesh:
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(size > 0.0, normals / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
     faces = np.asarray(mesh.faces, dtype=np.int64)
-    # A mirrored shape would show its inside.
+    # Mirroring turns the faces inside out.
     faces = faces[:, ::-1] if np.linalg.det(A) < 0.0 else faces
     vertices = np.asarray(mesh.vertices) @ A.T + T[:3, 3]
     return VisualMesh(material, frozen(vertices), frozen(normals), faces)

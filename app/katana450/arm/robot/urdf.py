@@ -1,4 +1,4 @@
-"""A URDF file as yourdfpy reads it, in plain values: links, joints and shapes."""
+"""A URDF file, read with yourdfpy, as plain values: links, joints and shapes."""
 
 from __future__ import annotations
 
@@ -31,13 +31,16 @@ class UrdfMimic(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """A <joint>.
+    """An element <joint>.
 
     Attributes:
+        name: of the joint.
         type: one of ``description.JOINTS``.
         parent, child: names of its links.
         origin: (4, 4) pose of the child in the parent at zero [m].
         axis: (3,) as stated, in the frame of the child; not normalised.
+        limit: limits and speed, if stated.
+        mimic: the joint that it follows, if any.
     """
 
     name: str
@@ -52,10 +55,13 @@ class UrdfJoint:
 
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
-    """A <link>.
+    """An element <link>.
 
     Attributes:
-        mass: [kg], 0 if not stated. center: (3,) of mass in the frame of the link [m].
+        name: of the link.
+        visuals, collisions: its shapes.
+        mass: [kg], 0 if not stated.
+        center: (3,) centre of mass in the frame of the link [m].
         missing: the mesh files of its shapes that do not exist.
     """
 
@@ -69,7 +75,7 @@ class UrdfLink:
 
 @dataclass(frozen=True, eq=False)
 class Urdf:
-    """A <robot>: its links and joints by name, in the order of the file."""
+    """An element <robot>: its links and joints by name, in the order of the file."""
 
     name: str
     links: Mapping[str, UrdfLink]
@@ -85,7 +91,7 @@ class Urdf:
         return found
 
     def parents_first(self) -> list[str]:
-        """Return the names of the links, each after the link it hangs on."""
+        """Return the names of the links, each after its parent."""
         parents = {joint.child: joint.parent for joint in self.joints.values()}
         children: dict[str, list[str]] = {}
         for name in self.links:
@@ -100,7 +106,7 @@ class Urdf:
 class _Stream:
     """A file that is read once, in one piece.
 
-    After a fault yourdfpy reads a file again, and keeps what its parser makes of the rest.
+    After a fault yourdfpy would read the file again and keep the parts that its parser accepts.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -112,11 +118,11 @@ class _Stream:
 
 
 def urdf_of(data: bytes, folder: Path) -> Urdf:
-    """Return the robot in ``data``, a file that passed the checks.
+    """Return the robot in ``data``, the contents of a file that passed the checks.
 
-    ``folder``: the folder of the file, which mesh files are named from.
+    ``folder``: the folder of the file, to which the names of mesh files are relative.
     """
-    # Takes longer to load than to read a file with.
+    # Imported here, because the import takes longer than reading a file.
     import yourdfpy
 
     options = {"build_scene_graph": False, "load_meshes": False}
@@ -162,7 +168,7 @@ def _joint(joint: Any) -> UrdfJoint:
 def _visual(
     shape: Any, colors: Mapping[str | None, Any], folder: Path, missing: list[Path]
 ) -> Visual | None:
-    """The shape of a visual or collision; None for a mesh file that joins ``missing``."""
+    """Return the shape of a visual or collision; None for a missing file, added to ``missing``."""
     geometry, scale = shape.geometry, np.ones(3)
     source: Path | Maker
     if geometry.box is not None:
@@ -182,7 +188,7 @@ def _visual(
 
 
 def _color(shape: Any, colors: Mapping[str | None, Any]) -> Color:
-    """Red, green and blue of 255 of its own material, or of that of the robot that it names."""
+    """Return red, green and blue (0..255) of its material, or of the robot's one of that name."""
     material = getattr(shape, "material", None)
     if material is None:
         return GREY
@@ -194,5 +200,5 @@ def _color(shape: Any, colors: Mapping[str | None, Any]) -> Color:
 
 
 def _origin(element: Any) -> FloatArray:
-    """(4, 4) of its origin [m]; the identity where none is stated."""
+    """Return the pose (4, 4) of the origin of ``element`` [m]; the identity if none is stated."""
     return frozen(np.eye(4) if element.origin is None else element.origin)

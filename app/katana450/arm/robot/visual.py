@@ -1,4 +1,4 @@
-"""The shapes of a link as its URDF gives them: primitives, and meshes trimesh can read."""
+"""The shapes of a link in its URDF: primitives, and meshes that trimesh can read."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 Color = tuple[int, int, int]
-"""Red, green and blue of 255."""
+"""Red, green and blue, 0..255."""
 
 Maker = Callable[[], Any]
-"""Returns a new trimesh [m]; most robots are read for their joints alone."""
+"""Returns a new trimesh [m]. Shapes are made on demand, because most robots are read only for their
+joints."""
 
 GREY: Color = (150, 156, 163)
-"""The color of a shape without one of its own."""
+"""Colour of a shape that has none of its own."""
 
 ROD_RADIUS = 0.008
-"""[m] Of the rods that stand for a link without shapes."""
+"""[m] Radius of the rods that represent a link without shapes."""
 
 ROD_LENGTH = 1e-3
-"""[m] Shorter links are not drawn."""
+"""[m] Shorter rods are not drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +35,10 @@ class Visual:
     """One shape.
 
     Attributes:
-        T_body_visual: (4, 4) where it sits in its body [m].
+        T_body_visual: (4, 4) pose in its body [m].
         scale: (3,) factors on the coordinates in the file.
         source: a mesh file, or the maker of a primitive shape.
-        colour: red, green and blue of 255, for shapes that bring none.
+        colour: red, green and blue, 0..255, for shapes that have no colour of their own.
     """
 
     T_body_visual: FloatArray
@@ -47,14 +48,17 @@ class Visual:
 
     @property
     def glb(self) -> Path | None:
-        """The file, if it can be shown as it is, with its own materials."""
+        """The GLB file, if it can be shown unchanged with its own materials; else None."""
         if not isinstance(self.source, Path) or self.source.suffix != ".glb":
             return None
         return self.source if (self.scale == 1.0).all() else None
 
     @cached_property
     def mesh(self) -> Any:
-        """A trimesh of it in the body's own frame [m]; RobotDescriptionError if it is none."""
+        """A trimesh of the shape in the body's frame [m].
+
+        Raises RobotDescriptionError if the file cannot be read.
+        """
         import trimesh
 
         if isinstance(self.source, Path):
@@ -69,16 +73,16 @@ class Visual:
 
 
 def unreadable_mesh(source: Path) -> RobotDescriptionError:
-    """Return the error for a mesh file that its reader refuses, whatever the reader says."""
+    """Return the error for a mesh file that its reader rejects, whatever the reader reports."""
     kind = source.suffix or "its format"
     return RobotDescriptionError(
-        f"{source} cannot be read as a mesh: the file is corrupt, or {kind} is not understood. "
-        "Export it anew, for example as binary STL."
+        f"{source} cannot be read as a mesh: the file is corrupt, or {kind} is not supported. "
+        "Export it again, for example as binary STL."
     )
 
 
 def rods(ends: Sequence[FloatArray]) -> tuple[Visual, ...]:
-    """Thin cylinders from a link's origin to each of ``ends`` (3,) [m] in its frame."""
+    """Return thin cylinders from a link's origin to each of ``ends`` (3,) [m] in its frame."""
     return tuple(
         Visual(frozen(np.eye(4)), frozen(np.ones(3)), _rod(end))
         for end in ends
@@ -129,7 +133,10 @@ def sphere(radius: float) -> Maker:
 
 
 def mesh_file(name: str, folder: Path) -> Path:
-    """``package://name/rest`` is looked for as rest beside the file and in the folders above."""
+    """Return the path of the mesh ``name``, relative to ``folder``.
+
+    The path in ``package://name/path`` is searched for beside the file and in the folders above it.
+    """
     if not name.startswith("package://"):
         return (folder / name.removeprefix("file://")).resolve()
     whole = Path(name.removeprefix("package://"))

@@ -1,4 +1,4 @@
-"""The props as what holds and catches water."""
+"""The props as vessels that hold and catch water."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from katana450.maths.water.environment import Basin, Cup, TableTop, WaterEnviron
 
 
 def water_environment(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironment:
-    """``basin_at``: where the basin stands [m], in the base frame. The floor bears the table."""
+    """Return the water environment of ``props``; ``basin_at``: place in the base frame [m].
+
+    The floor is at the underside of the table.
+    """
     cup, basin, table = props.cup, props.basin, props.table
     return WaterEnvironment(
         Cup(Cylinder(cup.inner_radius, _depth(cup)), cup.floor),

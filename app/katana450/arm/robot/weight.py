@@ -1,4 +1,4 @@
-"""What an arm weighs, by its description."""
+"""Loads of the links of an arm, from the masses in its description."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from katana450.maths.kinematics.statics import LinkLoad
 
 
 def loads_of(robot: Robot) -> tuple[LinkLoad, ...]:
-    """Return a load for each piece of the arm, its fingers at zero.
+    """Return one load for each rigid group of the arm, with its fingers at zero.
 
-    Empty where the file states no mass, and without an arm.
+    Empty if the file states no mass, or if there is no arm.
     """
     arm = robot.arm
     if arm is None:
@@ -25,7 +25,7 @@ def loads_of(robot: Robot) -> tuple[LinkLoad, ...]:
         T = T_shoulder_link[link.name] = T_shoulder_link[link.parent] @ link.at_rest(arm.resting)
         turned = link.joint is not None and link.joint.name in arm.chain.names
         count = axes[link.name] = axes[link.parent] + turned
-        # The fourth number is the mass itself.
+        # The fourth entry is the mass itself.
         moment = link.mass * (T @ np.append(link.center, 1.0))
         moments[count] = moments.get(count, np.zeros(4)) + moment
     return tuple(
