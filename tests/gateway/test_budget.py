@@ -41,7 +41,7 @@ def test_all_windows_of_an_identity_pay_from_one_budget() -> None:
         clocks.ask(budgets.of("a"), 0.0)
     assert refused.value.retry == pytest.approx(0.1)
     assert isinstance(refused.value, InputError)
-    assert "Ask again in" in str(refused.value)
+    assert "Try again in" in str(refused.value)
     clocks.ask(budgets.of("b"), 0.01)
     clocks.now += 1.01
     clocks.ask(budgets.of("a"), 0.0)

@@ -74,7 +74,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
     for upto in range(len(entries)):
         table.arm.event_log = tuple(entries[max(upto - 1, 0) : upto + 1])
         table.wait(TICK)
-    lines = [serialize.line(line) for line in table.hub.event_log.lines]
+    lines = [serialize.log_line(line) for line in table.hub.event_log.lines]
     assert [line.who for line in lines] == [None, driver.person.name, "Vera", None]
     assert [line.command for line in lines] == ["", "MoveTool", "Stop", "Stop"]
     assert [line.grounds for line in lines] == [
@@ -95,7 +95,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
 
 def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:
     gate = table.hub.gate
-    with pytest.raises(LeaseError, match="does not move"):
+    with pytest.raises(LeaseError, match="may not move"):
         gate.submit(cmd.Home(), SERVER)
     gate.submit(cmd.SpeedScale(0.5), SERVER)
     gate.submit(cmd.Hold(), SERVER)

@@ -68,10 +68,10 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
                 assert ask(f"{server.url}/health")[0] == 200
                 with frozen(server.pid):
                     began = time.monotonic()
-                    await control.wait(headline="No word from the arm")
+                    await control.wait(headline="No answer from the arm")
                     assert time.monotonic() - began < 2 * REPORTED
                     status, _, said = ask(f"{server.url}/health")
-                    assert (status, b"No word from the arm" in said) == (503, True)
+                    assert (status, b"No answer from the arm" in said) == (503, True)
                     await control.say("stop")
                     told = await control.wait(stop="requested")
                     assert (told["mood"], told["headline"]) == ("stopped", "Stop requested")

@@ -374,7 +374,7 @@ def test_the_age_of_a_picture_is_that_of_the_windows_own(table: Table) -> None:
 def test_no_lease_before_the_arm_is_ready() -> None:
     hub = Hub(lambda: 0.0)
     window = hub.join(Identity("session", None, Role.ADMIN), PAGES[0], lambda _: None)
-    with pytest.raises(LeaseError, match="not there yet"):
+    with pytest.raises(LeaseError, match="not ready yet"):
         hub.gate.claim(window.actor)
     hub.tick()
     hub.stop(window.actor)

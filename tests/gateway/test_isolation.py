@@ -59,7 +59,7 @@ def test_a_front_that_is_killed_comes_again_and_finds_an_arm_at_rest(server: App
         arm.go(requests.Home())
     state = again(server)
     assert server.front != killed
-    assert state.stopped == "The arm lost the server and stopped."
+    assert state.stopped == "The arm lost the connection to the server and stopped."
     assert state.status == "stopped"
     assert before.q[0] < state.q[0] < FAR[0] - 0.2
     assert "ended with status -9" in server.output

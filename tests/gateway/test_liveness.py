@@ -122,9 +122,9 @@ def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> 
     assert status.health(table.hub) is None
     table.arm.taken, table.arm.age = 0, 0.4
     table.wait(TICK, driver)
-    assert status.health(table.hub) == "No word from the arm's process for 0.4 s."
+    assert status.health(table.hub) == "No answer from the arm's process for 0.4 s."
     told = status.common(table.hub)
-    assert (told["mood"], told["headline"]) == ("lost", "No word from the arm")
+    assert (told["mood"], told["headline"]) == ("lost", "No answer from the arm")
     assert told["stopped"] is None
     table.arm.age = 0.6
     table.wait(TICK, driver)
