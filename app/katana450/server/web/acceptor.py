@@ -79,7 +79,7 @@ class _Connection:
 
     @property
     def open(self) -> bool:
-        """Whether the socket is open."""
+        """True while the socket is open."""
         return self.sock.fileno() >= 0
 
     def close(self) -> None:

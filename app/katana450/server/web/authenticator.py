@@ -49,7 +49,7 @@ class Address:
 
     @property
     def cookies_are_secure(self) -> bool:
-        """Whether clients use HTTPS, so that cookies can be marked as secure."""
+        """True if clients use HTTPS, so that cookies can be marked as secure."""
         return self.secure or (self.public or "").startswith("https:")
 
     def is_ours(self, host: str) -> bool:
