@@ -27,7 +27,8 @@ PREFACE = """\
 Programs can send the same requests as the page, under the same rules. One client at a time holds
 the lease, the right to drive, and sends ten heartbeats a second. Every client may stop the arm.
 Each message is a JSON object. The field `do` of a request names it. A request may have an `id`, a
-number or a text of your own; its answer has the same `id`. Lengths are in m, angles in rad, times in s.
+number or a text of your own; its answer has the same `id`. Without an `id` only questions such as
+`query` are answered, and refusals are sent. Lengths are in m, angles in rad, times in s.
 
 ## Connections
 
@@ -53,6 +54,7 @@ a later question can come first. A command is answered with one of these:
 
 - `done` with the `outcome` `accepted`;
 - `done` with the `outcome` `limited`, and the findings that limit it;
+- `done` with the `outcome` `unknown`, if the arm's process does not report it within 1 s;
 - `refused` with the reason.
 
 If a request is several commands (`set` with `more`) and some of them are refused, the outcome is

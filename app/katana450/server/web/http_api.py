@@ -137,11 +137,11 @@ class Api:
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.MAX_REQUEST_BYTES)
         try:
-            asked = self._hub.requests.decoded(body)
-            if isinstance(asked, requests.Hello | requests.Watch):
+            decoded = self._hub.requests.decoded(body)
+            if isinstance(decoded, requests.Hello | requests.Watch):
                 raise InputError("Send this request on the websocket or the TCP port.")
             window = self._window(request, identity)
-            answer = self._dispatcher.handle(window, asked, self._budget(request))
+            answer = self._dispatcher.handle(window, decoded, self._budget(request))
             if self._dispatcher.is_pending(answer):
                 answer = await self._dispatcher.concluded(answer)
             return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
