@@ -223,7 +223,7 @@ def test_stopped_arm_moves_only_after_clear_stop(table: Table) -> None:
     for act in acts:
         with pytest.raises(LeaseError, match="stopped"):
             act()
-    # Only the driver may clear it.
+    # Only the driver may clear the stop.
     with pytest.raises(LeaseError, match="Window 1 holds"):
         table.hub.move(other, cmd.ClearStop())
     assert stands_still(table)

@@ -147,6 +147,6 @@ class Answer(
     tag_field="is",
     tag=str.lower,
 ):
-    """Base of all answers; ``is`` is the class name in lower case, ``id`` that of the request."""
+    """Base of all answers; ``is`` names the class, and ``id`` is that of the request."""
 
     id: Id = None
