@@ -45,7 +45,7 @@ def common(hub: Hub) -> dict[str, Any]:
     if stopped is not None:
         now = StatusLine("stopped", "Stopped", "")
     if age is not None:
-        now = StatusLine("lost", "No answer from the arm", f"The picture is {age:.1f} s old.")
+        now = StatusLine("lost", "No answer from the arm", f"The state shown is {age:.1f} s old.")
     if stopped is not None and not stopped.confirmed:
         why = f"The arm has not confirmed the stop. {now.why}".rstrip()
         now = StatusLine("stopped", "Stop requested", why)
