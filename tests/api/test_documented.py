@@ -1,4 +1,4 @@
-"""The page about the API says what the API is."""
+"""Check docs/api.md and the OpenAPI description against the message classes."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ ADDED = tuple(kind for kinds in added_requests().values() for kind in kinds)
 EVERY_REQUEST: tuple[type[Request], ...] = (*get_args(requests.AnyRequest), *ADDED)
 
 
-def test_the_page_is_what_the_shapes_say() -> None:
+def test_page_is_up_to_date() -> None:
     assert PAGE.read_text(encoding="utf-8") == page(), "run `python -m docs.api`"
 
 
-def test_every_message_is_on_it_with_a_sentence() -> None:
-    said = PAGE.read_text(encoding="utf-8")
-    every = ((EVERY_REQUEST, "do"), (schema.kinds(answers.AnyAnswer), "is"))
-    for kinds, tag in every:
+def test_every_message_is_documented() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    messages = ((EVERY_REQUEST, "do"), (schema.kinds(answers.AnyAnswer), "is"))
+    for kinds, tag in messages:
         for kind in kinds:
-            assert f'### `"{tag}": "{tag_of(kind.__name__)}"`' in said
+            assert f'### `"{tag}": "{tag_of(kind.__name__)}"`' in text
             assert len(schema.summary(kind)) > 5, kind
 
 
-def test_the_description_for_tools_holds_together() -> None:
+def test_every_reference_in_openapi_exists() -> None:
     described = json.loads(schema.openapi_json(ADDED))
     text = json.dumps(described)
-    named = text.split("#/components/schemas/")[1:]
-    assert len(named) > 20
-    for reference in {part.partition('"')[0] for part in named}:
+    references = text.split("#/components/schemas/")[1:]
+    assert len(references) > 20
+    for reference in {part.partition('"')[0] for part in references}:
         assert reference in described["components"]["schemas"]
 
 

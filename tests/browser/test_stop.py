@@ -40,13 +40,13 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
     me = bar(driver, "name").partition(",")[0]
     os.kill(server.pid, signal.SIGSTOP)
     try:
-        wait_headline(other, "No word from the arm")
+        wait_headline(other, "No answer from the arm")
         assert mood(other.page) == "lost"
         other.page.keyboard.press("Space")
         for page in (driver, other):
             wait_headline(page, "Stop requested")
             assert mood(page.page) == "stopped"
-            assert "The arm has not confirmed it." in bar(page, "why")
+            assert "The arm has not confirmed the stop." in bar(page, "why")
         assert other.page.locator("#stop.asked").count() == 1
         other.keep(artefacts / "stop-requested.png")
     finally:

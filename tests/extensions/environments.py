@@ -1,4 +1,4 @@
-"""Environments of processes: extensions that are missing, and those of other distributions."""
+"""Environments of subprocesses without some extensions, or with other distributions."""
 
 from __future__ import annotations
 
@@ -22,18 +22,19 @@ sys.meta_path.insert(0, Blocked())
 
 
 def write_blocking(folder: Path) -> None:
-    """Write into ``folder`` what makes the packages in the variable BLOCKED impossible to import.
+    """Write a module into ``folder`` that blocks the import of the packages in BLOCKED.
 
-    It takes effect in processes that have the folder in PYTHONPATH.
+    It takes effect in processes that have the folder in PYTHONPATH. BLOCKED is a variable of the
+    environment.
     """
     (folder / "sitecustomize.py").write_text(BLOCKING, encoding="utf-8")
 
 
 @contextmanager
 def without(folder: Path, *names: str) -> Iterator[None]:
-    """Have processes that start meanwhile lack the extensions ``names``.
+    """Start processes without the extensions ``names`` inside the ``with`` block.
 
-    ``folder`` is added to where they look for modules.
+    ``folder`` is added to the search path of their modules.
     """
     write_blocking(folder)
     with pytest.MonkeyPatch.context() as patch:

@@ -1,4 +1,4 @@
-"""The core stays small enough to be read."""
+"""Check the size of the core: it stays small enough to be read."""
 
 from __future__ import annotations
 

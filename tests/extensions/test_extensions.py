@@ -1,4 +1,4 @@
-"""Extensions found, left out and added: the command line in processes of their own."""
+"""Test found, missing and added extensions with the command line in subprocesses."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ EXTENSION = Extension("weather", serve=SERVE)
 
 
 def katana450(*options: str, folder: Path | None = None, blocked: str = "", text: str = "") -> str:
-    """Return what a command prints, its errors too, after its exit status and a space."""
+    """Return exit status, a space, and the output of a command with its errors."""
     environment = os.environ | {"BLOCKED": blocked}
     if folder is not None:
         environment["PYTHONPATH"] = str(folder)
@@ -78,7 +78,7 @@ def katana450(*options: str, folder: Path | None = None, blocked: str = "", text
 
 @pytest.fixture
 def blocking(tmp_path: Path) -> Path:
-    """Return a folder that makes the packages in the variable BLOCKED impossible to import."""
+    """Return a folder whose module blocks the import of the packages in BLOCKED."""
     write_blocking(tmp_path)
     return tmp_path
 
@@ -97,12 +97,12 @@ def test_every_built_in_extension_is_found() -> None:
         ("media", ["render"]),
     ],
 )
-def test_missing_extension_takes_its_commands_with_it(
+def test_commands_of_a_missing_extension_are_not_listed(
     blocking: Path, name: str, commands: list[str]
 ) -> None:
     blocked = f"katana450.extensions.{name}"
-    said = katana450("--help", folder=blocking, blocked=blocked)
-    listed = [line.split()[0] for line in said.splitlines() if line.startswith("    ")]
+    output = katana450("--help", folder=blocking, blocked=blocked)
+    listed = [line.split()[0] for line in output.splitlines() if line.startswith("    ")]
     everything = ["serve", "fk", "ik", "access", "workspace", "export", "run", "demo", "render"]
     assert [each for each in everything if each not in listed] == commands
     refused = katana450(commands[0], folder=blocking, blocked=blocked)
@@ -123,13 +123,13 @@ def test_core_commands_work_without_any_extension(blocking: Path) -> None:
 
 def test_command_of_a_missing_extension_reports_it(blocking: Path) -> None:
     blocked = "katana450.extensions.media"
-    said = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
-    assert said.startswith("1 ")
-    assert "The extension media is needed but not installed." in said
+    output = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
+    assert output.startswith("1 ")
+    assert "The extension media is needed but not installed." in output
 
 
 NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "media")
-"""Extensions that a server runs without."""
+"""Extensions that a server does not need."""
 
 
 def test_server_runs_without_the_extensions_it_does_not_need(
@@ -154,20 +154,20 @@ def test_server_runs_without_the_extensions_it_does_not_need(
 
 def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:
     blocked = "katana450.extensions.importers"
-    said = katana450("serve", "--scene", "scene.yaml", folder=blocking, blocked=blocked)
-    assert said.startswith("2 ")
-    assert "unrecognized arguments: --scene" in said
+    output = katana450("serve", "--scene", "scene.yaml", folder=blocking, blocked=blocked)
+    assert output.startswith("2 ")
+    assert "unrecognized arguments: --scene" in output
 
 
 def test_map_is_refused_for_a_mechanism_that_is_not_an_arm(tmp_path: Path) -> None:
     gantry = str(ROOT / "tests" / "exchange" / "gantry.urdf")
     options = ("--urdf", gantry, "--workspace", str(tmp_path / "map.npz"))
-    said = katana450("serve", "--port", str(free_port()), *options)
-    assert said.startswith("1 ")
-    assert "map.npz maps where a tool can be. " in said
+    output = katana450("serve", "--port", str(free_port()), *options)
+    assert output.startswith("1 ")
+    assert "map.npz maps where a tool can be. " in output
 
 
-def test_another_distribution_adds_to_the_server(
+def test_another_distribution_extends_the_server(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = distribution(tmp_path, "station:EXTENSION", SERVED)
@@ -188,7 +188,7 @@ def test_another_distribution_adds_a_command(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("entry", "module", "said"),
+    ("entry", "module", "message"),
     [
         ("station:EXTENSION", "raise ValueError('no wind')", "weather cannot be loaded"),
         ("station:EXTENSION", "import no_such_thing", "No module named 'no_such_thing'"),
@@ -197,13 +197,13 @@ def test_another_distribution_adds_a_command(tmp_path: Path) -> None:
     ],
 )
 def test_broken_extension_of_another_distribution_is_reported_and_left_out(
-    tmp_path: Path, entry: str, module: str, said: str
+    tmp_path: Path, entry: str, module: str, message: str
 ) -> None:
     folder = distribution(tmp_path, entry, module)
     answered = katana450("fk", folder=folder, text=LINE)
     assert answered.startswith("0 ")
     assert '"T": [[1.0, ' in answered
-    assert said in answered
+    assert message in answered
 
 
 def test_reading_options_loads_nothing_heavy() -> None:

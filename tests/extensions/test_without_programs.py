@@ -1,4 +1,4 @@
-"""A server without the extension ``programs``: it drives, stops and watches over the arm."""
+"""Test a server without the extension ``programs``: it drives, stops and watches the arm."""
 
 from __future__ import annotations
 
@@ -95,14 +95,14 @@ def wait(arm: Client, until: Callable[[answers.State], bool]) -> answers.State:
     return state
 
 
-def test_it_starts_and_drives(server: AppServer, arm: Client) -> None:
+def test_server_starts_and_drives(server: AppServer, arm: Client) -> None:
     state = arm.joints(THERE)
     assert state.why == ""
     assert np.abs(np.array(state.q) - THERE).max() < 1e-6
     assert state.holder == "Driver"
     assert state.program is None
     assert arm.go(requests.Position(p=(0.4, 0.1, 0.05))).why == ""
-    # Nothing was left out with a message: somebody removed the extension.
+    # No message reports a missing feature, because the extension was removed on purpose.
     assert "left out" not in server.output
 
 
@@ -138,11 +138,11 @@ def test_request_of_the_missing_extension_is_refused_by_name(
     name = type(request_).__name__.lower()
     with pytest.raises(RefusedError, match=f"This server has no request '{name}'"):
         arm.ask(request_)
-    # The connection lasts, and so does the lease.
+    # The connection stays open, and the lease is kept.
     assert arm.joints(THERE).holder == "Driver"
 
 
-def test_description_for_tools_lists_what_there_is(server: AppServer) -> None:
+def test_openapi_lists_only_available_requests(server: AppServer) -> None:
     shapes = json.loads(ask(f"{server.url}{ROOT}/openapi.json")[2])["components"]["schemas"]
     assert "Joints" in shapes
     assert not {"Program", "Steer", "Order"} & set(shapes)
@@ -154,7 +154,7 @@ def test_page_and_its_files_are_served(server: AppServer) -> None:
         status, _, body = ask(server.url + path)
         assert status == 200, path
         assert body
-    # Uploads belong to an extension that needs the missing one.
+    # Uploads belong to another extension, which needs the missing one.
     upload = ask(
         f"{server.url}{ROOT}/mesh?name=a.stl", data=b"solid", X_Program="a-test-that-posts"
     )
@@ -173,7 +173,7 @@ def test_option_of_the_missing_extension_is_refused(option: str, tmp_path: Path)
 
 
 def test_another_distribution_provides_the_runner(tmp_path: Path) -> None:
-    """Its request, progress and folder are there, and its faults keep no stop from the arm."""
+    """Its request, progress and folder are available, and its errors do not block a stop."""
     distribution(tmp_path, "station:EXTENSION", STATION)
     with (
         without(tmp_path, "programs"),

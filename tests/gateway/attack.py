@@ -1,4 +1,4 @@
-"""Attacks from this machine, bounded in number and time, and how long STOP takes meanwhile."""
+"""Attacks from this machine, bounded in number and time, and the delay of STOP meanwhile."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tests.browser.server import APP
 from tests.gateway.client import Control, websocket
 
 FEW_DESCRIPTORS = ("sh", "-c", 'ulimit -n 1024; exec "$0" "$@"', *APP)
-"""A server where the system allows a process no more files; it cannot raise that itself."""
+"""Command of a server with a limit of open files, which it cannot raise itself."""
 
 
 @contextmanager
-def silent(port: int, count: int, said: bytes = b"") -> Iterator[list[socket.socket]]:
-    """``count`` connections that say no more than ``said``."""
+def silent(port: int, count: int, data: bytes = b"") -> Iterator[list[socket.socket]]:
+    """Open ``count`` connections that send ``data`` and nothing more."""
     sockets: list[socket.socket] = []
     try:
         for _ in range(count):
@@ -30,7 +30,7 @@ def silent(port: int, count: int, said: bytes = b"") -> Iterator[list[socket.soc
             each.settimeout(2.0)
             with suppress(OSError):
                 each.connect(("127.0.0.1", port))
-                each.sendall(said)
+                each.sendall(data)
         yield sockets
     finally:
         for each in sockets:
@@ -38,7 +38,7 @@ def silent(port: int, count: int, said: bytes = b"") -> Iterator[list[socket.soc
 
 
 def closed(sockets: list[socket.socket], seconds: float) -> int:
-    """How many of ``sockets`` the other side has closed after at most ``seconds``."""
+    """Return the number of ``sockets`` that the other side closes within ``seconds``."""
     left, until = set(sockets), time.monotonic() + seconds
     while left and time.monotonic() < until:
         for each in tuple(left):
@@ -54,7 +54,7 @@ def closed(sockets: list[socket.socket], seconds: float) -> int:
 
 
 def answered(sockets: list[socket.socket], seconds: float) -> int:
-    """On how many of ``sockets`` something has come within ``seconds``."""
+    """Return the number of ``sockets`` on which data arrives within ``seconds``."""
     time.sleep(seconds)
     return len(select.select(sockets, [], [], 0.0)[0])
 
@@ -63,7 +63,7 @@ def answered(sockets: list[socket.socket], seconds: float) -> int:
 async def asking(
     url: str, sockets: int, hz: float, what: str = "branches", token: str = ""
 ) -> AsyncIterator[Counter[str]]:
-    """Programs on ``sockets`` connections that ask ``hz`` times a second each; what they hear."""
+    """Send ``hz`` requests per second on each of ``sockets`` websockets; count the answers."""
     heard: Counter[str] = Counter()
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     request = f'{{"do": "query","at":"{what}"}}'
@@ -104,12 +104,12 @@ async def asking(
 
 
 async def stop_seconds(control: Control, times: int, seconds: float = 30.0) -> list[float]:
-    """[s] From STOP until it is answered, each of ``times``, in order of length."""
+    """Return the sorted delays [s] of the answers to ``times`` presses of STOP."""
     took = []
     for _ in range(times):
-        said = time.perf_counter()
+        pressed = time.perf_counter()
         await control.say("stop")
         await control.notice("stopped", seconds)
-        took.append(time.perf_counter() - said)
+        took.append(time.perf_counter() - pressed)
         await asyncio.sleep(0.05)
     return sorted(took)

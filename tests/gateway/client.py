@@ -1,4 +1,4 @@
-"""A browser without a browser: both sockets of a page, byte for byte."""
+"""A simulated browser: both sockets of a page, byte for byte."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 
 LEARNT = 30.0
-"""[s] In which a scene has come."""
+"""Timeout for receiving a scene [s]."""
 
 QUIET = 0.4
-"""[s] Long enough for the server to have sent whatever a message makes it send."""
+"""Time [s] in which the server has sent all answers to a message."""
 
 FAREWELL = 0.5
-"""[s] As long as is waited for the server's side of a goodbye."""
+"""Timeout for the server's close frame [s]."""
 
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
@@ -38,7 +38,7 @@ UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 def ask(
     url: str, *, data: bytes | None = None, **headers: str
 ) -> tuple[int, dict[str, str], bytes]:
-    """Status, headers and body of an answer, whatever it is; headers with _ for -."""
+    """Return status, headers and body of any response; ``headers`` have _ for -."""
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     try:
         with urllib.request.urlopen(
@@ -51,20 +51,20 @@ def ask(
 
 
 def enter(url: str, token: str = "") -> str:
-    """The cookie of a new session."""
+    """Return the cookie of a new session."""
     body = json.dumps({"token": token}).encode()
-    status, headers, said = ask(f"{url}/enter", data=body, Origin=url)
-    assert status == 204, said
+    status, headers, answer = ask(f"{url}/enter", data=body, Origin=url)
+    assert status == 204, answer
     return headers["set-cookie"].partition(";")[0]
 
 
 def page_name() -> str:
-    """As our page gives itself one."""
+    """Return a new key, as our page chooses one for itself."""
     return secrets.token_hex(16)
 
 
 class _Websocket(connect):
-    """One whose end is bounded: ``close`` alone waits for ever for a server that reads nothing."""
+    """A websocket with a timeout: plain ``close`` waits for ever if the server reads nothing."""
 
     async def __aexit__(self, *_error: object) -> None:
         with suppress(TimeoutError):
@@ -74,7 +74,7 @@ class _Websocket(connect):
 
 
 def websocket(url: str, path: str, cookie: str = "", **options: Any) -> connect:
-    """To be entered; ``origin`` is our own page's unless told otherwise."""
+    """Return a context manager of a websocket; ``origin`` defaults to our own page."""
     origin = options.pop("origin", url)
     headers = {"Cookie": cookie} if cookie else {}
     headers |= options.pop("headers", {})
@@ -84,29 +84,30 @@ def websocket(url: str, path: str, cookie: str = "", **options: Any) -> connect:
         additional_headers=headers,
         max_size=None,
         compression=None,
-        # Who reads no more hears no farewell either.
+        # A client that stops reading does not get the close frame either.
         close_timeout=FAREWELL,
         **options,
     )
 
 
 class Control:
-    """The page's own socket; gives a heartbeat every BEAT until told not to."""
+    """The control socket of a page; it sends heartbeats while ``alive`` is True."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.heard: list[dict[str, Any]] = []
         self.status: dict[str, Any] = {}
-        """As it is known by now."""
+        """All known values of the status."""
         self.alive = True
         self.last_beat = 0.0
         self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
 
     async def say(self, do: str, **request: Any) -> None:
+        """Send the request ``do``."""
         await self.socket.send(json.dumps({"do": do, **request}))
 
     async def wait(self, seconds: float = 5.0, **wanted: Any) -> dict[str, Any]:
-        """The status as soon as it has these values."""
+        """Wait until the status has these values, and return it."""
         async with asyncio.timeout(seconds):
             while True:
                 if self.status and all(self.status[key] == wanted[key] for key in wanted):
@@ -114,7 +115,7 @@ class Control:
                 await asyncio.sleep(0.01)
 
     async def notice(self, kind: str, seconds: float = 5.0) -> dict[str, Any]:
-        """The first notice of that kind, forgotten afterwards."""
+        """Wait for the first notice of ``kind``, remove it, and return it."""
         async with asyncio.timeout(seconds):
             while True:
                 for each in self.heard:
@@ -124,6 +125,7 @@ class Control:
                 await asyncio.sleep(0.01)
 
     async def close(self) -> None:
+        """Stop the heartbeats and close the socket."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -150,14 +152,14 @@ class Control:
 
 
 class Peer:
-    """A viser client; what it hears is not told to be seen."""
+    """A viser client that acknowledges no frames."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.controls: dict[str, dict[str, Any]] = {}
 
     async def listen(self, quiet: float = QUIET) -> list[dict[str, Any]]:
-        """Messages until none has come for ``quiet`` [s]."""
+        """Return the messages that arrive until none does for ``quiet`` [s]."""
         heard: list[dict[str, Any]] = []
         while True:
             try:
@@ -170,9 +172,9 @@ class Peer:
             heard += msgspec.msgpack.decode(body)["messages"]
 
     async def learn(self) -> None:
-        """Take in the scene and the panel, and say where it looks from, as a page does.
+        """Receive the scene and the panel, and send a camera, as a page does.
 
-        viser counts a browser as there from its first camera on.
+        viser counts a browser as connected from its first camera.
         """
         await self.say(
             type="ViewerCameraMessage",
@@ -186,12 +188,12 @@ class Peer:
             look_at=[0.0, 0.0, 0.0],
             up_direction=[0.0, 0.0, 1.0],
         )
-        told: list[dict[str, Any]] = []
+        messages: list[dict[str, Any]] = []
         async with asyncio.timeout(LEARNT):
-            # On a busy machine the scene comes with breaks.
-            while not any(message["type"] == "ReplayDoneMessage" for message in told):
-                told += await self.listen()
-        for message in told:
+            # On a busy machine the scene arrives with pauses.
+            while not any(message["type"] == "ReplayDoneMessage" for message in messages):
+                messages += await self.listen()
+        for message in messages:
             label = message.get("props", {}).get("label")
             if message["type"].startswith("Gui") and label:
                 self.controls[label] = message
@@ -200,7 +202,7 @@ class Peer:
         await self.socket.send(msgspec.msgpack.encode(message))
 
     async def set(self, label: str, **updates: Any) -> None:
-        """Change attributes of the control with this label."""
+        """Change attributes of the control with ``label``."""
         uuid = self.controls[label]["uuid"]
         await self.say(type="GuiUpdateMessage", uuid=uuid, updates=updates)
 
@@ -209,7 +211,7 @@ class Peer:
 async def controlling(
     url: str, cookie: str | None = None, page: str | None = None
 ) -> AsyncIterator[Control]:
-    """A page's control socket."""
+    """Open the control socket of a page."""
     cookie = enter(url) if cookie is None else cookie
     async with websocket(url, f"/control?page={page or page_name()}", cookie) as socket:
         control = Control(socket)
@@ -221,7 +223,7 @@ async def controlling(
 
 @asynccontextmanager
 async def opened(url: str, token: str = "") -> AsyncIterator[tuple[Peer, Control]]:
-    """A whole page: both its sockets, its scene learned."""
+    """Open both sockets of a page and receive its scene."""
     cookie, page = enter(url, token), page_name()
     async with (
         controlling(url, cookie, page) as control,

@@ -1,4 +1,4 @@
-"""The server of a file of tests, and a program's hand on it."""
+"""Fixtures: the server of a test module, and a program that drives its arm."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tests.browser.server import APP, AppServer
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:
-    """One that speaks JSON lines too."""
+    """Start a server that also accepts JSON lines."""
     with AppServer((*APP, "--lines", "0")) as server:
         yield server
 
 
 @pytest.fixture
 def program(server: AppServer) -> Iterator[Client]:
-    """A program that holds the arm; what it was told to do is forgotten afterwards."""
+    """Connect a program that holds the lease; its targets are dropped afterwards."""
     with connect(server.url, "Test") as program:
         program.ask(requests.ClearStop())
         program.ask(requests.Speed(value=1.0))

@@ -1,4 +1,4 @@
-"""Programs by hand: a line of JSON at a time on the TCP port, or a request over HTTP."""
+"""Simple programs: JSON lines on the TCP port, or requests over HTTP."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Lines:
 
     @staticmethod
     def port(server: AppServer) -> int:
-        """Where the server listens for programs."""
+        """Return the TCP port of the server for programs."""
         found = AT.search(server.output)
         assert found is not None
         return int(found[1])
@@ -56,7 +56,7 @@ class Lines:
 
 @contextmanager
 def speaking(server: AppServer, name: str = "Lines") -> Iterator[Lines]:
-    """One that has said who it is."""
+    """Connect a program and send its ``hello``."""
     lines = Lines(server)
     with lines.socket, lines.reader:
         lines.say(do="hello", name=name)
@@ -65,7 +65,7 @@ def speaking(server: AppServer, name: str = "Lines") -> Iterator[Lines]:
 
 
 def post(server: AppServer, program: str = "a-test-that-posts", **request: Any) -> tuple[int, Any]:
-    """Status and answer of a single request over HTTP."""
+    """Return status and answer of a single request over HTTP."""
     status, _, body = ask(
         f"{server.url}/api/v1/do", data=json.dumps(request).encode(), X_Program=program
     )

@@ -1,6 +1,6 @@
-"""Find GNU Octave, and install it where that can be done without asking.
+"""Find GNU Octave, and install it if this is possible without a password.
 
-``python tests/gateway/octave.py`` does so; where it is not there its tests are skipped.
+``python tests/gateway/octave.py`` does this. Without Octave its tests are skipped.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import shutil
 import subprocess
 
 PACKAGES = ("octave", "octave-instrument-control")
-"""Debian's names. The second brings TCP connections."""
+"""Names of the Debian packages. The second provides TCP connections."""
 
 MISSING = (
     "GNU Octave with its package instrument-control is not here; on Debian and Ubuntu: "
@@ -19,7 +19,7 @@ MISSING = (
 
 
 def find() -> str | None:
-    """Octave's command line, if it is there and can open connections."""
+    """Return the path of Octave's command line; None unless it can open TCP connections."""
     path = shutil.which("octave-cli")
     if path is None:
         return None
@@ -28,7 +28,7 @@ def find() -> str | None:
 
 
 def main() -> None:
-    """Say which Octave the tests use; install it first if root can."""
+    """Print the Octave that the tests use; install it first if the user is root."""
     if find() is None and shutil.which("apt-get") and os.geteuid() == 0:
         environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
         install = ["apt-get", "install", "--yes", "--quiet=2", "--no-install-recommends", *PACKAGES]

@@ -1,4 +1,4 @@
-"""Joint angles that tests of the gateway drive to."""
+"""Joint angles to which tests of the gateway move the arm."""
 
 from __future__ import annotations
 

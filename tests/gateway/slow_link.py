@@ -1,4 +1,4 @@
-"""A line that carries only so many bytes a second, between a client and a server."""
+"""A connection of limited rate between a client and a server."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from types import TracebackType
 from typing import Self
 
 SLICE = 0.02
-"""[s] What the line carries in this time goes at once."""
+"""Time [s] whose data the line carries in one burst."""
 
 WINDOW = 8192
-"""Bytes that the line itself holds in each direction."""
+"""Bytes that the line buffers in each direction."""
 
 
 class SlowLink:
-    """Context manager: connections to ``port`` go on to ``to_port``, both on this machine.
+    """Context manager that relays connections from ``port`` to ``to_port`` on this machine.
 
-    ``rate`` is in bytes a second in each direction for all connections together, as a thin line
-    has it, ``delay`` in seconds one way; ``cut`` silences the line without closing it.
+    ``rate``: bytes per second in each direction for all connections together. ``delay``: one-way
+    delay [s]. ``cut`` silences the line without closing it.
     """
 
     def __init__(self, to_port: int, rate: float, delay: float = 0.0) -> None:
@@ -30,14 +30,14 @@ class SlowLink:
         self._to_port = to_port
         self._loop = asyncio.new_event_loop()
         self._listening = socket.create_server(("127.0.0.1", 0))
-        # Else the kernel would take in seconds' worth of a thin line.
+        # Larger buffers of the kernel would hold seconds of data of a slow line.
         self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW)
         self._free_at = [0.0, 0.0]
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     @property
     def port(self) -> int:
-        """Where the line begins."""
+        """Return the port of the client's end."""
         port: int = self._listening.getsockname()[1]
         return port
 
@@ -65,7 +65,7 @@ class SlowLink:
         for task in tasks:
             task.cancel()
         self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
-        # What was aborted says goodbye in the next turn.
+        # Aborted connections end in the next turn of the loop.
         self._loop.run_until_complete(asyncio.sleep(0.0))
         self._loop.close()
 

@@ -1,4 +1,4 @@
-"""Which connections are accepted, kept and closed."""
+"""Test the acceptor: accepted, kept and closed connections."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ async def _accepting() -> AsyncIterator[tuple[Acceptor, tuple[str, int]]]:
 
 
 async def _connected(server: tuple[str, int], of: str = "127.0.0.1") -> socket.socket:
-    """A connection from the address ``of``, once the server has had time to accept it."""
+    """Connect from the address ``of``, and give the server time to accept."""
     connection = socket.create_connection(server, timeout=2.0, source_address=(of, 0))
     connection.setblocking(False)
     await asyncio.sleep(0.02)
@@ -47,7 +47,7 @@ def _is_open(connection: socket.socket) -> bool:
         return False
 
 
-def test_the_address_with_most_connections_loses_its_oldest() -> None:
+def test_oldest_connection_of_the_most_frequent_address_is_closed() -> None:
     async def act() -> None:
         async with _accepting() as (_, server):
             lonely = await _connected(server, "127.0.0.2")
@@ -62,7 +62,7 @@ def test_the_address_with_most_connections_loses_its_oldest() -> None:
     asyncio.run(act())
 
 
-def test_connections_that_have_ended_leave_room_for_others() -> None:
+def test_closed_connections_make_room_for_others() -> None:
     async def act() -> None:
         async with _accepting() as (_, server):
             early = [await _connected(server) for _ in range(WAITING // 2 + 1)]
@@ -76,7 +76,7 @@ def test_connections_that_have_ended_leave_room_for_others() -> None:
     asyncio.run(act())
 
 
-def test_a_connection_that_is_kept_is_not_closed_for_others() -> None:
+def test_kept_connection_is_not_closed_for_others() -> None:
     async def act() -> None:
         async with _accepting() as (acceptor, server):
             driver = await _connected(server)
@@ -90,7 +90,7 @@ def test_a_connection_that_is_kept_is_not_closed_for_others() -> None:
     asyncio.run(act())
 
 
-def test_failures_to_accept_are_logged_once_and_do_not_keep_the_loop_busy(
+def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     tried = []
@@ -113,7 +113,7 @@ def test_failures_to_accept_are_logged_once_and_do_not_keep_the_loop_busy(
 
 
 @pytest.mark.parametrize(("soft", "hard"), [(256, 2048), (256, 512)])
-def test_the_descriptor_limit_is_raised_as_far_as_the_system_allows(soft: int, hard: int) -> None:
+def test_descriptor_limit_is_raised_as_far_as_the_system_allows(soft: int, hard: int) -> None:
     program = (
         "import resource\n"
         "from katana450.server.web.acceptor import raise_descriptor_limit\n"

@@ -1,4 +1,4 @@
-"""An access file that becomes unreadable while the server runs: STOP works all the same."""
+"""Test an access file that becomes unreadable while the server runs: STOP keeps working."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def a_folder(path: Path) -> None:
 
 
 @pytest.mark.parametrize("fault", [removed, open_to_others, cut_off, a_folder])
-def test_last_good_links_count_and_the_fault_is_logged_once(
+def test_last_readable_links_stay_valid_and_the_error_is_logged_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, fault: Callable[[Path], None]
 ) -> None:
     file = AccessFile.create(tmp_path / "access.json")
@@ -53,7 +53,7 @@ def test_last_good_links_count_and_the_fault_is_logged_once(
     assert len(caplog.records) == 1
 
 
-def test_links_count_anew_once_the_file_is_mended(tmp_path: Path) -> None:
+def test_links_are_read_again_once_the_file_is_repaired(tmp_path: Path) -> None:
     file = AccessFile.create(tmp_path / "access.json")
     token = file.give("Anna", Role.OPERATOR, YEARS)
     served = AccessFile.open(file.path)
@@ -71,8 +71,8 @@ def test_stop_works_with_an_unreadable_access_file(tmp_path: Path) -> None:
     with AppServer((*APP, "--access", str(path))) as server:
         cookie = enter(server.url, token)
         path.write_text("{")
-        status, _, said = ask(f"{server.url}/stop", data=b"", Cookie=cookie, Origin=server.url)
-        assert (status, said) == (204, b"")
+        status, _, body = ask(f"{server.url}/stop", data=b"", Cookie=cookie, Origin=server.url)
+        assert (status, body) == (204, b"")
         bearer = f"Bearer {token}"
         assert ask(f"{server.url}/api/v1/stop", data=b"", Authorization=bearer)[0] == 204
         state = json.loads(ask(f"{server.url}/api/v1/state", Authorization=bearer)[2])

@@ -1,4 +1,4 @@
-"""Programs at the door of a real server: over a websocket, over HTTP, over a TCP port."""
+"""Test programs on a real server: over a websocket, over HTTP, over a TCP port."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.gateway.lines import Lines, post, speaking
 from tests.gateway.postures import READY, THERE
 
 
-def test_everything_there_is_to_ask_for_has_an_answer(program: Client) -> None:
+def test_every_query_is_answered(program: Client) -> None:
     asked: list[requests.Request] = [
         requests.Heartbeat(n=3), requests.Gripper(angle=0.1), requests.Tool(name="flange"),
         requests.Tool(name="tcp"), requests.Joint(axis=5, value=0.1), requests.Pause(),
@@ -43,7 +43,7 @@ def test_everything_there_is_to_ask_for_has_an_answer(program: Client) -> None:
             program.ask(request)
 
 
-def test_a_line_of_json_at_a_time_does_the_same(server: AppServer) -> None:
+def test_json_lines_on_tcp_do_the_same(server: AppServer) -> None:
     with speaking(server, "Octave") as lines:
         lines.answer(do="clear_stop")
         done = lines.answer(do="joints", q=THERE.tolist())
@@ -51,7 +51,7 @@ def test_a_line_of_json_at_a_time_does_the_same(server: AppServer) -> None:
         lines.say(do="watch", hz=20)
         state: dict[str, Any] = {"ticket": -1}
         while state["ticket"] < done["ticket"] or state["moving"]:
-            # Whatever is asked is a heartbeat.
+            # Every request is a heartbeat.
             lines.say(do="heartbeat")
             while (state := lines.hear())["is"] != "state":
                 pass
@@ -101,7 +101,7 @@ def test_repeated_invalid_requests_close_the_connection(
         assert (after.q, after.holder, after.stopped) == (before.q, before.holder, before.stopped)
 
 
-def test_single_requests_may_be_posted(server: AppServer) -> None:
+def test_single_requests_can_be_posted(server: AppServer) -> None:
     status, done = post(server, do="clear_stop", id=1)
     assert (status, done["is"], done["id"], done["outcome"]) == (200, "done", 1, "accepted")
     status, done = post(server, do="joint", axis=5, value=0.3)
@@ -114,9 +114,9 @@ def test_single_requests_may_be_posted(server: AppServer) -> None:
         assert state["stopped"] is None
         time.sleep(0.05)
     assert state["q"][4] == pytest.approx(0.3, abs=1e-12)
-    status, said = post(server, "another-program-there", do="home", id="h")
-    assert (status, said["is"], said["id"]) == (409, "refused", "h")
-    assert "holds the arm" in said["why"]
+    status, answer = post(server, "another-program-there", do="home", id="h")
+    assert (status, answer["is"], answer["id"]) == (409, "refused", "h")
+    assert "holds the arm" in answer["why"]
     assert post(server, do="fly")[0] == 422
     assert post(server, do="watch", hz=3)[0] == 422
     assert post(server, "short", do="home")[0] == 422
@@ -124,7 +124,7 @@ def test_single_requests_may_be_posted(server: AppServer) -> None:
     assert post(server, do="release_lease")[0] == 200
 
 
-def test_another_sites_page_cannot_speak_for_a_program(server: AppServer) -> None:
+def test_page_of_another_site_cannot_send_requests_as_a_program(server: AppServer) -> None:
     for headers in ({"Origin": "https://evil.example"}, {"Origin": "null"}):
         status, _, _ = ask(
             f"{server.url}/api/v1/stop", data=b"", X_Program="a-test-that-posts", **headers
@@ -133,7 +133,7 @@ def test_another_sites_page_cannot_speak_for_a_program(server: AppServer) -> Non
     assert json.loads(ask(f"{server.url}/api/v1/state")[2])["stopped"] is None
 
 
-def test_the_description_names_all_that_is_there(server: AppServer) -> None:
+def test_openapi_lists_every_route(server: AppServer) -> None:
     described = json.loads(ask(f"{server.url}/api/v1/openapi.json")[2])
     for path in described["paths"]:
         data = b"{}" if path.endswith("do") else None
@@ -145,7 +145,7 @@ def test_the_description_names_all_that_is_there(server: AppServer) -> None:
         assert kind.__name__ in shapes
 
 
-def test_where_a_link_is_asked_for_a_program_needs_a_token(tmp_path: Path, capsys: Any) -> None:
+def test_program_needs_a_token_if_the_server_requires_links(tmp_path: Path, capsys: Any) -> None:
     file = tmp_path / "access.json"
     tokens = {}
     for role in ("viewer", "operator"):

@@ -1,4 +1,4 @@
-"""Motions and objects that a program asks a real server for."""
+"""Test motions and objects that a program requests of a real server."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ from katana450.server.api.fields import Matrix4
 from tests.gateway.postures import READY, THERE
 
 
-def test_a_program_drives_the_joints_and_knows_when_they_are_there(
-    program: Client, arm: MountedArm
-) -> None:
+def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: MountedArm) -> None:
     there = program.joints(THERE)
     assert there.status == "ok"
     assert there.why == ""
@@ -38,7 +36,7 @@ def test_a_program_drives_the_joints_and_knows_when_they_are_there(
 
 
 @pytest.mark.parametrize("frame", list(requests.Frame))
-def test_a_pose_may_be_in_either_frame(
+def test_pose_can_be_in_either_frame(
     program: Client, arm: MountedArm, frame: requests.Frame
 ) -> None:
     T = forward(arm.chain, THERE)
@@ -70,7 +68,7 @@ def test_unreachable_request_gives_the_reason(program: Client) -> None:
         program.ask(requests.Pose(T=skewed))
 
 
-def test_a_state_tells_what_follows_from_the_posture(
+def test_state_includes_values_derived_from_the_posture(
     program: Client, robot: Robot, arm: MountedArm
 ) -> None:
     q = THERE + np.array((0.3, 0.0, 0.0, 0.0, 0.0))
@@ -93,14 +91,14 @@ def test_a_state_tells_what_follows_from_the_posture(
         assert time.monotonic() < deadline
 
 
-def test_another_branch_is_taken_on_a_way_that_is_clear(program: Client) -> None:
+def test_other_branch_is_reached_on_a_clear_path(program: Client) -> None:
     program.joints(np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)))
     there = program.go(requests.Branch(shoulder="front", elbow="down"))
     assert there.branch == ("front", "down")
     assert there.status == "ok"
     back = program.go(requests.Branch(shoulder="front", elbow="up"))
     assert back.branch == ("front", "up")
-    # A STOP while the way is being worked out ends that too.
+    # A stop while the path is being planned ends the planning too.
     program.ask(requests.Branch(shoulder="front", elbow="down"))
     program.ask(requests.Stop())
     program.ask(requests.ClearStop())
@@ -115,7 +113,7 @@ def _rows(T: npt.ArrayLike) -> Matrix4:
     return rows
 
 
-def test_objects_are_put_elsewhere_and_met_and_taken_away(program: Client) -> None:
+def test_objects_are_moved_touched_and_removed(program: Client) -> None:
     known = {each.name: each for each in program.query(answers.Objects).objects}
     assert set(known) == {"cup", "basin"}
     T = np.array(known["cup"].T)

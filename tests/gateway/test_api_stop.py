@@ -1,4 +1,4 @@
-"""STOP and silence while a program drives the arm of a real server."""
+"""Test STOP and silence while a program drives the arm of a real server."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_any_window_can_stop_a_program(server: AppServer, program: Client) -> No
     assert any(line.who == "bystander" and line.began for line in event_log.lines)
 
 
-def test_a_program_that_falls_silent_stops_the_arm(server: AppServer) -> None:
+def test_silent_program_causes_a_stop(server: AppServer) -> None:
     async def act() -> None:
         async with (
             websocket(server.url, "/api/v1/socket?name=Frozen") as silent,

@@ -1,4 +1,4 @@
-"""Streams of joint angles that a program sends to a real server, and of states that it gets."""
+"""Test streams of joint angles to a real server, and of states from it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from katana450.server.api import answers, requests
 from tests.gateway.postures import READY, THERE
 
 
-def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(program: Client) -> None:
+def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
     began = time.monotonic()
     while (t := time.monotonic() - began) < 1.5:
         wave = READY + math.sin(2.0 * t) * np.array((0.2, 0.0, 0.0, 0.0, 0.4))
@@ -26,7 +26,7 @@ def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(program: Client) -
     time.sleep(1.2)
     rest = program.query(answers.State)
     assert not rest.moving
-    # It braked at once and did not go on to where the stream had wanted it.
+    # The arm braked at once and did not continue to the last target of the stream.
     assert abs(rest.q[0] - 0.2 * math.sin(2.0 * 1.5)) < 0.2
     # A target of another kind stays until it is reached.
     there = program.joints(THERE)
@@ -34,9 +34,12 @@ def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(program: Client) -
 
 
 @pytest.mark.parametrize("rates", [False, True])
-def test_a_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool) -> None:
-    """It uses 0.7 of the acceleration. On a busy machine samples come late; until the next one the
-    arm continues at the speed of the last, so the bound is what that lateness can make of it."""
+def test_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool) -> None:
+    """The stream uses 0.7 of the acceleration, and its samples are late on a busy machine.
+
+    Until the next sample the arm continues at the speed of the last, so the bound includes the
+    effect of that delay.
+    """
     # With a better stream the bound is tighter.
     for _ in range(3):
         reached, bound, sent = followed(program, rates)
@@ -47,7 +50,7 @@ def test_a_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool
 
 
 def followed(program: Client, rates: bool) -> tuple[float, float, float]:
-    """Stream the sine twice; return the farthest angle [rad] reached, its bound, and that sent."""
+    """Stream the sine twice; return the maximum angles [rad] reached, allowed and sent."""
     program.go(requests.Home())
     acceleration = program.query(answers.Arm).acceleration[0]
     began, seen, sent = time.monotonic(), [0.0], []
@@ -55,7 +58,7 @@ def followed(program: Client, rates: bool) -> tuple[float, float, float]:
         sample = sine(t)
         q, qd = READY.copy(), np.zeros(5)
         q[0], qd[0] = READY[0] + sample.q, sample.qd
-        # Its answer comes once the server has it.
+        # The answer arrives once the server has the sample.
         program.ask(requests.Servo(q=q.tolist(), qd=qd.tolist() if rates else None))
         sent.append(replace(sample, taken=time.monotonic() - began))
         seen.append(program.query(answers.State).setpoint[0] - READY[0])
@@ -68,12 +71,12 @@ def followed(program: Client, rates: bool) -> tuple[float, float, float]:
 
 
 SIZE, OMEGA = 0.4, math.tau / 3.0
-"""[rad, rad/s] Of the sine."""
+"""Amplitude [rad] and maximum speed [rad/s] of the sine."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Angle [rad] and speed [rad/s] of the sine at ``t`` [s]; ``taken``: when the server had it."""
+    """Angle [rad] and speed [rad/s] of the sine at ``t`` [s]; ``taken``: time of its receipt."""
 
     t: float
     q: float
@@ -86,10 +89,10 @@ def sine(t: float) -> Sample:
 
 
 def reach(samples: list[Sample], late: float, acceleration: float) -> float:
-    """Return the largest angle [rad] that an arm can get to which follows ``samples``.
+    """Return the maximum angle [rad] that an arm can reach while it follows ``samples``.
 
-    It continues at the speed of a sample until it knows the next, at most for 0.2 s, and brakes
-    then. ``late``: lateness of its control loop [s].
+    The arm continues at the speed of a sample until the next arrives, for at most 0.2 s, and then
+    brakes. ``late``: delay of its control loop [s].
     """
     farthest = 0.0
     for sample, following in pairwise(samples):
@@ -101,17 +104,17 @@ def reach(samples: list[Sample], late: float, acceleration: float) -> float:
 
 
 @pytest.mark.parametrize(("gap", "bound"), [(0.02, 1.01), (0.06, 1.05)])
-def test_bound_of_a_stream_that_comes_in_time_is_its_amplitude(gap: float, bound: float) -> None:
+def test_bound_of_a_punctual_stream_is_its_amplitude(gap: float, bound: float) -> None:
     samples = [sine(gap * i) for i in range(round(3.0 / gap) + 1)]
     assert SIZE < reach(samples, 0.005, 2.5) < bound * SIZE
 
 
-def test_states_come_as_often_as_they_are_wanted(program: Client) -> None:
+def test_states_arrive_at_the_requested_rate(program: Client) -> None:
     times = []
     for state in program.states(hz=50.0):
         times.append(time.monotonic())
         assert len(state.q) == 5
         if len(times) == 60:
             break
-    # A busy machine may tell fewer, never more.
+    # A busy machine may send fewer states, never more.
     assert 0.019 < np.mean(np.diff(times)) < 0.04

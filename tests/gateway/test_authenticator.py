@@ -1,4 +1,4 @@
-"""Who may come in, and as what: links that are signed, run out and can be taken back."""
+"""Test access links, which are signed, expire and can be revoked, and the checks of origins."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def file(tmp_path: Path) -> AccessFile:
     return AccessFile.create(tmp_path / "access.json")
 
 
-def test_a_link_is_good_for_its_person_until_it_runs_out(file: AccessFile) -> None:
+def test_link_is_valid_for_its_person_until_it_expires(file: AccessFile) -> None:
     token = file.give("Anna", Role.OPERATOR, 1000.0)
     found = file.check(token, 999.0)
     assert found is not None
@@ -45,11 +45,11 @@ def test_a_link_is_good_for_its_person_until_it_runs_out(file: AccessFile) -> No
     assert file.check(token, 1000.0) is None
 
 
-def test_a_link_that_was_taken_back_is_no_good(file: AccessFile) -> None:
+def test_revoked_link_is_invalid(file: AccessFile) -> None:
     tokens = [file.give(name, Role.VIEWER, HOUR) for name in ("Anna", "Bert")]
     known = file.check(tokens[0], 0.0)
     assert known is not None
-    # By another process, as `katana450 access revoke` is one.
+    # Another process changes the file, as `katana450 access revoke` does.
     assert AccessFile.open(file.path).revoke(known[0]).name == "Anna"
     assert file.check(tokens[0], 0.0) is None
     assert file.check(tokens[1], 0.0) is not None
@@ -76,7 +76,7 @@ def test_access_link_needs_the_secret(file: AccessFile, tmp_path: Path) -> None:
         "x" * 999,
     ):
         assert file.check(forged, 0.0) is None
-    # Signed for something else, or about nothing.
+    # Tokens signed for another purpose, or with another content.
     secret = json.loads(file.path.read_text())["secret"]
     assert file.check(URLSafeSerializer(secret, salt="else").dumps([known[0], HOUR]), 0.0) is None
     strangers: list[Any] = [[known[0]], {}, None, [1, 2], [known[0], "soon"], [[], 5.0], "x"]
@@ -84,7 +84,7 @@ def test_access_link_needs_the_secret(file: AccessFile, tmp_path: Path) -> None:
         assert file.check(URLSafeSerializer(secret, salt=SALT).dumps(strange), 0.0) is None
 
 
-def test_the_file_is_for_its_owner_alone(file: AccessFile) -> None:
+def test_file_readable_by_others_is_refused(file: AccessFile) -> None:
     file.give("Anna", Role.VIEWER, HOUR)
     assert stat.S_IMODE(file.path.stat().st_mode) == 0o600
     file.path.chmod(0o640)
@@ -93,7 +93,7 @@ def test_the_file_is_for_its_owner_alone(file: AccessFile) -> None:
 
 
 @pytest.mark.parametrize("content", ["", "{}", '{"secret": 1, "grants": {}}', "[]"])
-def test_a_file_of_something_else_is_named(tmp_path: Path, content: str) -> None:
+def test_file_of_another_kind_is_reported(tmp_path: Path, content: str) -> None:
     path = tmp_path / "other.json"
     path.write_text(content)
     path.chmod(0o600)
@@ -104,7 +104,7 @@ def test_a_file_of_something_else_is_named(tmp_path: Path, content: str) -> None
 
 
 @pytest.mark.parametrize("name", ["", "x" * 41, "two\nlines"])
-def test_a_name_is_one_that_can_be_shown(file: AccessFile, name: str) -> None:
+def test_unprintable_or_too_long_name_is_refused(file: AccessFile, name: str) -> None:
     with pytest.raises(InputError, match="name"):
         file.give(name, Role.VIEWER, HOUR)
 
@@ -134,7 +134,7 @@ PROXIED = Address(
         (PROXIED, "localhost:8080", True),
     ],
 )
-def test_which_names_are_ours(address: Address, host: str, ours: bool) -> None:
+def test_only_own_host_names_are_accepted(address: Address, host: str, ours: bool) -> None:
     assert address.is_ours(host) is ours
 
 
@@ -150,17 +150,19 @@ def test_which_names_are_ours(address: Address, host: str, ours: bool) -> None:
         (PROXIED, "http://arm.example.org", "other", False),
     ],
 )
-def test_which_pages_are_ours(address: Address, origin: str, host: str, ours: bool) -> None:
+def test_only_own_origins_are_accepted(
+    address: Address, origin: str, host: str, ours: bool
+) -> None:
     assert address.is_our_page(origin, host) is ours
 
 
 @pytest.mark.parametrize("url", ["arm.example.org", "ftp://arm", "https://", "https://a/b"])
-def test_a_public_address_is_one(url: str) -> None:
+def test_invalid_public_address_is_refused(url: str) -> None:
     with pytest.raises(ConfigurationError, match="looks like"):
         public_origin(url)
 
 
-def test_cookies_are_for_our_pages_alone(file: AccessFile) -> None:
+def test_cookies_are_sent_to_our_pages_alone(file: AccessFile) -> None:
     token = file.give("Anna", Role.VIEWER, time.time() + HOUR)
     for address, secure in ((LOOPBACK, False), (OPEN, True), (PROXIED, True)):
         authenticator = Authenticator(file, 8080, address)
@@ -176,12 +178,12 @@ def test_cookies_are_for_our_pages_alone(file: AccessFile) -> None:
         assert "set-cookie" not in response.headers
 
 
-# The whole way
+# With a real server
 
 
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[AppServer, Path]]:
-    """A server that asks for links, and the file they are kept in."""
+    """Start a server that requires links; yield it and the access file."""
     path = tmp_path_factory.mktemp("access") / "access.json"
     AccessFile.create(path)
     with AppServer((*APP, "--access", str(path))) as server:
@@ -282,7 +284,7 @@ def test_stop_press_over_two_channels_counts_once() -> None:
                 post("?press=one")
                 await asyncio.sleep(0.3)
                 assert control.status["stopped"] is None
-                # One that is like no other is a new one, whatever it is called.
+                # A press with another name counts as a new one.
                 for query in ("?press=two", "?press=" + 100 * "x", "?press=", ""):
                     post(query)
                     await control.wait(mood="stopped")
@@ -321,7 +323,7 @@ def test_no_link_is_in_the_log(guarded: tuple[AppServer, Path]) -> None:
     assert json.loads(path.read_text())["secret"] not in server.output
 
 
-def test_the_commands_give_list_and_take_back(
+def test_access_commands_give_list_and_revoke(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "access.json"
@@ -344,7 +346,7 @@ def test_the_commands_give_list_and_take_back(
         main([*give_anna[:4], "--for", "forever", *options])
 
 
-def test_open_to_others_it_wants_links_or_a_word() -> None:
+def test_public_server_needs_links_or_an_explicit_option() -> None:
     command = [sys.executable, "-m", "katana450", "serve", "--host", "0.0.0.0"]
     done = subprocess.run(
         [*command, "--port", str(free_port())],
@@ -363,7 +365,7 @@ def test_open_to_others_it_wants_links_or_a_word() -> None:
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")
-def test_it_speaks_https(tmp_path: Path) -> None:
+def test_server_uses_https(tmp_path: Path) -> None:
     cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
     options = ("-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost")
     names = ("-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1")
@@ -384,7 +386,7 @@ def test_it_speaks_https(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (("--tls-cert", "/nowhere"), "both --tls-cert and --tls-key"),
         (("--tls-cert", "/nowhere", "--tls-key", "/nowhere"), "no certificate"),
@@ -393,7 +395,7 @@ def test_it_speaks_https(tmp_path: Path) -> None:
     ],
 )
 def test_invalid_setting_is_reported(
-    options: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+    options: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["serve", "--port", str(free_port()), *options]) == 1
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err

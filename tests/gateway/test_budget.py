@@ -1,4 +1,4 @@
-"""What questions may cost, and who pays."""
+"""Test the processor time that questions may cost, and the accounts that pay."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from katana450.server.service.budget import (
 
 
 class Clocks:
-    """A clock, and a processor that works for a second of it when told to."""
+    """A clock, and a processor time that advances on request."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -41,13 +41,13 @@ def test_all_windows_of_an_identity_pay_from_one_budget() -> None:
         clocks.ask(budgets.of("a"), 0.0)
     assert refused.value.retry == pytest.approx(0.1)
     assert isinstance(refused.value, InputError)
-    assert "Ask again in" in str(refused.value)
+    assert "Try again in" in str(refused.value)
     clocks.ask(budgets.of("b"), 0.01)
     clocks.now += 1.01
     clocks.ask(budgets.of("a"), 0.0)
 
 
-def test_the_retry_time_is_long_enough() -> None:
+def test_retry_time_is_long_enough() -> None:
     clocks = Clocks()
     budget = clocks.budgets().of("a")
     clocks.ask(budget, 3.0 * IDENTITY_BUDGET)
@@ -57,7 +57,7 @@ def test_the_retry_time_is_long_enough() -> None:
     clocks.ask(budget, 0.0)
 
 
-def test_a_crowd_shares_a_budget_that_the_driver_does_not_need() -> None:
+def test_viewers_share_a_budget_and_the_driver_does_not() -> None:
     clocks = Clocks()
     budgets = clocks.budgets()
     viewers = [budgets.of(name) for name in "abc"]
@@ -66,7 +66,7 @@ def test_a_crowd_shares_a_budget_that_the_driver_does_not_need() -> None:
     with pytest.raises(BusyError) as refused:
         clocks.ask(viewers[2], 0.0)
     assert not refused.value.gone
-    # What is no question is kept from nobody by others, such as to ask for the arm.
+    # Other requests than questions do not depend on the shared budget.
     clocks.ask(viewers[2], 0.0, question=False)
     clocks.ask(viewers[2], IDENTITY_BUDGET / 2.0, driver="c/page")
     with pytest.raises(BusyError):
@@ -83,7 +83,7 @@ def test_another_window_of_the_driver_cannot_empty_the_drivers_budget() -> None:
         clocks.ask(budget, 0.0)
 
 
-def test_an_identity_that_asks_on_regardless_is_sent_away_and_forgiven() -> None:
+def test_identity_that_ignores_refusals_is_disconnected_and_later_accepted() -> None:
     clocks = Clocks()
     budget = clocks.budgets().of("a")
     clocks.ask(budget, IDENTITY_BUDGET)
@@ -100,8 +100,8 @@ def test_an_identity_that_asks_on_regardless_is_sent_away_and_forgiven() -> None
     clocks.ask(budget, 0.0)
 
 
-def test_the_budget_has_room_for_several_windows_with_their_instruments() -> None:
-    """Thirty states and ten jogs a second, at three times what a state costs here."""
+def test_budget_is_sufficient_for_several_windows_with_instruments() -> None:
+    """Each window requests 30 states and 10 jogs per second, at three times the measured cost."""
     clocks = Clocks()
     budgets = clocks.budgets()
     for tick in range(10 * 30):

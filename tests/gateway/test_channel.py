@@ -1,4 +1,4 @@
-"""Who asks a lot, beside others who have a turn too."""
+"""Test channels of flooding clients, which must not delay others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ASKED = 200
 
 
 class Torrent:
-    """A line on which everything has arrived already."""
+    """A connection on which all requests have already arrived."""
 
     def __init__(self) -> None:
         self.left = ASKED
@@ -38,7 +38,7 @@ class Torrent:
 
 
 class Deaf(Torrent):
-    """One that takes in nothing, not even a farewell."""
+    """A connection that accepts no data, not even a close frame."""
 
     async def send(self, _text: str) -> None:
         await asyncio.Event().wait()
@@ -47,7 +47,7 @@ class Deaf(Torrent):
         await asyncio.Event().wait()
 
 
-def test_many_requests_of_one_client_delay_nobody_else() -> None:
+def test_flooding_client_does_not_delay_others() -> None:
     async def ask() -> list[int]:
         hub, torrent = Hub(time.monotonic), Torrent()
         program = ProgramChannel(hub, torrent, Budgets(hub.clock).of("a"))

@@ -1,4 +1,4 @@
-"""No call of the client waits for ever, whatever the server does."""
+"""Test that every call of the client ends, whatever the server does."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from katana450.client.files import LostError
 from katana450.server.api import answers, requests
 
 BOUND = 5.0
-"""[s] Far longer than the timeouts that are set here."""
+"""Maximum duration of a test [s], much longer than the timeouts set here."""
 
 TIMEOUT = 0.3
 
 
 @pytest.fixture(autouse=True)
-def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+def _short_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(asynchronous, "ANSWER_TIMEOUT", TIMEOUT)
 
 
 def _talk(handler: Callable[[ServerConnection], Awaitable[None]], act: str) -> None:
-    """Have a client do ``act`` with a server that does ``handler``; it must end in a LostError."""
+    """Run ``act`` of a client with a server that runs ``handler``; expect a LostError."""
 
     async def run() -> None:
         async with serve(handler, "127.0.0.1", 0, compression=None, close_timeout=0.1) as server:
@@ -68,7 +68,7 @@ async def _mute(connection: ServerConnection) -> None:
 
 async def _welcoming(connection: ServerConnection) -> None:
     await connection.send(WELCOME)
-    # It reads what comes, and answers nothing.
+    # The server reads all requests and answers none.
     async for _ in connection:
         pass
 
@@ -93,21 +93,21 @@ async def _babbling(connection: ServerConnection) -> None:
     await connection.wait_closed()
 
 
-def test_a_server_that_never_welcomes_is_given_up() -> None:
+def test_missing_welcome_raises_an_error() -> None:
     _talk(_mute, "ask")
 
 
-def test_a_request_that_is_never_answered_is_given_up() -> None:
+def test_missing_answer_raises_an_error() -> None:
     _talk(_welcoming, "ask")
 
 
-def test_states_that_never_come_are_given_up() -> None:
+def test_missing_states_raise_an_error() -> None:
     _talk(_silent_watch, "states")
 
 
-def test_client_gives_up_on_a_server_that_reads_nothing() -> None:
+def test_server_that_reads_nothing_raises_an_error() -> None:
     _talk(_deaf, "tell")
 
 
-def test_a_server_that_speaks_another_language_is_given_up() -> None:
+def test_server_with_another_protocol_raises_an_error() -> None:
     _talk(_babbling, "states")

@@ -1,4 +1,4 @@
-"""The command gate: lease, stop and the age of a gesture, with viser's hook and with threads."""
+"""Test the command gate: lease, stop and age of a gesture, with viser's hook and with threads."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
     for upto in range(len(entries)):
         table.arm.event_log = tuple(entries[max(upto - 1, 0) : upto + 1])
         table.wait(TICK)
-    lines = [serialize.line(line) for line in table.hub.event_log.lines]
+    lines = [serialize.log_line(line) for line in table.hub.event_log.lines]
     assert [line.who for line in lines] == [None, driver.person.name, "Vera", None]
     assert [line.command for line in lines] == ["", "MoveTool", "Stop", "Stop"]
     assert [line.grounds for line in lines] == [
@@ -83,26 +83,26 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
         "anybody may stop the arm",
         "protection by the server",
     ]
-    told = [line.finding for line in lines]
-    assert [each.reason for each in told] == ["axis limit", "contact", "stopped", "stopped"]
-    amounts = [(each.amount, each.unit) for each in told[:3]]
+    reported = [line.finding for line in lines]
+    assert [each.reason for each in reported] == ["axis limit", "contact", "stopped", "stopped"]
+    amounts = [(each.amount, each.unit) for each in reported[:3]]
     assert amounts == [(0.5, "rad"), (0.006, "m"), (0.02, "m")]
-    assert told[0].axis == 2
-    assert told[1].parts == ("finger_left_link", "table")
-    assert told[2].seconds == 0.3
-    assert "press Clear stop" in told[2].text
+    assert reported[0].axis == 2
+    assert reported[1].parts == ("finger_left_link", "table")
+    assert reported[2].seconds == 0.3
+    assert "press Clear stop" in reported[2].text
 
 
-def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:
+def test_server_may_stop_hold_and_slow_but_not_move(table: Table) -> None:
     gate = table.hub.gate
-    with pytest.raises(LeaseError, match="does not move"):
+    with pytest.raises(LeaseError, match="may not move"):
         gate.submit(cmd.Home(), SERVER)
     gate.submit(cmd.SpeedScale(0.5), SERVER)
     gate.submit(cmd.Hold(), SERVER)
     assert (table.arm.fraction, table.arm.holds, table.hub.lease.holder) == (0.5, 1, None)
 
 
-def test_gesture_let_through_before_a_stop_is_refused_after_it_was_cleared(table: Table) -> None:
+def test_gesture_from_before_a_stop_is_refused_after_clear_stop(table: Table) -> None:
     driver = table.join(PAGES[0])
     gesture = table.touch(driver.person.key)
     table.stop("Vera")
@@ -116,7 +116,7 @@ def test_gesture_let_through_before_a_stop_is_refused_after_it_was_cleared(table
     assert table.arm.commands == [cmd.Home()]
 
 
-def test_gesture_from_before_the_lease_was_lost_takes_no_free_lease(table: Table) -> None:
+def test_gesture_from_before_a_lost_lease_acquires_no_lease(table: Table) -> None:
     driver = table.join(PAGES[0])
     gesture = table.touch(driver.person.key)
     table.hub.release_lease(driver)
@@ -126,7 +126,7 @@ def test_gesture_from_before_the_lease_was_lost_takes_no_free_lease(table: Table
 
 
 def test_no_gesture_of_another_thread_passes_a_stop(table: Table) -> None:
-    """Of each accepted command, every stop before it was made before its gesture was received."""
+    """Every stop before an accepted command was made before the receipt of its gesture."""
     driver = table.join(PAGES[0])
     gate, done = table.hub.gate, threading.Event()
 
@@ -174,7 +174,7 @@ def test_no_gesture_of_another_thread_passes_a_stop(table: Table) -> None:
 
 
 class Hooked:
-    """viser's hook for one browser of a window, without the gateway's end of its socket."""
+    """The hook of viser for one browser of a window, without the gateway's end of its socket."""
 
     def __init__(self, table: Table, server: viser.ViserServer, window: Window) -> None:
         self.gate = table.hub.gate
@@ -188,11 +188,11 @@ class Hooked:
         internals.pretend_client(server, CLIENT, client)
 
     def receive(self) -> None:
-        """The gateway receives a message and passes it on."""
+        """Receive a message in the gateway and pass it on."""
         self.slot.stamps.append(self.gate.revocations)
 
     async def handle(self, message: Any) -> None:
-        """Viser comes to handle it."""
+        """Handle the message in viser."""
         await self.gestures._handle(CLIENT, message)
         await asyncio.sleep(0)
 
@@ -208,7 +208,7 @@ def viser_server() -> Iterator[viser.ViserServer]:
 def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
     table: Table, viser_server: viser.ViserServer
 ) -> None:
-    """The slider was moved before STOP and clear, and viser comes to it after both."""
+    """The slider moves before STOP and clear, and viser handles the message after both."""
     driver = table.join(PAGES[0])
 
     async def slide() -> None:
@@ -222,7 +222,7 @@ def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
         await hooked.handle(moved)
         assert (table.arm.commands, slider.value) == ([], 0.0)
         assert "Do it again" in hooked.refusals[0]
-        # The window is shown the truth.
+        # The window gets the true value.
         (correction,) = hooked.corrections
         assert correction.updates == {"value": 0.0}
         hooked.receive()

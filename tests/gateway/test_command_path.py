@@ -1,7 +1,7 @@
-"""Every gesture in the scene reaches the arm by the command gate, from raw viser sockets.
+"""Test that every gesture in the scene passes the command gate, with raw viser sockets.
 
-The server is a process of its own. The ticket of the newest state counts the commands that the arm
-was given, so an unchanged ticket proves that none got through.
+The server is a separate process. The ticket of the newest state counts the commands to the arm, so
+an unchanged ticket proves that none got through.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FAR = [1.2, 0.0, 0.5]
 """[m] Out of reach."""
 
 SETTLED = 0.3
-"""[s] The server has done what it was sent, and would have shown it."""
+"""Time [s] in which the server has handled all messages and shown their effects."""
 
 
 @pytest.fixture(scope="module")
@@ -51,12 +51,12 @@ async def end(peer: Peer, name: str = HANDLE) -> None:
 
 
 def placed(heard: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Messages that put the handle elsewhere."""
+    """Return the messages that move the handle."""
     return [m for m in heard if m["type"] == "SetPositionMessage" and m["name"] == HANDLE]
 
 
 async def at_rest(watcher: AsyncClient, after: int = 0) -> answers.State:
-    """Return the state as soon as the arm rests and more than ``after`` commands were given."""
+    """Return the state once the arm rests and more than ``after`` commands were given."""
     async with asyncio.timeout(20.0):
         while True:
             state = await watcher.query(answers.State)
@@ -66,7 +66,7 @@ async def at_rest(watcher: AsyncClient, after: int = 0) -> answers.State:
 
 
 async def unmoved(watcher: AsyncClient, before: answers.State) -> bool:
-    """Whether the arm is given no command while what was sent is done."""
+    """Return whether the arm gets no command while the server handles the messages."""
     await asyncio.sleep(SETTLED)
     now = await watcher.query(answers.State)
     return (now.ticket, now.goal) == (before.ticket, before.goal)
@@ -90,7 +90,7 @@ def test_handle_moved_by_a_spectator_springs_back(
             await taken_by(driving)
             before = await at_rest(watcher)
             await driver.listen()
-            # Nobody holds the handle; then the driver does.
+            # First the lease is free; then the driver holds it.
             for held in (False, True):
                 if held:
                     await start(driver)
@@ -115,7 +115,7 @@ def test_handle_moved_by_a_spectator_springs_back(
     asyncio.run(drag())
 
 
-def test_take_over_ends_the_drag_of_the_other(server: AppServer) -> None:
+def test_take_over_ends_the_drag_of_the_former_driver(server: AppServer) -> None:
     async def drag() -> None:
         async with (
             opened(server.url) as (first, driving),
@@ -131,7 +131,7 @@ def test_take_over_ends_the_drag_of_the_other(server: AppServer) -> None:
             for y in (0.1, 0.15, 0.2):
                 await move(first, 0.45, y, 0.4)
             assert await unmoved(watcher, before)
-            # Neither does it move on as a part of the drag of the new driver.
+            # Its messages do not count as a part of the new driver's drag either.
             await start(second)
             await asyncio.sleep(SETTLED)
             await move(first, 0.45, 0.25, 0.4)
@@ -148,7 +148,7 @@ def test_take_over_ends_the_drag_of_the_other(server: AppServer) -> None:
     asyncio.run(drag())
 
 
-def test_drag_from_before_a_stop_moves_nothing_after_it_was_cleared(server: AppServer) -> None:
+def test_drag_from_before_a_stop_moves_nothing_after_clear_stop(server: AppServer) -> None:
     async def drag() -> None:
         async with (
             opened(server.url) as (peer, control),
@@ -169,7 +169,7 @@ def test_drag_from_before_a_stop_moves_nothing_after_it_was_cleared(server: AppS
             await end(peer)
             assert await unmoved(watcher, before)
             assert placed(await peer.listen())
-            # A new one does.
+            # A new drag moves the arm.
             await start(peer)
             await move(peer, 0.45, 0.05, 0.4)
             await end(peer)

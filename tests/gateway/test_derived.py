@@ -1,4 +1,4 @@
-"""Answers that follow from a snapshot are worked out once, whoever asks."""
+"""Test that answers that depend on a snapshot alone are computed once for all clients."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_branches_are_computed_once_per_snapshot() -> None:
     assert len(computed) == 2
 
 
-def test_what_was_worked_out_goes_with_its_snapshot() -> None:
+def test_cached_values_are_dropped_with_their_snapshot() -> None:
     gc.collect()
     snapshot = _snapshot()
     before = len(derived._FOUND)
@@ -60,7 +60,7 @@ def test_what_was_worked_out_goes_with_its_snapshot() -> None:
     assert len(derived._FOUND) == before
 
 
-def test_an_error_is_not_kept() -> None:
+def test_error_is_not_cached() -> None:
     snapshot = _snapshot()
 
     def fail() -> int:

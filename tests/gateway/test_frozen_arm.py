@@ -1,4 +1,4 @@
-"""The arm's process frozen or without its control loop: reported in time, and stopped after it."""
+"""Test a frozen process of the arm, and one without a control loop: reported and stopped."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 REPORTED = 0.5
-"""[s] By then it is said that no state comes; a busy machine is given as long again."""
+"""Time [s] after which missing states are reported; a busy machine gets twice as long."""
 
-# Ends the control thread as soon as the arm moves, as a fault that nobody foresaw would.
+# Ends the control thread as soon as the arm moves, like an unexpected error.
 FATAL = """
 import sys
 from katana450.cli.main import main
@@ -47,7 +47,7 @@ if __name__ == "__main__":
 
 @contextmanager
 def frozen(process: int) -> Iterator[None]:
-    """``process`` does nothing meanwhile."""
+    """Suspend ``process`` inside the ``with`` block."""
     os.kill(process, signal.SIGSTOP)
     try:
         yield
@@ -68,15 +68,15 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
                 assert ask(f"{server.url}/health")[0] == 200
                 with frozen(server.pid):
                     began = time.monotonic()
-                    await control.wait(headline="No word from the arm")
+                    await control.wait(headline="No answer from the arm")
                     assert time.monotonic() - began < 2 * REPORTED
-                    status, _, said = ask(f"{server.url}/health")
-                    assert (status, b"No word from the arm" in said) == (503, True)
+                    status, _, body = ask(f"{server.url}/health")
+                    assert (status, b"No answer from the arm" in body) == (503, True)
                     await control.say("stop")
-                    told = await control.wait(stop="requested")
-                    assert (told["mood"], told["headline"]) == ("stopped", "Stop requested")
-                    assert "not confirmed" in told["why"]
-                    # Longer than a pipe full of heartbeats: nothing blocks, and STOP is answered.
+                    shown = await control.wait(stop="requested")
+                    assert (shown["mood"], shown["headline"]) == ("stopped", "Stop requested")
+                    assert "not confirmed" in shown["why"]
+                    # Longer than it takes to fill a pipe with heartbeats: STOP is still answered.
                     await asyncio.sleep(6.0)
                     state = arm.query(answers.State)
                     assert state.stop == "requested"
@@ -84,14 +84,14 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
                     assert control.status["stop"] == "requested"
                     assert isinstance(arm.ask(requests.Stop()), answers.Done)
                     assert ask(f"{server.url}/health")[0] == 503
-                told = await control.wait(stop="confirmed")
-                assert (told["mood"], told["headline"]) == ("stopped", "Stopped")
+                shown = await control.wait(stop="confirmed")
+                assert (shown["mood"], shown["headline"]) == ("stopped", "Stopped")
                 await asyncio.sleep(1.0)
                 state = arm.query(answers.State)
                 assert state.stop == "confirmed"
                 assert state.age < 1.0
                 assert not state.moving
-                # It went on from where it was, to where it could brake.
+                # The arm continued from its place to where it could brake.
                 assert state.q[0] - before.q[0] < 1.5
                 assert state.q[0] < FAR[0] - 0.2
                 assert ask(f"{server.url}/health")[::2] == (200, b"ok\n")
@@ -100,7 +100,7 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
         asyncio.run(act(server))
 
 
-def test_arm_that_was_frozen_stands_still_and_waits_for_a_reset() -> None:
+def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
     command = (*ATTENTIVE_APP, "--silence", "0.6", "--lines", "0")
     with AppServer(command) as server, speaking(server, "Driver") as driver:
         driver.say(do="joints", q=FAR.tolist())

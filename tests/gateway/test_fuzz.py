@@ -1,4 +1,4 @@
-"""Thousands of broken messages at every socket: nothing falls or moves, and who drives goes on."""
+"""Test thousands of broken messages at every socket: no crash, no motion, no other driver."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from tests.gateway.client import (
 )
 
 MESSAGES = 10_000 if "KATANA450_LONG" in os.environ else 1_000
-"""At all sockets together."""
+"""Number of mutants at all sockets together."""
 
 PAUSE = 0.003
-"""[s] In which a line of JSON is read."""
+"""Time in which a line of JSON is read [s]."""
 
 HERE = "127.0.0.1"
 
@@ -57,7 +57,7 @@ JSON: list[dict[str, Any]] = [
     {"do": "query", "at": "arm"},
     {"do": "watch", "hz": 10},
 ]
-"""What the mutants come from. No STOP: that is everybody's."""
+"""Messages that are mutated. STOP is not among them, because every client may send it."""
 
 VISER: list[dict[str, Any]] = [
     {"type": "TransformControlsDragStartMessage", "name": "/target/move", "owner": ""},
@@ -77,7 +77,7 @@ Send = Callable[[bytes], Awaitable[None]]
 
 
 def changed(message: Any, rng: random.Random, nasty: tuple[Any, ...]) -> Any:
-    """``message`` with one of its parts replaced, taken away, doubled or added."""
+    """Return ``message`` with one of its parts replaced, removed, doubled or added."""
     if isinstance(message, dict) and message and rng.random() < 0.8:
         copy: dict[Any, Any] = {**message}
         key = rng.choice(list(copy))
@@ -98,7 +98,7 @@ def changed(message: Any, rng: random.Random, nasty: tuple[Any, ...]) -> Any:
 
 
 def broken(data: bytes, rng: random.Random) -> bytes:
-    """``data`` cut, with bits turned, or with something else in its middle."""
+    """Return ``data`` cut, with flipped bits, or with other bytes inserted."""
     if not data:
         return data
     at = rng.randrange(len(data))
@@ -116,7 +116,7 @@ def broken(data: bytes, rng: random.Random) -> bytes:
 
 
 def json_mutant(rng: random.Random) -> bytes:
-    """Never a whole STOP, nor two lines."""
+    """Return a broken request that is neither a valid STOP nor two lines."""
     message = rng.choice(JSON)
     for _ in range(rng.randint(1, 3)):
         message = changed(message, rng, NASTY)
@@ -138,7 +138,7 @@ def viser_mutant(rng: random.Random, uuids: list[str]) -> bytes:
 
 
 async def pour_in(count: int, mutant: Callable[[], bytes], line: Callable[[], Any]) -> int:
-    """Send so many mutants, on a new ``line`` whenever one is closed; how many lines it took."""
+    """Send ``count`` mutants, on a new ``line`` after each close; return the number of lines."""
     sent = lines = 0
     while sent < count:
         lines += 1
@@ -151,7 +151,7 @@ async def pour_in(count: int, mutant: Callable[[], bytes], line: Callable[[], An
 
 
 class WebLine:
-    """A websocket whose answers are thrown away, and the sockets it needs beside it."""
+    """A websocket whose answers are ignored, with the other sockets that it needs."""
 
     def __init__(self, url: str, path: str, **options: Any) -> None:
         self._url, self._path, self._options = url, path, options
@@ -179,7 +179,7 @@ class WebLine:
                 await socket.send(data)
             else:
                 await socket.send(data.decode(errors="replace"))
-            # Once it is answered, what went before was read.
+            # Once this is answered, all messages before it were read.
             await (await socket.ping())
 
         return send
@@ -189,7 +189,7 @@ class WebLine:
 
 
 class TcpLine:
-    """The port for JSON lines, after a good hello."""
+    """A connection to the port for JSON lines, after a valid ``hello``."""
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -221,7 +221,7 @@ class TcpLine:
 
 
 async def storm(server: AppServer, lines_port: int, uuids: list[str]) -> dict[str, int]:
-    """All of it at once."""
+    """Send mutants to all sockets at the same time."""
     url, fraction = server.url, MESSAGES // 4
     rngs = [random.Random(seed) for seed in range(4)]
     kinds: dict[str, tuple[Callable[[], bytes], Callable[[], Any]]] = {
@@ -241,7 +241,7 @@ async def storm(server: AppServer, lines_port: int, uuids: list[str]) -> dict[st
 
 
 async def learned(url: str) -> list[str]:
-    """The numbers of the panel's controls, as every browser is told them."""
+    """Return the numbers of the panel's controls, which every browser gets."""
     async with websocket(
         url, f"/viser?page={page_name()}", enter(url), subprotocols=[SUBPROTOCOL]
     ) as socket:
@@ -251,7 +251,7 @@ async def learned(url: str) -> list[str]:
 
 
 def kept(state: answers.State) -> tuple[Any, ...]:
-    """What nobody but who holds the arm may change."""
+    """Return the values of ``state`` that only the driver may change."""
     return (
         state.q,
         state.goal,
@@ -264,7 +264,7 @@ def kept(state: answers.State) -> tuple[Any, ...]:
     )
 
 
-def test_nothing_falls_and_nothing_moves(server: AppServer) -> None:
+def test_broken_messages_cause_no_crash_and_no_motion(server: AppServer) -> None:
     lines_port = int(server.output.rpartition(f"JSON lines on {HERE}:")[2].split(".")[0])
     with connect_program(server.url, "Driver") as arm:
         arm.ask(requests.Acquire())
@@ -275,7 +275,7 @@ def test_nothing_falls_and_nothing_moves(server: AppServer) -> None:
         print(f"{MESSAGES} messages; lines it took: {taken}")
         assert kept(arm.query(answers.State)) == kept(before)
         assert arm.query(answers.Objects).objects == objects
-        # Whoever drives, drives on.
+        # The driver keeps the lease and can drive.
         q = np.add(before.q, (0.2, 0.0, 0.0, 0.0, 0.0))
         assert np.allclose(arm.joints(q).q, q, atol=1e-9)
     assert server.running

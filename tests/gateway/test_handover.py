@@ -1,4 +1,4 @@
-"""Requests for the arm, take-overs, and the name behind a STOP, on a real server."""
+"""Test requests for the lease, take-overs, and the name of who stopped, on a real server."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_owner_of_a_running_program_decides_about_requests(server: AppServer) ->
             await other.say("ask")
             await other.wait(asked=True)
             (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]
-            # Nobody else decides.
+            # No other participant may decide.
             await other.say("decline", to=asking["number"])
             assert "do not hold" in (await other.notice("refused"))["why"]
             await owner.say("decline", to=asking["number"])
@@ -85,7 +85,7 @@ def test_owner_of_a_running_program_decides_about_requests(server: AppServer) ->
 
 
 async def numbered(owner: Control, other: Control) -> dict[str, Any]:
-    """Return ``other`` as the only one in the list of ``owner`` of who asks."""
+    """Return ``other`` as the only entry in the list of requests that ``owner`` gets."""
     async with asyncio.timeout(5.0):
         while not owner.status["asking"]:
             await asyncio.sleep(0.01)
@@ -95,7 +95,7 @@ async def numbered(owner: Control, other: Control) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("by_program", [False, True])
-def test_former_driver_is_told_who_took_over(server: AppServer, by_program: bool) -> None:
+def test_former_driver_gets_the_name_of_the_new_one(server: AppServer, by_program: bool) -> None:
     async def act() -> None:
         async with (
             controlling(server.url, enter(server.url)) as driver,
@@ -130,18 +130,18 @@ def test_stop_names_the_page_that_pressed_it_after_a_restart() -> None:
 
     async def name(server: AppServer, cookie: str) -> str:
         async with controlling(server.url, cookie, page) as control:
-            said: str = (await control.wait())["name"]
-            return said
+            name_shown: str = (await control.wait())["name"]
+            return name_shown
 
     with AppServer() as server:
         cookie = enter(server.url)
         assert press(server, cookie) == f"{asyncio.run(name(server, cookie))} pressed STOP."
         server.restart()
-        # The page has no socket yet, and is the same person once it has one.
+        # The page has no socket yet; with a socket it is the same person.
         stopped = press(server, cookie)
         assert stopped == f"{asyncio.run(name(server, cookie))} pressed STOP."
         assert "Somebody" not in stopped
-        # A page that says no name of its own cannot be told from others.
+        # A page without a key of its own cannot be identified.
         server.restart()
         page = "short"
         assert press(server, cookie) == "Somebody pressed STOP."

@@ -1,4 +1,4 @@
-"""A front that is held up again and again: a dead driver's arm stops, a live one's goes on."""
+"""Test a front end that is suspended repeatedly: only the arm of a dead driver stops."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ pytestmark = pytest.mark.skipif(
 
 SILENCE = 1.0
 HELD_UP = 0.6
-"""[s] Longer than half the silence, each time."""
+"""Duration of each suspension [s], longer than half the heartbeat timeout."""
 
 LOADED = 3.0
-"""[s] So long that goes on."""
+"""Total duration of the load [s]."""
 
 
-# A dead driver's server is awake for less than two looks, a live one's for long enough to tell the
-# arm that it is there.
+# With a dead driver the server is awake for less than two checks. With a live one it is awake for
+# long enough to send a heartbeat to the arm.
 @pytest.mark.parametrize(
     ("alive", "awake"), [(False, 0.01), pytest.param(True, 0.1, marks=pytest.mark.long)]
 )
@@ -64,7 +64,7 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
             if line["began"] and line["finding"]["reason"] == "stopped"
         ]
         took = datetime.fromisoformat(stopped[-1]).timestamp() - last
-        # As soon as it is awake again, and not once the load has ended.
+        # The stop comes as soon as the server is awake, not after the end of the load.
         assert took < SILENCE + 2 * HELD_UP
 
     with AppServer((*ATTENTIVE_APP, "--silence", str(SILENCE))) as server:

@@ -1,6 +1,6 @@
-"""Hostile clients: what they send changes nothing and harms nobody else.
+"""Test hostile clients: their messages change nothing and harm no other client.
 
-The other browser here is a raw client too, so that what it is sent can be looked at byte for byte.
+The other browser is a raw client too, so that the messages to it can be compared byte for byte.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from tests.gateway.client import (
 )
 
 BRIEF = 0.1
-"""[s] Long enough for the next frame: six of the view's."""
+"""Time [s] in which the next frame arrives: six periods of the view."""
 
 Attack = Callable[[Peer], Any]
 
@@ -52,7 +52,7 @@ def server() -> Iterator[AppServer]:
 
 
 async def drag(peer: Peer, wxyz: list[float], position: list[float], **changed: str) -> None:
-    """Take hold of a gizmo, and drag it to a pose."""
+    """Grab a gizmo, and drag it to a pose."""
     which = {"name": GIZMO["name"], "owner": "", **changed}
     await peer.say(type="TransformControlsDragStartMessage", **which)
     await peer.say(**(which | {"type": GIZMO["type"], "wxyz": wxyz, "position": position}))
@@ -60,7 +60,7 @@ async def drag(peer: Peer, wxyz: list[float], position: list[float], **changed: 
 
 @asynccontextmanager
 async def peers(url: str) -> AsyncIterator[tuple[Peer, Peer]]:
-    """A page that means ill and one that watches."""
+    """Open a hostile page and one that watches."""
     async with opened(url) as (bad, _), opened(url) as (good, _):
         yield bad, good
 
@@ -127,7 +127,7 @@ async def moves_the_arm(good: Peer, degrees: float) -> list[dict[str, Any]]:
     return await good.listen()
 
 
-def test_a_message_no_page_sends_changes_nothing(server: AppServer) -> None:
+def test_message_that_no_page_sends_changes_nothing(server: AppServer) -> None:
     async def attack() -> None:
         async with peers(server.url) as (bad, good):
             for name, send in ATTACKS.items():
@@ -138,10 +138,10 @@ def test_a_message_no_page_sends_changes_nothing(server: AppServer) -> None:
     asyncio.run(attack())
 
 
-def test_what_is_no_message_is_not_answered(server: AppServer) -> None:
+def test_invalid_message_is_not_answered(server: AppServer) -> None:
     async def attack() -> None:
         async with peers(server.url) as (_, good):
-            # On a busy machine the scene comes with breaks.
+            # On a busy machine the scene arrives with pauses.
             await good.listen(1.0)
             for name, send in RUDE.items():
                 async with opened(server.url) as (bad, _):
@@ -167,7 +167,7 @@ def test_sender_of_repeated_bad_messages_is_disconnected(server: AppServer) -> N
 
 
 def test_closed_browser_receives_no_more_frames(server: AppServer) -> None:
-    """The scene is on its way to each of them when it is closed."""
+    """Each browser is closed while the scene is being sent to it."""
 
     async def knock(cookie: str) -> None:
         path = f"/viser?page={page_name()}"
@@ -188,7 +188,7 @@ def test_closed_browser_receives_no_more_frames(server: AppServer) -> None:
     assert "Traceback" not in server.output
 
 
-def test_after_all_that_the_arm_still_obeys_a_good_browser(server: AppServer) -> None:
+def test_arm_obeys_a_valid_browser_after_the_attacks(server: AppServer) -> None:
     async def obey() -> None:
         async with opened(server.url) as (bad, _), opened(server.url) as (good, control):
             await control.say("take")
@@ -197,12 +197,12 @@ def test_after_all_that_the_arm_still_obeys_a_good_browser(server: AppServer) ->
             heard = await moves_the_arm(good, 12.5)
             turned = [m for m in heard if m["type"] == "SetOrientationMessage"]
             assert any(m["name"].endswith("/pan_link") for m in turned)
-            # The other browser is told of the slider, and of the same motion.
-            told = await bad.listen()
+            # The other browser gets the slider, and the same motion.
+            messages = await bad.listen()
             assert {"value": 12.5} in [
-                m["updates"] for m in told if m["type"] == "GuiUpdateMessage"
+                m["updates"] for m in messages if m["type"] == "GuiUpdateMessage"
             ]
-            # And cannot move it, being somebody else; it is told the truth.
+            # The other browser does not hold the lease: it gets the true value back.
             await bad.set("Axis 1", value=30.0)
             (truth,) = [m for m in await bad.listen() if m["type"] == "GuiUpdateMessage"]
             assert truth["updates"] == {"value": 12.5}
@@ -214,8 +214,8 @@ def test_after_all_that_the_arm_still_obeys_a_good_browser(server: AppServer) ->
     assert "Dropped a GuiUpdateMessage" in server.output
 
 
-def test_an_attack_without_the_guard_would_do_harm() -> None:
-    """What the guard is for: bare viser lets the same message disable a control for everyone."""
+def test_attack_without_the_guard_would_do_harm() -> None:
+    """Without the guard, viser lets the same message disable a control for all browsers."""
 
     @asynccontextmanager
     async def bare_peers(url: str) -> AsyncIterator[tuple[Peer, Peer]]:
@@ -241,11 +241,11 @@ def test_an_attack_without_the_guard_would_do_harm() -> None:
         assert asyncio.run(attack(bare.url)) == []
 
 
-# Those who do not come by the front page
+# Clients that are not signed in
 
 
 def refusal(opening: connect) -> int:
-    """The status with which a socket is refused."""
+    """Return the status with which a websocket is refused."""
 
     async def knock() -> int:
         with pytest.raises(InvalidStatus) as refused:
@@ -258,7 +258,7 @@ def refusal(opening: connect) -> int:
 
 @pytest.mark.parametrize("path", ["/viser?page=", "/control?page="])
 @pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:1", "null", None])
-def test_another_sites_page_opens_no_socket(
+def test_page_of_another_site_opens_no_socket(
     server: AppServer, path: str, origin: str | None
 ) -> None:
     cookie = enter(server.url)
@@ -268,7 +268,7 @@ def test_another_sites_page_opens_no_socket(
     assert refusal(opening) == 403
 
 
-def test_another_sites_page_posts_nothing(server: AppServer) -> None:
+def test_page_of_another_site_posts_nothing(server: AppServer) -> None:
     cookie = enter(server.url)
     for path in ("/stop", "/enter"):
         for headers in ({}, {"Origin": "https://evil.example"}):
@@ -277,13 +277,13 @@ def test_another_sites_page_posts_nothing(server: AppServer) -> None:
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "[", "10.0.0.1"])
-def test_a_name_that_was_pointed_here_is_not_ours(server: AppServer, host: str) -> None:
-    status, _, said = ask(f"{server.url}/", Host=host)
+def test_foreign_host_name_is_refused(server: AppServer, host: str) -> None:
+    status, _, body = ask(f"{server.url}/", Host=host)
     assert status in (400, 403)
-    assert b"katana" not in said.lower()
+    assert b"katana" not in body.lower()
 
 
-def test_without_a_session_there_is_nothing_to_see(server: AppServer) -> None:
+def test_client_without_a_session_gets_no_scene(server: AppServer) -> None:
     opening = websocket(server.url, f"/viser?page={page_name()}", subprotocols=[SUBPROTOCOL])
     assert refusal(opening) == 403
     assert ask(f"{server.url}/viser/")[0] == 401
@@ -299,7 +299,7 @@ def test_without_a_session_there_is_nothing_to_see(server: AppServer) -> None:
 
 
 def viser_port(server: AppServer) -> int:
-    """The other port on which the process that people speak to listens."""
+    """Return the other port on which the front end listens."""
     inodes = {
         link.readlink().name.partition("[")[2].rstrip("]")
         for link in Path(f"/proc/{server.front}/fd").iterdir()
@@ -321,7 +321,7 @@ def test_viser_accepts_only_the_gateway(server: AppServer) -> None:
             f"ws://127.0.0.1:{port}", subprotocols=[SUBPROTOCOL], additional_headers=headers
         ) as socket:
             with suppress(ConnectionClosed):
-                # Said before it is sent away, so that it is already there to be read.
+                # Sent before the close, so that the answer can already be read.
                 for _ in range(50):
                     await socket.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
                 while True:
@@ -339,18 +339,18 @@ def test_viser_accepts_only_the_gateway(server: AppServer) -> None:
     asyncio.run(watch())
 
 
-# Those who want too much
+# Clients that send too much
 
 
 async def round_trip(control: Any) -> float:
-    """How long a status takes to come after a word that makes one."""
+    """Return the time [s] from a request to the status that it causes."""
     started = time.perf_counter()
     await control.say("take")
     await control.notice("refused")
     return time.perf_counter() - started
 
 
-def test_a_flood_is_closed_and_the_others_do_not_notice(server: AppServer) -> None:
+def test_flooding_client_is_closed_without_effect_on_others(server: AppServer) -> None:
     async def attack() -> None:
         async with opened(server.url) as (good, control):
             await control.say("take")
@@ -375,7 +375,7 @@ def test_a_flood_is_closed_and_the_others_do_not_notice(server: AppServer) -> No
     asyncio.run(attack())
 
 
-def test_a_large_message_is_not_taken(server: AppServer) -> None:
+def test_large_message_is_refused(server: AppServer) -> None:
     async def attack() -> None:
         async with peers(server.url) as (bad, good):
             with suppress(ConnectionClosed):
@@ -438,11 +438,11 @@ def test_browser_with_false_acknowledgements_is_closed(server: AppServer) -> Non
 
     for count in (-1, 10**6, 2**60):
         assert asyncio.run(lie(count)) == 1008
-    # What is no count at all is no message, once.
+    # A value that is not a count is an invalid message.
     assert asyncio.run(lie("all")) is None
 
 
-def test_client_that_never_reads_delays_nobody(server: AppServer) -> None:
+def test_client_that_never_reads_does_not_delay_others(server: AppServer) -> None:
     async def attack() -> None:
         async with opened(server.url) as (good, control), AsyncExitStack() as stack:
             await control.say("take")
@@ -470,7 +470,7 @@ def test_client_that_never_reads_delays_nobody(server: AppServer) -> None:
     asyncio.run(attack())
 
 
-def test_a_driver_whose_page_hangs_stops_the_arm_in_time() -> None:
+def test_hanging_page_of_the_driver_causes_a_stop_in_time() -> None:
     async def hang(url: str) -> list[float]:
         took = []
         async with opened(url) as (peer, control):
@@ -490,20 +490,20 @@ def test_a_driver_whose_page_hangs_stops_the_arm_in_time() -> None:
 
     with AppServer(ATTENTIVE_APP) as server:
         took = asyncio.run(hang(server.url))
-    # A status is told every tenth of a second.
+    # A status is sent every tenth of a second.
     assert min(took) >= Settings.silence
     assert min(took) < Settings.silence + 0.2
 
 
 @pytest.mark.long
-def test_there_is_room_for_many_and_no_more() -> None:
+def test_number_of_browsers_is_limited() -> None:
     async def crowd(server: AppServer) -> None:
         async with opened(server.url) as (good, _), AsyncExitStack() as stack:
             found_room: list[object] = []
 
-            async def crowd_in(most: int) -> None:
+            async def crowd_in(maximum: int) -> None:
                 cookie, before = enter(server.url), len(found_room)
-                while len(found_room) <= before + most:
+                while len(found_room) <= before + maximum:
                     path = f"/viser?page={page_name()}"
                     line = websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL])
                     found_room.append(await stack.enter_async_context(line))
@@ -516,7 +516,7 @@ def test_there_is_room_for_many_and_no_more() -> None:
                 assert len(found_room) - before == BROWSERS_EACH
             with pytest.raises(InvalidStatus):
                 await crowd_in(BROWSERS_EACH)
-            # One that a slow machine has not finished closing may still have its place.
+            # On a slow machine a connection that is still closing may hold its place.
             assert BROWSERS - 3 <= len(found_room) <= BROWSERS - 1
             assert await moves_the_arm(good, 3.0)
 
@@ -534,7 +534,7 @@ def test_there_is_room_for_many_and_no_more() -> None:
         "?playbackPath=",
     ],
 )
-def test_visers_page_is_not_sent_elsewhere(server: AppServer, query: str) -> None:
+def test_page_of_viser_is_not_redirected(server: AppServer, query: str) -> None:
     cookie = enter(server.url)
     host = server.url.removeprefix("http://")
     assert ask(f"{server.url}/viser/{query.format(host=host)}", Cookie=cookie)[0] == 400
@@ -562,5 +562,5 @@ def test_every_response_has_security_headers(server: AppServer) -> None:
 @pytest.mark.parametrize(
     "path", ["/static/../app/katana450/cli/main.py", "/static/%2e%2e/pyproject.toml"]
 )
-def test_no_other_file_is_given_out(server: AppServer, path: str) -> None:
+def test_no_other_file_is_served(server: AppServer, path: str) -> None:
     assert ask(server.url + path)[0] == 404

@@ -1,4 +1,4 @@
-"""Who may move the arm, told by a clock of the test's own."""
+"""Test the hub with a simulated clock: lease, stops and silence."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ PAGES = ("first-page-of-all", "second-page-of-all")
 
 
 class FakeArm:
-    """Remembers what it was told; moves when the test says so."""
+    """An arm that records its commands, and moves when a test sets ``moving``."""
 
-    # What a hub does not ask for.
+    # A hub does not use these.
     robot: Robot
     arm: MountedArm
     nodes: Nodes
@@ -76,7 +76,7 @@ class FakeArm:
 
     @property
     def snapshot(self) -> Snapshot:
-        """With every stop in it, unless the test says how many."""
+        """A snapshot with every stop, unless a test sets their number."""
         return Snapshot(self.state, self.stops if self.taken is None else self.taken)
 
     @property
@@ -118,7 +118,7 @@ class FakeArm:
 
 
 class Table:
-    """A hub, its arm, and the hands of a clock."""
+    """A hub with its arm and a clock that tests set."""
 
     def __init__(self, state: State, runner: Callable[[Hub], Runner] | None = None) -> None:
         self.t = 100.0
@@ -133,20 +133,20 @@ class Table:
         name: str | None = None,
         heartbeat: LastHeartbeat | None = None,
     ) -> Window:
-        told = self.told.setdefault(page, [])
-        return self.hub.join(Identity("session", name, role), page, told.append, heartbeat)
+        notices = self.told.setdefault(page, [])
+        return self.hub.join(Identity("session", name, role), page, notices.append, heartbeat)
 
     def touch(self, key: str) -> Actor:
-        """A control of the scene is touched in the window of ``key``."""
+        """Touch a control of the scene in the window of ``key``."""
         gate = self.hub.gate
         return gate.claim(self.hub.at_scene(key, gate.revocations))
 
     def stop(self, name: str, press: str | None = None) -> None:
-        """A participant of that name presses STOP."""
+        """Press STOP as a participant of ``name``."""
         self.hub.stop(actor_of(Identity("anybody", name, Role.VIEWER), CommandChannel.PAGE), press)
 
     def wait(self, seconds: float, *alive: Window) -> None:
-        """Let time pass, with heartbeats of those who are ``alive``."""
+        """Advance the clock, with heartbeats of the windows ``alive``."""
         end = self.t + seconds
         while self.t < end - 1e-9:
             self.t += min(TICK, end - self.t)
@@ -223,7 +223,7 @@ def test_stopped_arm_moves_only_after_clear_stop(table: Table) -> None:
     for act in acts:
         with pytest.raises(LeaseError, match="stopped"):
             act()
-    # Only who drives may end it.
+    # Only the driver may clear the stop.
     with pytest.raises(LeaseError, match="Window 1 holds"):
         table.hub.move(other, cmd.ClearStop())
     assert stands_still(table)
@@ -243,14 +243,14 @@ def test_repeated_stop_press_counts_once(table: Table) -> None:
     table.stop("Window 1", "another")
     assert stands_still(table)
     table.hub.move(driver, cmd.ClearStop())
-    # Without a name every one counts.
+    # Presses without a name all count.
     for _ in range(2):
         table.stop("Window 1")
         assert stands_still(table)
         table.hub.move(driver, cmd.ClearStop())
 
 
-def test_an_arm_that_lost_its_stop_is_stopped_again(table: Table) -> None:
+def test_arm_that_lost_its_stop_is_stopped_again(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.stop("Window 1")
     table.arm.stopped, table.arm.moves = False, True
@@ -275,7 +275,7 @@ def test_silent_driver_of_a_moving_arm_causes_a_stop(table: Table) -> None:
     assert not moves(table)
     assert table.hub.stopped is not None
     assert table.hub.stopped.why == "Window 1 fell silent while the arm moved."
-    # A word that comes late starts nothing anew.
+    # A late message starts no motion.
     table.hub.heartbeat(driver)
     with pytest.raises(LeaseError, match="clear the stop"):
         table.touch(driver.person.key)
@@ -299,7 +299,7 @@ def test_silent_driver_at_rest_loses_the_lease_without_a_stop(table: Table) -> N
     ],
     ids=["handed over", "taken", "given up"],
 )
-def test_another_driver_finds_an_arm_that_wants_nothing(
+def test_new_driver_gets_an_arm_without_targets(
     table: Table, change: Callable[[Hub, Window, Window], None]
 ) -> None:
     driver, other = (table.join(page) for page in PAGES)
@@ -318,7 +318,7 @@ def test_reloaded_page_keeps_its_identity(table: Table) -> None:
     again = table.join(PAGES[0])
     assert again.person == driver.person
     table.touch(again.person.key)
-    # The old socket's end comes after the new one's beginning.
+    # The old socket ends after the new one has begun.
     fresh = table.join(PAGES[0])
     table.hub.leave(again)
     assert table.hub.window(fresh.person.key) is fresh
@@ -355,12 +355,12 @@ def test_released_jog_is_ended_explicitly(table: Table) -> None:
     table.hub.move(driver, cmd.Jog(np.array((0.2, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE))
     table.hub.move(driver, cmd.Jog(np.array((0.0,) * 5), JogFrame.BASE))
     assert table.arm.jogs[-1] == ((0.0,) * 5, JogFrame.BASE)
-    # A driver who jogged no more and falls silent stops nothing.
+    # After the end of the jog a silent driver causes no stop.
     table.wait(2 * Settings.silence)
     assert table.arm.stops == 0
 
 
-def test_the_age_of_a_picture_is_that_of_the_windows_own(table: Table) -> None:
+def test_age_is_that_of_the_windows_own_picture(table: Table) -> None:
     first, second = (table.join(page) for page in PAGES)
     picture = FakePicture()
     table.hub.show(first.person.key, picture)
@@ -374,7 +374,7 @@ def test_the_age_of_a_picture_is_that_of_the_windows_own(table: Table) -> None:
 def test_no_lease_before_the_arm_is_ready() -> None:
     hub = Hub(lambda: 0.0)
     window = hub.join(Identity("session", None, Role.ADMIN), PAGES[0], lambda _: None)
-    with pytest.raises(LeaseError, match="not there yet"):
+    with pytest.raises(LeaseError, match="not ready yet"):
         hub.gate.claim(window.actor)
     hub.tick()
     hub.stop(window.actor)

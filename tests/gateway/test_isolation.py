@@ -1,4 +1,4 @@
-"""What people speak to may crash or freeze: the arm, in a process of its own, stops meanwhile."""
+"""Test crashes and freezes of the front end: the arm stops in its separate process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def server() -> Iterator[AppServer]:
 
 
 def under_way(arm: Client) -> answers.State:
-    """Set out for FAR; the state once the arm is on its way."""
+    """Start a motion to FAR; return the state once the arm moves."""
     arm.ask(requests.Joints(q=FAR.tolist()))
     while (state := arm.query(answers.State)).q[0] < 0.2:
         assert state.stopped is None
@@ -41,17 +41,17 @@ def under_way(arm: Client) -> answers.State:
 
 
 def again(server: AppServer, seconds: float = 60.0) -> answers.State:
-    """What the next front says first."""
+    """Return the first state of the restarted front end."""
     end = time.monotonic() + seconds
     while True:
-        # A front that is not quite there yet hangs up, or has no arm yet.
+        # A front end that is still starting closes connections, or has no arm yet.
         with suppress(KatanaError, TimeoutError), connect(server.url) as arm:
             return arm.query(answers.State)
         assert time.monotonic() < end, server.output
         time.sleep(0.2)
 
 
-def test_a_front_that_is_killed_comes_again_and_finds_an_arm_at_rest(server: AppServer) -> None:
+def test_killed_front_end_is_restarted_with_an_arm_at_rest(server: AppServer) -> None:
     killed = server.front
     with suppress(LostError), connect(server.url, "Driver") as arm:
         before = under_way(arm)
@@ -59,7 +59,7 @@ def test_a_front_that_is_killed_comes_again_and_finds_an_arm_at_rest(server: App
         arm.go(requests.Home())
     state = again(server)
     assert server.front != killed
-    assert state.stopped == "The arm lost the server and stopped."
+    assert state.stopped == "The arm lost the connection to the server and stopped."
     assert state.status == "stopped"
     assert before.q[0] < state.q[0] < FAR[0] - 0.2
     assert "ended with status -9" in server.output
@@ -71,23 +71,23 @@ def test_a_front_that_is_killed_comes_again_and_finds_an_arm_at_rest(server: App
         assert there.status == "ok"
 
 
-def test_a_front_that_freezes_stops_the_arm_in_time() -> None:
+def test_frozen_front_end_causes_a_stop_in_time() -> None:
     with AppServer(ATTENTIVE_APP) as server, connect(server.url, "Driver") as arm:
         before = under_way(arm)
         front = server.front
         os.kill(front, signal.SIGSTOP)
         time.sleep(1.5)
         os.kill(front, signal.SIGCONT)
-        # What came meanwhile is read first.
+        # Messages that arrived meanwhile are read first.
         while (state := arm.query(answers.State)).stopped is None:
             time.sleep(0.02)
-        # A quarter of a second of silence, and the way it takes to brake.
+        # A quarter of a second of silence, and the braking distance.
         assert state.q[0] - before.q[0] < 2.2 * 0.5 + 1.0
         assert state.q[0] < FAR[0] - 0.2
         assert "STOP" in server.output
 
 
-def test_when_the_arms_process_is_killed_the_other_goes_too(server: AppServer) -> None:
+def test_front_end_ends_with_the_process_of_the_arm(server: AppServer) -> None:
     front = server.front
     os.kill(server.pid, signal.SIGKILL)
     end = time.monotonic() + 10.0

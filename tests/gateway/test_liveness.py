@@ -1,4 +1,4 @@
-"""Silence is judged by when messages were received, on a test clock and on real sockets."""
+"""Test that silence is measured by the receipt of messages, on a test clock and real sockets."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from katana450.settings import Settings
 from tests.gateway.test_hub import PAGES, Table, moves
 
 LATE = 0.2
-"""[s] Between two looks of a server that is held up: within the silence that is allowed."""
+"""Interval [s] of the checks of a delayed server, shorter than the heartbeat timeout."""
 
 
 class Received(LastHeartbeat):
-    """A connection whose newest message was received when the test says, and not handled yet."""
+    """A connection whose newest message has a receipt time set by a test, and waits unhandled."""
 
     received = 0.0
 
@@ -46,7 +46,7 @@ def test_silent_driver_is_stopped_by_a_server_that_is_always_late(table: Table) 
         table.t += LATE
         table.hub.tick()
     assert not moves(table)
-    # The second look came after the allowed silence, so the arm heard of the first alone.
+    # The second check came after the timeout, so the arm got a heartbeat at the first alone.
     assert table.arm.beats == 2
 
 
@@ -62,7 +62,7 @@ def test_arm_gets_no_heartbeat_for_a_silent_driver_at_rest(table: Table) -> None
     assert table.hub.stopped is None
 
 
-def test_message_that_waits_for_a_late_server_is_no_silence(table: Table) -> None:
+def test_message_that_waits_for_a_late_server_counts(table: Table) -> None:
     heartbeat = Received(lambda: table.t)
     driver = table.join(PAGES[0], heartbeat=heartbeat)
     table.touch(driver.person.key)
@@ -72,14 +72,14 @@ def test_message_that_waits_for_a_late_server_is_no_silence(table: Table) -> Non
         heartbeat.received = table.t - 0.1
         table.hub.tick()
     assert moves(table)
-    # Messages that are handled late count from when they were received.
+    # Messages that are handled late count from their receipt.
     table.t += 0.2
     table.hub.heartbeat(driver)
     table.hub.tick()
     assert not moves(table)
 
 
-def test_reason_tells_a_silent_window_from_a_closed_one(table: Table) -> None:
+def test_reason_distinguishes_a_silent_window_from_a_closed_one(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.touch(driver.person.key)
     table.arm.moves = True
@@ -97,22 +97,22 @@ def test_stop_is_requested_until_a_newer_state_is_stopped(table: Table) -> None:
     table.stop("Vera")
     table.wait(0.2, driver)
     assert stage(table) == ("stopped", "requested")
-    # A state that is stopped, but older than the request, confirms nothing.
+    # A stopped state that is older than the request does not confirm it.
     table.arm.stopped = True
     table.wait(TICK, driver)
     assert stage(table) == ("stopped", "requested")
     table.arm.taken = table.arm.stops
     table.wait(TICK, driver)
     assert stage(table) == ("stopped", "confirmed")
-    # So does every further press.
+    # Every further press requests a stop again.
     table.stop("Vera")
     assert stage(table) == ("stopped", "requested")
     assert table.arm.stops == 2
 
 
 def stage(table: Table) -> tuple[str, str]:
-    told = status.common(table.hub)
-    return told["mood"], told["stop"]
+    shown = status.common(table.hub)
+    return shown["mood"], shown["stop"]
 
 
 def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> None:
@@ -122,10 +122,10 @@ def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> 
     assert status.health(table.hub) is None
     table.arm.taken, table.arm.age = 0, 0.4
     table.wait(TICK, driver)
-    assert status.health(table.hub) == "No word from the arm's process for 0.4 s."
-    told = status.common(table.hub)
-    assert (told["mood"], told["headline"]) == ("lost", "No word from the arm")
-    assert told["stopped"] is None
+    assert status.health(table.hub) == "No answer from the arm's process for 0.4 s."
+    shown = status.common(table.hub)
+    assert (shown["mood"], shown["headline"]) == ("lost", "No answer from the arm")
+    assert shown["stopped"] is None
     table.arm.age = 0.6
     table.wait(TICK, driver)
     assert table.hub.stopped == StopRecord(
@@ -136,7 +136,7 @@ def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> 
 
 @pytest.fixture
 def line() -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Both ends of a TCP connection."""
+    """Return both ends of a TCP connection."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
         near = socket.create_connection(listening.getsockname())
         far, _ = listening.accept()
@@ -156,12 +156,12 @@ def test_arrival_is_when_the_kernel_received_the_message(
     near.sendall(b"heartbeat\n")
     sent = time.monotonic()
     time.sleep(0.4)
-    # It waits unread, and is read and handled late: it arrived when it was sent.
+    # The message waits unread and is handled late, but its arrival is when it was sent.
     margin = 0.1
     for handle in (lambda: None, lambda: far.recv(100), arrival.note):
         handle()
         assert before - margin < arrival.newest < sent + margin
     near.close()
     time.sleep(0.2)
-    # The end of a connection is no message.
+    # The end of a connection is not a message.
     assert arrival.newest < sent + margin

@@ -1,4 +1,4 @@
-"""Nobody keeps STOP waiting: silent connections, half requests, floods of questions."""
+"""Test that load does not delay STOP: silent connections, half requests, floods of questions."""
 
 from __future__ import annotations
 
@@ -26,38 +26,38 @@ from tests.gateway.client import ask, controlling, enter, websocket
 from tests.gateway.lines import Lines
 
 SOON = 1.0
-"""[s] STOP takes a hundredth of it; a machine that runs other tests takes longer."""
+"""Maximum delay of STOP [s]. It takes a hundredth of this, but more on a busy machine."""
 
 SILENT = 1100
-"""Connections: more than the server may have files open."""
+"""Number of connections, more than the open files that the server may have."""
 
 
 @pytest.fixture(scope="module")
 def tokens(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Of a link for each role; ``file`` is where they are."""
+    """Return the token of a link for each role, and under ``file`` the access file."""
     file = tmp_path_factory.mktemp("access") / "access.json"
     found = {"file": str(file)}
     for name in ("viewer", "operator", "other"):
         role = "viewer" if name == "viewer" else "operator"
         command = ["access", "give", "--file", str(file), "--name", name, "--role", role]
-        said = subprocess.run(
+        output = subprocess.run(
             [sys.executable, "-m", "katana450", *command],
             cwd=ROOT, capture_output=True, text=True, check=True, timeout=60,
         ).stdout  # fmt: skip
-        found[name] = said.partition("#")[2].strip()
+        found[name] = output.partition("#")[2].strip()
     return found
 
 
 @pytest.fixture(scope="module")
 def guarded(tokens: dict[str, str]) -> Iterator[AppServer]:
-    """A server that asks for links and may have 1024 files open."""
+    """Start a server that requires links and may have 1024 open files."""
     with AppServer((*FEW_DESCRIPTORS, "--access", tokens["file"])) as server:
         yield server
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:
-    """One that asks nobody."""
+    """Start a server that requires no links."""
     with AppServer((*APP, "--lines", "0")) as server:
         yield server
 
@@ -71,7 +71,7 @@ def test_silent_connections_do_not_delay_stop(guarded: AppServer, tokens: dict[s
             task = asyncio.create_task(stop_seconds(control, 60))
             with silent(guarded.port, 0) as _:
                 pass
-            # They connect in a thread, so that nobody here is kept waiting by it.
+            # They connect in a thread, so that the event loop of this test is not blocked.
             holding = silent(guarded.port, SILENT)
             await asyncio.to_thread(holding.__enter__)
             try:
@@ -81,7 +81,7 @@ def test_silent_connections_do_not_delay_stop(guarded: AppServer, tokens: dict[s
             assert max(took) < SOON
 
     asyncio.run(act())
-    # One sentence now and then, and no traceback for each.
+    # The log has a line now and then, and no traceback for each connection.
     assert len(guarded.output.splitlines()) < 100, guarded.output
     assert "Traceback" not in guarded.output
 
@@ -93,10 +93,10 @@ def test_new_clients_are_served_among_silent_ones(
     with silent(guarded.port, SILENT):
         for _ in range(5):
             began = time.monotonic()
-            status, _, said = ask(
+            status, _, body = ask(
                 f"{guarded.url}/stop", data=b"", Origin=guarded.url, Cookie=cookie
             )
-            assert (status, said) == (204, b"")
+            assert (status, body) == (204, b"")
             assert ask(f"{guarded.url}/health")[0] == 200
             assert time.monotonic() - began < 2.0 * SOON
 
@@ -121,14 +121,14 @@ def test_half_requests_are_closed_and_slow_bodies_refused(server: AppServer) -> 
 
 def test_slow_body_is_refused(server: AppServer) -> None:
     head = f"POST /enter HTTP/1.1\r\nHost: x\r\nOrigin: {server.url}\r\nContent-Length: 20\r\n\r\n"
-    said = head.replace("Host: x", f"Host: 127.0.0.1:{server.port}").encode()
-    with silent(server.port, 1, said) as (slow,):
+    request = head.replace("Host: x", f"Host: 127.0.0.1:{server.port}").encode()
+    with silent(server.port, 1, request) as (slow,):
         slow.settimeout(4.0 * BODY_SECONDS)
         answer = slow.recv(4096)
     assert answer.startswith(b"HTTP/1.1 408 ")
 
 
-def test_a_flood_of_questions_is_refused_and_does_not_delay_stop(
+def test_flood_of_questions_is_refused_and_does_not_delay_stop(
     guarded: AppServer, tokens: dict[str, str]
 ) -> None:
     cookie = enter(guarded.url, tokens["operator"])
@@ -154,7 +154,7 @@ def test_refusal_states_when_to_retry(server: AppServer) -> None:
                 await stack.enter_async_context(websocket(server.url, path, max_queue=None))
                 for _ in range(3)
             ]
-            # No more on each than one connection may say at once.
+            # Each connection sends no more than its rate limit allows.
             for _ in range(700):
                 for line in lines:
                     await line.send('{"do": "query","at":"world"}')
@@ -166,12 +166,12 @@ def test_refusal_states_when_to_retry(server: AppServer) -> None:
 
     refused = asyncio.run(act())
     assert refused["retry"] > 0.0
-    assert "Ask again in" in refused["why"]
+    assert "Try again in" in refused["why"]
 
 
 def test_http_questions_take_from_the_same_budget(server: AppServer) -> None:
     def flood(_number: int) -> dict[str, str]:
-        """Headers of the first answer that refuses."""
+        """Return the headers of the first refusal."""
         for _ in range(2000):
             status, headers, _ = ask(f"{server.url}/api/v1/world")
             if status == 429:
@@ -209,17 +209,17 @@ def test_one_identity_cannot_take_all_uploads(guarded: AppServer, tokens: dict[s
         f"Authorization: Bearer {tokens['operator']}\r\nContent-Length: 100\r\n\r\nx"
     ).encode()
     with silent(guarded.port, WAITING, head) as dripping:
-        # Those beyond its share are told so; the others hold their places.
+        # Connections beyond the limit are refused; the others keep their places.
         assert answered(dripping, 5.0) == WAITING - WAITING_EACH
-        status, _, said = ask(
+        status, _, body = ask(
             f"{guarded.url}/api/v1/mesh?name=b.stl",
             data=b"no mesh",
             Authorization=f"Bearer {tokens['other']}",
         )
-        assert status == 422, said
+        assert status == 422, body
 
 
-def test_silent_lines_do_not_keep_programs_out(server: AppServer) -> None:
+def test_silent_tcp_connections_do_not_block_programs(server: AppServer) -> None:
     port = Lines.port(server)
     with silent(port, 64):
         lines = Lines(server)

@@ -1,4 +1,4 @@
-"""Nothing that comes from outside starts a line of the log or colours one."""
+"""Test that no text from outside starts or colours a line of the log."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.gateway.lines import Lines
 FORGED = "2026-01-01 00:00:00,000 WARNING Stopped: Eve pressed STOP."
 
 BREAKS = ["\n", "\r", "\r\n", "\v", "\f", "\x1b[2K\x1b[31m", "\x85", "\u2028", "\u2029", "\u202e"]
-"""Characters that end a line or steer a terminal."""
+"""Characters that end a line or control a terminal."""
 
 ENTRY = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} [A-Z]+ ")
 
@@ -63,7 +63,7 @@ def test_log_names_the_person_who_stopped_the_arm() -> None:
 
 
 def test_requests_cannot_forge_a_line_of_the_log() -> None:
-    """Fields, values, names, headers and paths, by every way in."""
+    """Send fields, values, names, headers and paths through every channel."""
     with AppServer((*APP, "--lines", "0")) as server:
         for each in BREAKS:
             evil = f"x{each}{FORGED}"
@@ -79,7 +79,7 @@ def test_requests_cannot_forge_a_line_of_the_log() -> None:
         ask(f"{server.url}/enter", data=f"\n{FORGED}".encode(), Origin=server.url)
         time.sleep(0.3)
         output = server.output
-    assert "A bad request" in output
+    assert "Invalid request from" in output
     for line in output.splitlines():
         if FORGED in line:
             assert ENTRY.match(line), line

@@ -1,4 +1,4 @@
-"""A mechanism that is no arm of the family, live on a real server: joint by joint, and no tool."""
+"""Test a mechanism outside the family on a real server: its joints move, and it has no tool."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def somewhere(robot: Robot, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.random.default_rng(seed).uniform(0.9 * joints.lower, 0.9 * joints.upper)
 
 
-def test_it_has_what_the_test_is_about(robot: Robot) -> None:
+def test_mechanism_has_sliding_and_driven_joints(robot: Robot) -> None:
     joints = robot.joint_group
     assert any(joints.slides)
     assert not all(joints.slides)
@@ -67,27 +67,32 @@ def test_every_link_is_where_another_program_has_it(
         q = somewhere(robot, seed)
         there = program.joints(q)
         np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
-        # It is told driven joints alone, and works out by itself what follows them.
+        # It gets the driven joints alone, and computes the following joints itself.
         urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
-        told = {link.name: link.T for link in program.query(answers.Links).links}
-        assert set(told) == set(urdf.link_map)
-        for name, T in told.items():
+        poses = {link.name: link.T for link in program.query(answers.Links).links}
+        assert set(poses) == set(urdf.link_map)
+        for name, T in poses.items():
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
 
 
 def test_arm_answer_gives_the_reason_for_joints_only(
     server: AppServer, program: Client, robot: Robot
 ) -> None:
-    told = program.query(answers.Arm)
-    assert told.joints == list(robot.joint_group.names)
-    assert told.slides == list(robot.joint_group.slides)
-    assert (told.tools, told.default_tool, told.gripper, told.T_base_shoulder) == (
+    description = program.query(answers.Arm)
+    assert description.joints == list(robot.joint_group.names)
+    assert description.slides == list(robot.joint_group.slides)
+    assert (
+        description.tools,
+        description.default_tool,
+        description.gripper,
+        description.T_base_shoulder,
+    ) == (
         {},
         None,
         None,
         None,
     )
-    assert "need five turning axes. Its joints are j1 (prismatic)" in told.joints_only
+    assert "need five turning axes. Its joints are j1 (prismatic)" in description.joints_only
     state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
@@ -148,7 +153,7 @@ def test_stop_pause_and_lease_are_those_of_an_arm(
         program.joints(far)
 
 
-def test_its_world_is_named_too(program: Client, robot: Robot) -> None:
+def test_its_vrml_world_has_names(program: Client, robot: Robot) -> None:
     slide = robot.joint_group.names[robot.joint_group.slides.index(True)]
     axis = robot.axis(robot.joints[slide])
     program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
@@ -161,7 +166,7 @@ def test_its_world_is_named_too(program: Client, robot: Robot) -> None:
     program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
 
 
-def test_a_slider_moves_it_in_its_own_unit(server: AppServer, robot: Robot) -> None:
+def test_slider_moves_a_joint_in_its_own_unit(server: AppServer, robot: Robot) -> None:
     async def act() -> None:
         async with opened(server.url) as (peer, control):
             name = robot.joint_group.names[robot.joint_group.slides.index(True)]

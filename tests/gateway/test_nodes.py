@@ -1,4 +1,4 @@
-"""The VRML world by name: what is told of it, and what setting it comes to, over every line."""
+"""Test reading and setting the VRML world by name, over every channel."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from tests.robot.public_arms import PX150, J, written
 
 THERE = {"axis_1": 0.4, "axis_2": -1.0, "axis_3": 1.3, "axis_4": 0.3, "axis_5": -0.5}
 AXES = {"axis_1": (0, 0, 1), "axis_5": (1, 0, 0)}
-"""Those of the joints that do not turn about y."""
+"""Axes of the joints that do not turn about y."""
 
 
 @pytest.fixture(scope="module")
@@ -74,28 +74,28 @@ def get(nodes: VrmlNodes, state: State, node: str, field: str) -> Any:
     return value.value
 
 
-def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
+def test_names_types_and_values_are_those_of_the_file(
     nodes: VrmlNodes, state: State, robot: Robot
 ) -> None:
     angles = robot.joint_values(state.q, state.gripper)
     file = world_of(robot, angles).named()
-    told = {node.node: node for node in nodes.world(state).nodes}
-    objects = {name for name, node in told.items() if node.of.startswith("object")}
-    assert told.keys() - objects <= file.keys()
+    world = {node.node: node for node in nodes.world(state).nodes}
+    objects = {name for name, node in world.items() if node.of.startswith("object")}
+    assert world.keys() - objects <= file.keys()
     assert not objects & file.keys()
-    for name in told.keys() - objects:
-        assert told[name].kind == file[name].kind
-        for field in told[name].fields:
+    for name in world.keys() - objects:
+        assert world[name].kind == file[name].kind
+        for field in world[name].fields:
             assert FIELDS[file[name].kind][field.field].value == field.type
             shown: Any = file[name].get(field.field)
             np.testing.assert_allclose(np.array(field.value), shown, rtol=0, atol=5e-5)
-    # Whatever joint and look the file has, the server has.
+    # The server has every joint and appearance of the file.
     dressed = ("Switch", "Material")
     assert {name for name, node in file.items() if node.kind in dressed} == {
-        name for name, node in told.items() if node.kind in dressed
+        name for name, node in world.items() if node.kind in dressed
     } - objects
-    assert set(robot.joints) <= told.keys()
-    # Names that are no identifiers, or taken, are made so.
+    assert set(robot.joints) <= world.keys()
+    # Names that are invalid or taken are changed.
     assert {"left_cube", "left_cube_look", "pan_link_look_2", "pan_link_look_paint"} <= objects
 
 
@@ -104,26 +104,26 @@ def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
 def test_setting_a_joint_is_a_motion_command(
     nodes: VrmlNodes, state: State, wanted: dict[str, float]
 ) -> None:
-    said = nodes.command(
+    command = nodes.command(
         state,
         [setting(each, "rotation", rotation(each, angle)) for each, angle in wanted.items()],
     )
-    assert isinstance(said, cmd.SetAxes)
-    assert dict(said.values) == {int(each[-1]) - 1: angle for each, angle in wanted.items()}
-    # However long the axis is told.
+    assert isinstance(command, cmd.SetAxes)
+    assert dict(command.values) == {int(each[-1]) - 1: angle for each, angle in wanted.items()}
+    # The length of the axis does not matter.
     huge = [setting(n, "rotation", [1e200 * x for x in rotation(n, 0)[:3]] + [a])
             for n, a in wanted.items()]  # fmt: skip
-    assert nodes.command(state, huge) == said
-    # The other way round about the axis turned round, and an axis of any length, is the same.
+    assert nodes.command(state, huge) == command
+    # The negative angle about the reversed axis of any length is the same rotation.
     turned = [setting(n, "rotation", [-2.0 * x for x in rotation(n, 0)[:3]] + [-a])
               for n, a in wanted.items()]  # fmt: skip
     again = nodes.command(state, turned)
     assert isinstance(again, cmd.SetAxes)
-    assert dict(again.values) == dict(said.values)
+    assert dict(again.values) == dict(command.values)
 
 
-def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None:
-    said = nodes.command(
+def test_all_fields_of_a_message_are_one_command(nodes: VrmlNodes, state: State) -> None:
+    command = nodes.command(
         state,
         [
             setting("axis_1", "rotation", [0, 0, 1, 0.1]),
@@ -134,8 +134,8 @@ def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None
             setting("finger_right_joint", "rotation", [0, 0, 1, 0.3]),
         ],
     )
-    assert isinstance(said, cmd.Batch)
-    turned, moved, spun, painted, gripped = said.commands
+    assert isinstance(command, cmd.Batch)
+    turned, moved, spun, painted, gripped = command.commands
     assert turned == cmd.SetAxes(((0, 0.1), (1, -1.0)))
     assert isinstance(moved, cmd.MoveObject)
     assert moved.R is None
@@ -153,7 +153,7 @@ def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None
 
 
 @pytest.mark.parametrize(
-    ("node", "field", "value", "said"),
+    ("node", "field", "value", "reason"),
     [
         ("axis_9", "rotation", [0, 1, 0, 0.1], "no node 'axis_9'"),
         ("axis_2", "scale", [1, 1, 1], "is a Transform with rotation, center"),
@@ -181,10 +181,10 @@ def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None
     ],
 )
 def test_one_invalid_field_refuses_the_whole_set_request(
-    nodes: VrmlNodes, state: State, node: str, field: str, value: Any, said: str
+    nodes: VrmlNodes, state: State, node: str, field: str, value: Any, reason: str
 ) -> None:
     fine = setting("axis_1", "rotation", [0, 0, 1, 0.1])
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=reason):
         nodes.command(state, [fine, setting(node, field, value)])
 
 
@@ -202,10 +202,10 @@ anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(names, fields, anything), min_size=1, max_size=3))
 def test_setting_any_field_gives_a_valid_command_or_a_refusal(
-    nodes: VrmlNodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
+    nodes: VrmlNodes, rules: Session, state: State, changes: list[tuple[str, str, Any]]
 ) -> None:
     try:
-        command = nodes.command(state, [setting(*each) for each in said])
+        command = nodes.command(state, [setting(*each) for each in changes])
     except InputError:
         return
     rules.check(command)
@@ -230,14 +230,14 @@ def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(robot: Robot) -> N
         nodes.command(begun, [setting("cup", "translation", [1.5, 0.0, 0.0])])
 
 
-def test_a_bare_arm_has_no_names_for_the_gripper(robot: Robot) -> None:
+def test_arm_without_a_gripper_has_no_names_for_it(robot: Robot) -> None:
     stripped = bare(robot)
     arm = stripped.require_arm()
     session = Session(arm, arm.ready((0.0, -1.2, 1.5, 0.1, 0.0)))
     nodes = VrmlNodes(stripped, session.environment)
-    told = {node.node for node in nodes.world(session.begin(session.ready, 0.0, 0.0)).nodes}
-    assert "axis_5" in told
-    assert not {name for name in told if "finger" in name or "gripper" in name}
+    names = {node.node for node in nodes.world(session.begin(session.ready, 0.0, 0.0)).nodes}
+    assert "axis_5" in names
+    assert not {name for name in names if "finger" in name or "gripper" in name}
 
 
 def test_sliding_joint_has_a_translation_along_its_axis() -> None:
@@ -247,14 +247,14 @@ def test_sliding_joint_has_a_translation_along_its_axis() -> None:
     state = session.begin(np.array((0.2, 0.0, 0.0)), 0.0, 0.0)
     along = np.array((math.cos(0.3), math.sin(0.3), 0.0))
     np.testing.assert_allclose(get(nodes, state, "rail", "translation"), 0.2 * along, atol=1e-12)
-    said = nodes.command(state, [setting("rail", "translation", (-0.1 * along).tolist())])
-    assert isinstance(said, cmd.SetAxes)
-    np.testing.assert_allclose(said.values, ((0, -0.1),), rtol=0, atol=1e-15)
+    command = nodes.command(state, [setting("rail", "translation", (-0.1 * along).tolist())])
+    assert isinstance(command, cmd.SetAxes)
+    np.testing.assert_allclose(command.values, ((0, -0.1),), rtol=0, atol=1e-15)
     with pytest.raises(InputError, match=r"rail slides along 0\.955336 0\.29552 0"):
         nodes.command(state, [setting("rail", "translation", [0.1, 0.1, 0.1])])
 
 
-def test_joint_that_rests_has_its_value_and_cannot_be_set(tmp_path: Path) -> None:
+def test_fixed_joint_has_its_value_and_cannot_be_set(tmp_path: Path) -> None:
     pan = J("pan", "revolute", "base", "camera", axis=(0.0, 1.0, 0.0), limits=(0.3, 0.8))
     robot = load(written(tmp_path, "arm", [*PX150, pan]))
     arm = robot.require_arm()
@@ -267,7 +267,7 @@ def test_joint_that_rests_has_its_value_and_cannot_be_set(tmp_path: Path) -> Non
 
 
 def arrived(lines: Lines, ticket: int) -> None:
-    """Once the arm is at rest with that order in it."""
+    """Wait until the arm rests and its state includes the command of ``ticket``."""
     while (now := lines.answer(do="query"))["ticket"] < ticket or now["moving"]:
         time.sleep(0.02)
 
@@ -278,28 +278,28 @@ def all_joints(q: dict[str, float]) -> dict[str, Any]:
     return {"node": node, "field": "rotation", "value": rotation(node, angle), "more": more}
 
 
-def test_a_real_server_is_driven_by_name_on_a_line(server: AppServer) -> None:
+def test_arm_is_driven_by_name_over_tcp(server: AppServer) -> None:
     with speaking(server, "VR Sink") as lines:
         before = lines.answer(do="query")["q"]
         done = lines.answer(do="set", **all_joints(THERE))
         assert done["is"] == "done"
         soon = lines.answer(do="get", node="axis_1", field="rotation")["values"][0]["value"][3]
-        # On its way under the arm's own limits, not there.
+        # The arm is still moving, under its own limits.
         assert abs(soon - before[0]) < 0.1
         arrived(lines, done["ticket"])
         more = [{"node": name, "field": "rotation"} for name in THERE]
-        said = lines.answer(do="get", node="axis_2", field="center", more=more)["values"]
-        assert [each["node"] for each in said] == ["axis_2", *THERE]
-        for each, (name, angle) in zip(said[1:], THERE.items(), strict=True):
+        values = lines.answer(do="get", node="axis_2", field="center", more=more)["values"]
+        assert [each["node"] for each in values] == ["axis_2", *THERE]
+        for each, (name, angle) in zip(values[1:], THERE.items(), strict=True):
             np.testing.assert_allclose(each["value"], rotation(name, angle), rtol=0, atol=1e-9)
-        # All or none.
+        # Either all fields are set or none.
         bad = all_joints({**THERE, "axis_1": 0.0})
         bad["more"][-1]["value"] = [0, 1, 0, 0.1]
         refused = lines.answer(do="set", **bad)
         assert refused["is"] == "refused"
         assert "axis_5 turns about 1 0 0" in refused["why"]
         assert lines.answer(do="query")["goal"][0] == THERE["axis_1"]
-        # STOP is stronger than any name.
+        # A stop also blocks commands by name.
         lines.answer(do="stop")
         stopped = lines.answer(do="set", node="axis_1", field="rotation", value=[0, 0, 1, 0])
         assert "clear the stop first" in stopped["why"]
@@ -308,7 +308,7 @@ def test_a_real_server_is_driven_by_name_on_a_line(server: AppServer) -> None:
         lines.answer(do="release_lease")
 
 
-def test_the_world_is_painted_moved_and_watched(server: AppServer) -> None:
+def test_appearance_and_objects_are_set_and_watched_by_name(server: AppServer) -> None:
     with speaking(server, "Painter") as lines:
         lines.answer(
             do="set", node="cup", field="translation", value=[0.3, 0.2, 0.0],
@@ -323,18 +323,18 @@ def test_the_world_is_painted_moved_and_watched(server: AppServer) -> None:
                     {"node": "axis_2", "field": "rotation"}],
         )  # fmt: skip
         wanted: list[Any] = [[0.3, 0.2, 0.0], [1.0, 0.0, 0.0], -1.0]
-        told: list[Any] = []
-        while told[:3] != wanted:
+        values: list[Any] = []
+        while values[:3] != wanted:
             state = lines.hear()
-            told = [each["value"] for each in state.get("fields", ())]
-        assert told[3] == [0.0, 1.0, 0.0, state["q"][1]]
+            values = [each["value"] for each in state.get("fields", ())]
+        assert values[3] == [0.0, 1.0, 0.0, state["q"][1]]
         lines.say(do="watch", hz=0)
         nothing = lines.answer(do="watch", hz=5, fields=[{"node": "cups", "field": "translation"}])
         assert "no node 'cups'" in nothing["why"]
         for node, field in (("cup_paint", "diffuseColor"), ("pan_link_look", "whichChoice")):
             assert lines.answer(do="set", node=node, field=field, value=None)["is"] == "done"
         with connect(server.url, "Watcher") as watcher:
-            # Done is said when it is taken; the world that is told comes after.
+            # The answer arrives when the command is taken; the changed world follows.
             end = time.monotonic() + 5.0
             while painted(watcher):
                 assert time.monotonic() < end
@@ -355,20 +355,20 @@ def painted(client: Client) -> bool:
     )
 
 
-def test_it_is_the_same_over_http(server: AppServer) -> None:
+def test_names_work_over_http(server: AppServer) -> None:
     status, _, body = ask(f"{server.url}/api/v1/world")
     assert status == 200
-    told = {node["node"]: node for node in json.loads(body)["nodes"]}
-    assert {"axis_1", "pan_link_look", "pan_link_paint", "cup", "basin_paint"} <= told.keys()
-    assert told["axis_2"]["fields"][0] == {
+    world = {node["node"]: node for node in json.loads(body)["nodes"]}
+    assert {"axis_1", "pan_link_look", "pan_link_paint", "cup", "basin_paint"} <= world.keys()
+    assert world["axis_2"]["fields"][0] == {
         "field": "rotation", "type": "SFRotation", "settable": True,
-        "value": told["axis_2"]["fields"][0]["value"],
+        "value": world["axis_2"]["fields"][0]["value"],
     }  # fmt: skip
-    status, said = post(server, do="set", node="axis_5", field="rotation", value=[1, 0, 0, 0.2])
-    assert (status, said["is"]) == (200, "done")
-    status, said = post(server, do="get", node="axis_5", field="rotation")
-    assert (status, said["is"]) == (200, "values")
-    status, said = post(server, do="set", node="axis_5", field="rotation", value="round")
-    assert (status, said["is"]) == (422, "refused")
-    status, said = post(server, do="release_lease")
+    status, answer = post(server, do="set", node="axis_5", field="rotation", value=[1, 0, 0, 0.2])
+    assert (status, answer["is"]) == (200, "done")
+    status, answer = post(server, do="get", node="axis_5", field="rotation")
+    assert (status, answer["is"]) == (200, "values")
+    status, answer = post(server, do="set", node="axis_5", field="rotation", value="round")
+    assert (status, answer["is"]) == (422, "refused")
+    status, answer = post(server, do="release_lease")
     assert status == 200

@@ -1,4 +1,4 @@
-"""`nudge`: one joint by a relative angle, from the command to the script step."""
+"""Test ``nudge``, a relative motion of one joint, as command, request and script step."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def test_nudge_is_limited_to_the_range_of_the_joint(session: Session) -> None:
     assert after.goal[1] == session.require_arm().chain.upper[1]
     (found,) = after.findings
     assert (found.reason, found.axis) == (Reason.AXIS_LIMIT, 1)
-    # The next one counts from the limit, not from what was asked beyond it.
+    # The next nudge counts from the limit, not from the requested angle beyond it.
     back = session.step(after, [cmd.Nudge(1, -0.1)], 0.02)
     assert back.goal[1] == pytest.approx(session.require_arm().chain.upper[1] - 0.1)
     assert back.findings == ()
 
 
 @pytest.mark.parametrize("bad", [(5, 0.1), (-1, 0.1), (0, math.nan), (True, 0.1)])
-def test_nudge_of_no_joint_is_refused(session: Session, bad: tuple[int, float]) -> None:
+def test_invalid_nudge_is_refused(session: Session, bad: tuple[int, float]) -> None:
     with pytest.raises(InputError):
         session.check(cmd.Nudge(*bad))
 

@@ -1,4 +1,4 @@
-"""The real GNU Octave drives the arm over the TCP port, with kinematics of its own."""
+"""Test GNU Octave, which drives the arm over the TCP port with its own kinematics."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from tests.gateway import octave
 OCTAVE = octave.find()
 
 
-def told_by(server: AppServer, script: str) -> dict[str, Any]:
-    """What a script of examples/octave prints."""
+def output_of(server: AppServer, script: str) -> dict[str, Any]:
+    """Return the output of a script of examples/octave."""
     assert OCTAVE is not None
     found = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
     assert found is not None
@@ -34,12 +34,12 @@ def told_by(server: AppServer, script: str) -> dict[str, Any]:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    told: dict[str, Any] = json.loads(done.stdout.splitlines()[0])
-    return told
+    output: dict[str, Any] = json.loads(done.stdout.splitlines()[0])
+    return output
 
 
 def check_kinematics(arm: MountedArm, angles: list[float], asked: list[list[float]]) -> None:
-    """Octave's joint angles on the circle against ours."""
+    """Compare Octave's joint angles on the circle with ours."""
     chain = arm.chain_to("tcp")
     for angle, q in zip(angles, asked, strict=True):
         p = np.array((0.150, 0.100 * math.sin(angle), -0.110 + 0.100 * math.cos(angle)))
@@ -49,22 +49,22 @@ def check_kinematics(arm: MountedArm, angles: list[float], asked: list[list[floa
 
 
 @pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
-def test_octave_goes_round_the_papers_circle(arm: MountedArm, server: AppServer) -> None:
-    told = told_by(server, "circle")
-    # Where both have the tip at the start, each by its own kinematics.
-    assert told["start_error_mm"] < 1e-11
-    check_kinematics(arm, told["angles"], told["asked"])
-    # How many states there are, and how far the arm lags behind the stream, is the machine's.
-    assert told["states"] > 20
-    assert told["largest_error_mm"] < 100.0
+def test_octave_follows_the_circle_of_the_paper(arm: MountedArm, server: AppServer) -> None:
+    output = output_of(server, "circle")
+    # Both compute the tip at the start, each by its own kinematics.
+    assert output["start_error_mm"] < 1e-11
+    check_kinematics(arm, output["angles"], output["asked"])
+    # The number of states, and the lag of the arm behind the stream, depend on the machine.
+    assert output["states"] > 20
+    assert output["largest_error_mm"] < 100.0
 
 
 @pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
 def test_octave_turns_the_vrml_world_by_name_and_reads_it_back(
     arm: MountedArm, server: AppServer
 ) -> None:
-    told = told_by(server, "places = 6; circle_by_name")
-    assert len(told["angles"]) == 6
-    check_kinematics(arm, told["angles"], told["asked"])
-    np.testing.assert_allclose(told["heard"], told["asked"], rtol=0, atol=1e-9)
-    assert told["colour"] == [0.1, 0.5, 0.9]
+    output = output_of(server, "places = 6; circle_by_name")
+    assert len(output["angles"]) == 6
+    check_kinematics(arm, output["angles"], output["asked"])
+    np.testing.assert_allclose(output["heard"], output["asked"], rtol=0, atol=1e-9)
+    assert output["colour"] == [0.1, 0.5, 0.9]

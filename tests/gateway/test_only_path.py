@@ -1,4 +1,4 @@
-"""Nothing but the command gate puts commands into the link to the arm."""
+"""Test that only the command gate puts commands into the link to the arm."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ PACKAGE = Path(katana450.__file__).parent
 DELIVERIES = {
     ("server/service/command_gate.py", "self.arm"),
     ("server/service/command_gate.py", "arm"),
-    # Behind the gate: the handle passes on, the worker also adds the path it has found.
+    # Behind the gate the handle passes commands on; the worker also adds the planned path.
     ("server/service/arm_handle.py", "self._sink"),
     ("arm/runtime/planning_worker.py", "self._arm"),
 }
-"""Files, and what they deliver commands to."""
+"""Files, and the objects to which they deliver commands."""
 
 
 def uses(name: str) -> set[tuple[str, str]]:
-    """Return each file with what it takes the attribute ``name`` of, called or not."""
+    """Return each file that uses the attribute ``name``, with the object that has it."""
     return {
         (path.relative_to(PACKAGE).as_posix(), ast.unparse(node.value))
         for path in PACKAGE.rglob("*.py")

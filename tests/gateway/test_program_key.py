@@ -1,4 +1,4 @@
-"""The key of a program that posts is its secret; its name is what others see."""
+"""Test the key of a program that posts: it is secret, and others see only the name."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def test_program_key_is_secret_and_required() -> None:
         pages = [json.loads(ask(f"{server.url}/api/v1/{at}")[2]) for at in ("state", "event_log")]
         assert pages[0]["holder"] == "Sorter"
         assert key not in json.dumps(pages)
-        # Its name is no key, whoever sends it.
+        # The name of a program does not serve as its key.
         assert post(server, "Sorter", do="home")[0] == 422
         assert post(server, secrets.token_hex(16), do="home")[0] == 409
         assert key not in server.output
-        # Looks of strangers, under its name or any other, are no heartbeats of it.
+        # Reads of other clients, under any name, do not count as its heartbeats.
         assert do(do="joints", q=FAR.tolist())[0] == 200
         end = time.monotonic() + 10.0
         while (state := json.loads(ask(f"{server.url}/api/v1/state")[2]))["stopped"] is None:
@@ -43,5 +43,5 @@ def test_program_key_is_secret_and_required() -> None:
             assert time.monotonic() < end
         assert state["stopped"] == "Sorter fell silent while the arm moved."
         assert state["q"][0] < FAR[0] - 0.2
-        # Looks open no windows: it and the other that posted are there.
+        # Reads open no windows: only the two programs that posted have one.
         assert state["windows"] == 2

@@ -1,4 +1,4 @@
-"""A program comes to rest when its owner falls silent with the connection still open."""
+"""Test that a program comes to rest when its owner falls silent on an open connection."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ steps:
 """
 
 BRAKING = 2.0
-"""[s] To come to rest, and to be asked about it on a busy machine."""
+"""Time [s] to come to rest, and to query the state on a busy machine."""
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def state_of(server: AppServer) -> dict[str, Any]:
 
 
 def wait(server: AppServer, status: str, seconds: float = 30.0) -> dict[str, Any]:
-    """The state once the program is ``status`` and, if it ended, the arm is at rest."""
+    """Wait until the program is ``status`` and, if it ended, the arm is at rest."""
     end = time.monotonic() + seconds
     while True:
         state = state_of(server)
@@ -72,7 +72,7 @@ def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path)
         try:
             wait(server, "running")
             time.sleep(1.5 * OWNER_SILENCE)
-            # While its heartbeats come the program runs.
+            # The program runs while heartbeats of the owner arrive.
             assert wait(server, "running", 1.0)["moving"]
             os.kill(owner.pid, signal.SIGSTOP)
             began = time.monotonic()
@@ -84,7 +84,7 @@ def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path)
     assert took < OWNER_SILENCE + BRAKING
     why = "Terminal fell silent: a program ends with its owner's heartbeats."
     assert state["program"]["why"] == why
-    # At rest on its way, neither stopped for good nor held by anybody.
+    # The arm rests on its path. It is not stopped, and the lease is free.
     assert (state["stopped"], state["holder"]) == (None, None)
     assert 0.05 < state["q"][0] < np.deg2rad(100) - 0.05
     clear_stop(server)

@@ -1,4 +1,4 @@
-"""Who may tell a program what to do, told by a clock of the test's own."""
+"""Test the program runner with a simulated clock: owner, lease, pauses and stops."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def made(hub: Hub) -> ProgramRunner:
 
 
 class Staged(Table):
-    """A table whose arm can be planned for."""
+    """A table with an arm for which programs can be planned."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(session.begin(session.ready, 0.0, 0.0), made)
@@ -44,11 +44,11 @@ class Staged(Table):
 
     @property
     def status(self) -> str:
-        told = self.programs.progress()
-        return "" if told is None else told.status
+        progress = self.programs.progress()
+        return "" if progress is None else progress.status
 
     def plan(self, window: Window, script: str = SCRIPT) -> None:
-        """And wait for the thread that does it."""
+        """Plan ``script`` and wait for the planning thread."""
         self.programs.script(window, script, more=False, speed=1.0)
         due = time.monotonic() + 10.0
         while self.status == "planning" and time.monotonic() < due:
@@ -60,7 +60,7 @@ def table(session: Session) -> Staged:
     return Staged(session)
 
 
-def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
+def test_program_holds_the_lease_under_its_own_name(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.touch(window.person.key)
     table.plan(window)
@@ -77,7 +77,7 @@ def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
 
 
 def test_program_time_passes_while_the_state_is_unchanged(table: Staged) -> None:
-    """An arm at rest shows the state in which it came to rest, its time included."""
+    """Use an arm at rest, whose state is unchanged, its time included."""
     window = table.join(PAGES[0])
     table.plan(window)
     table.programs.steer(window, ProgramOrder.RUN)
@@ -94,7 +94,7 @@ def test_pause_does_not_count_towards_the_timeout(table: Staged) -> None:
     rest = table.arm.rest
     table.arm.rest = replace(rest, gripper_goal=rest.gripper_goal + 0.5)
     table.wait(0.1, window)
-    # The fingers rest on their way, and nothing new is shown before they are told to go on.
+    # The fingers rest on their path, and no new state comes before ``resume``.
     table.arm.rest = replace(table.arm.rest, paused=True)
     table.wait(2.0 * ACTION_TIMEOUT, window)
     assert table.status == "paused"
@@ -105,7 +105,7 @@ def test_pause_does_not_count_towards_the_timeout(table: Staged) -> None:
     assert table.status == "failed"
 
 
-def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> None:
+def test_others_may_steer_a_program_only_if_they_may_take_the_lease(table: Staged) -> None:
     owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
     viewer, admin = table.join("third", Role.VIEWER), table.join("fourth", Role.ADMIN)
     program_runner = table.programs
@@ -113,10 +113,10 @@ def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> 
         program_runner.script(viewer, SCRIPT, more=False, speed=1.0)
     table.plan(owner)
     program_runner.steer(owner, ProgramOrder.RUN)
-    for window, said in ((viewer, "watch"), (other, "is Window 1's")):
-        with pytest.raises(LeaseError, match=said):
+    for window, reason in ((viewer, "watch"), (other, "is Window 1's")):
+        with pytest.raises(LeaseError, match=reason):
             program_runner.check_may_touch(window.actor)
-        with pytest.raises(LeaseError, match=said):
+        with pytest.raises(LeaseError, match=reason):
             program_runner.steer(window, ProgramOrder.END)
     with pytest.raises(LeaseError, match="end it first"):
         table.plan(other)
@@ -136,7 +136,7 @@ def test_program_does_not_take_the_lease_from_a_driver(table: Staged) -> None:
     assert table.hub.lease.holder == other.person
 
 
-def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
+def test_stop_and_a_closed_page_end_a_program(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window)
     table.programs.steer(window, ProgramOrder.RUN)
@@ -176,7 +176,7 @@ def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> N
     clicked = table.hub.at_scene(window.person.key, table.hub.gate.revocations)
     table.stop("Anybody")
     table.hub.move(window, cmd.ClearStop())
-    # A click that was on its way meanwhile.
+    # A click that waited in the socket meanwhile.
     with pytest.raises(LeaseError, match="Do it again"):
         table.panel.plan(SCRIPT, ProgramOrder.RUN, clicked)
     with pytest.raises(LeaseError, match="Do it again"):

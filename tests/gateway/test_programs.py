@@ -1,4 +1,4 @@
-"""Programs run by a real server, as its Python client asks for them."""
+"""Test programs on a real server, requested by the Python client."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def arm(server: AppServer) -> Iterator[Client]:
 
 
 def planned(arm: Client, text: str) -> answers.Progress:
-    """Once it is, or refused."""
+    """Send a script and wait until it is planned or refused."""
     for at in range(0, len(text), 100):
         more = at + 100 < len(text)
         arm.ask(Program(text=text[at : at + 100], more=more))
@@ -77,7 +77,7 @@ def run(arm: Client, order: ProgramOrder = ProgramOrder.RUN) -> None:
     arm.ask(Steer(order=order))
 
 
-def test_a_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
+def test_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
     run(arm)
     during = arm.query(answers.State)
     assert during.holder is not None
@@ -94,7 +94,7 @@ def test_a_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
     assert np.abs(np.array(after.q) - READY).max() < 1e-9
 
 
-def test_stop_ends_it_in_the_middle(arm: Client) -> None:
+def test_stop_ends_a_running_program(arm: Client) -> None:
     run(arm)
     wait(arm, lambda program: program.line == 3 and program.fraction > 0.3)
     arm.ask(requests.Stop())
@@ -109,7 +109,7 @@ def test_stop_ends_it_in_the_middle(arm: Client) -> None:
         arm.ask(Steer(order=ProgramOrder.RUN))
 
 
-def test_it_pauses_steps_and_is_ended(arm: Client) -> None:
+def test_program_is_paused_stepped_and_ended(arm: Client) -> None:
     run(arm, ProgramOrder.STEP)
     assert wait(arm, lambda program: program.status == "paused").line == 4
     arm.ask(Steer(order=ProgramOrder.RESUME))
@@ -123,7 +123,7 @@ def test_it_pauses_steps_and_is_ended(arm: Client) -> None:
     assert state.holder is None
 
 
-def test_the_arm_can_be_taken_from_it(server: AppServer, arm: Client) -> None:
+def test_lease_can_be_taken_from_a_program(server: AppServer, arm: Client) -> None:
     run(arm)
     with connect(server.url, "Boss") as boss:
         boss.ask(requests.Take())
@@ -158,7 +158,7 @@ def test_errors_are_reported_with_their_lines(arm: Client) -> None:
         arm.ask(Steer(order=ProgramOrder.RUN))
 
 
-def test_a_script_that_is_too_long_is_refused(arm: Client) -> None:
+def test_script_that_is_too_long_is_refused(arm: Client) -> None:
     part = "#" * 900 + "\n"
     for _ in range(72):
         arm.ask(Program(text=part, more=True))
@@ -167,7 +167,9 @@ def test_a_script_that_is_too_long_is_refused(arm: Client) -> None:
 
 
 @pytest.mark.parametrize("interrupted", [False, True])
-def test_from_the_command_line(server: AppServer, tmp_path: Path, interrupted: bool) -> None:
+def test_program_runs_from_the_command_line(
+    server: AppServer, tmp_path: Path, interrupted: bool
+) -> None:
     script = tmp_path / "script.yaml"
     script.write_text(THERE_AND_BACK)
     command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
@@ -175,9 +177,9 @@ def test_from_the_command_line(server: AppServer, tmp_path: Path, interrupted: b
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
     ) as process:
         assert process.stdout is not None
-        said = ""
+        output = ""
         for line in process.stdout:
-            said += line
+            output += line
             if interrupted and "line 3" in line:
                 time.sleep(0.4)
                 os.kill(process.pid, signal.SIGINT)
@@ -186,7 +188,7 @@ def test_from_the_command_line(server: AppServer, tmp_path: Path, interrupted: b
         process.wait(timeout=10)
     assert process.returncode == (130 if interrupted else 0), error
     assert "Traceback" not in error
-    assert ("the arm holds" in error) if interrupted else ("Done." in said)
+    assert ("the arm holds" in error) if interrupted else ("Done." in output)
     with connect(server.url, "Watcher") as watcher:
         state = watcher.query(answers.State)
         assert state.program is not None

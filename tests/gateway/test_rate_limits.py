@@ -1,4 +1,4 @@
-"""How often something may happen, and how far a browser may be behind."""
+"""Test the token bucket, and the flow control of frames to a browser."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from katana450.server.viser_bridge.flow import (
 from katana450.server.web.token_bucket import TokenBucket
 
 
-def test_a_bucket_gives_what_it_holds_and_fills_with_time() -> None:
+def test_bucket_gives_its_tokens_and_refills_with_time() -> None:
     bucket = TokenBucket(10.0, 3.0, 0.0)
     assert [bucket.take(0.0) for _ in range(4)] == [True, True, True, False]
     assert not bucket.take(0.09)
@@ -27,13 +27,13 @@ def test_a_bucket_gives_what_it_holds_and_fills_with_time() -> None:
     assert [bucket.take(100.0) for _ in range(4)] == [True, True, True, False]
 
 
-def test_a_bucket_takes_many_or_none() -> None:
+def test_bucket_gives_all_requested_tokens_or_none() -> None:
     bucket = TokenBucket(1.0, 5.0, 0.0)
     assert not bucket.take(0.0, 6.0)
     assert bucket.take(0.0, 5.0)
 
 
-def test_time_that_goes_back_fills_nothing() -> None:
+def test_bucket_does_not_refill_when_time_goes_back() -> None:
     bucket = TokenBucket(1.0, 1.0, 10.0)
     assert bucket.take(10.0)
     assert not bucket.take(0.0)
@@ -48,7 +48,7 @@ def test_browser_without_acknowledgements_gets_all_frames() -> None:
     assert flow.age(1e9) == 0.0
 
 
-def test_the_age_is_that_of_the_oldest_frame_that_is_not_seen() -> None:
+def test_age_is_that_of_the_oldest_unseen_frame() -> None:
     flow = FlowControl()
     for t in (1.0, 2.0, 3.0):
         flow.sent(100, t)
@@ -58,7 +58,7 @@ def test_the_age_is_that_of_the_oldest_frame_that_is_not_seen() -> None:
     assert flow.age(99.0) == 0.0
 
 
-def test_nothing_more_is_sent_while_something_is_overdue() -> None:
+def test_no_frame_is_sent_while_one_is_overdue() -> None:
     flow = FlowControl()
     flow.sent(100, 0.0)
     assert flow.seen(1, 0.1)
@@ -66,13 +66,13 @@ def test_nothing_more_is_sent_while_something_is_overdue() -> None:
     assert flow.has_room(1.0 + 0.99 * OVERDUE)
     assert not flow.has_room(1.0 + OVERDUE)
     assert flow.seen(2, 1.0 + OVERDUE)
-    # By now it is known that this line takes so long.
+    # Now the delay of this line is known.
     flow.sent(100, 2.0)
     assert flow.has_room(2.0 + 1.99 * OVERDUE)
     assert not flow.has_room(2.0 + 2.0 * OVERDUE)
 
 
-def test_a_frame_larger_than_the_line_goes_alone() -> None:
+def test_frame_larger_than_the_line_is_sent_alone() -> None:
     flow = FlowControl()
     flow.sent(100, 0.0)
     assert flow.seen(1, 0.1)
@@ -93,7 +93,7 @@ def test_flow_control_keeps_frames_fresh_and_uses_the_bandwidth(
 
 @pytest.mark.parametrize("trip", [0.0, 0.05])
 @pytest.mark.parametrize("size", [300, 2000])
-def test_when_a_line_grows_thin_little_is_on_the_way(size: int, trip: float) -> None:
+def test_little_data_is_in_flight_when_a_line_becomes_slow(size: int, trip: float) -> None:
     ages = ages_after(20.0, lambda t: 5e6 if t < 30.0 else 1.5e4, trip, size)
     assert max(ages) < 1.5
     assert np.median(ages[len(ages) // 2 :]) < 0.6
@@ -104,9 +104,9 @@ FRAME = 0.016
 
 
 def ages_after(warm: float, rate: Callable[[float], float], trip: float, size: int) -> list[float]:
-    """Of the frames of ``size`` that are seen from ``warm`` [s] on to the end of a minute.
+    """Return the ages of the frames of ``size`` seen from ``warm`` [s] to the end of a minute.
 
-    On a line of ``rate`` [bytes/s] and round trip ``trip`` [s], and viser with a frame every FRAME.
+    The line has ``rate`` [bytes/s] and round trip ``trip`` [s]; viser has a frame every FRAME.
     """
     flow, t, free_at, count = FlowControl(), 0.0, 0.0, 1
     flow.sent(100, 0.0)
@@ -129,7 +129,7 @@ def ages_after(warm: float, rate: Callable[[float], float], trip: float, size: i
 
 
 @pytest.mark.parametrize("count", [-1, 1, 4, 10**30])
-def test_what_cannot_have_been_seen_is_no_word(count: int) -> None:
+def test_impossible_acknowledgement_is_ignored(count: int) -> None:
     flow = FlowControl()
     for t in range(3):
         flow.sent(100, float(t))

@@ -1,4 +1,4 @@
-"""Meshes and scenes at the door of a real server: brought, placed, attached, saved and loaded."""
+"""Test meshes and scenes on a real server: upload, placement, attachment, saving and loading."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def scene(ring: Path) -> Path:
-    """A folder as a person writes it."""
+    """Write a scene folder by hand."""
     path = ring.with_name("mine.yaml")
     path.write_text(
         """\
@@ -66,7 +66,7 @@ objects:
 
 @pytest.fixture(scope="module")
 def tokens(ring: Path) -> dict[str, str]:
-    """Of a link for each role."""
+    """Return the token of a link for each role."""
     file, until = AccessFile.create(ring.with_name("access.json")), time.time() + 3600.0
     return {role.value: file.give(role.value, role, until) for role in (Role.VIEWER, Role.OPERATOR)}
 
@@ -99,7 +99,7 @@ def until(true: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def test_the_server_begins_with_its_scene_and_objects(server: AppServer, arm: Client) -> None:
+def test_server_starts_with_its_scene_and_objects(server: AppServer, arm: Client) -> None:
     now = objects(arm)
     assert list(now) == ["cup", "gate", "ring"]
     assert now["gate"].colour == "#2477d4"
@@ -111,15 +111,17 @@ def test_the_server_begins_with_its_scene_and_objects(server: AppServer, arm: Cl
     assert "ring: 576 triangles" in server.output
 
 
-def test_a_mesh_is_placed_fixed_to_the_hand_and_met(arm: Client, ring: Path, robot: Robot) -> None:
-    told = arm.upload(ring)
-    assert told.name == "ring 2"
-    assert told.triangles == 576
-    np.testing.assert_allclose(told.size, (0.104, 0.104, 0.024), atol=1e-6)
+def test_mesh_is_placed_fixed_to_the_hand_and_touched(
+    arm: Client, ring: Path, robot: Robot
+) -> None:
+    uploaded = arm.upload(ring)
+    assert uploaded.name == "ring 2"
+    assert uploaded.triangles == 576
+    np.testing.assert_allclose(uploaded.size, (0.104, 0.104, 0.024), atol=1e-6)
     other = arm.upload(ring, "cm").key
-    assert other != told.key
+    assert other != uploaded.key
     form = requests.Shape.MESH
-    arm.ask(requests.Place(name="it", shape=form, mesh=told.key, scale=0.5, opacity=0.4))
+    arm.ask(requests.Place(name="it", shape=form, mesh=uploaded.key, scale=0.5, opacity=0.4))
     until(lambda: "it" in objects(arm))
     at = np.array(objects(arm)["it"].T)[:3, 3]
     assert 0.3 < np.hypot(*at[:2]) < 0.7
@@ -142,8 +144,8 @@ def test_a_mesh_is_placed_fixed_to_the_hand_and_met(arm: Client, ring: Path, rob
     for wrong in (
         requests.Place(name="it", shape=form),
         requests.Place(name="it", shape=form, mesh="0" * 32),
-        requests.Place(name="it", shape=requests.Shape.BOX, size=[0.1] * 3, mesh=told.key),
-        requests.Place(name="it", shape=form, mesh=told.key, scale=900.0),
+        requests.Place(name="it", shape=requests.Shape.BOX, size=[0.1] * 3, mesh=uploaded.key),
+        requests.Place(name="it", shape=form, mesh=uploaded.key, scale=900.0),
         requests.Place(name="cup", scale=2.0),
         requests.Attach(name="nobody", to=requests.Attachment.HAND),
         requests.Attach(name="ring", to=requests.Attachment.TABLE, T=_rows(np.eye(4))),
@@ -164,21 +166,21 @@ def test_file_read_by_a_library_is_uploaded(arm: Client, tmp_path: Path, kind: s
     assert sorted(mesh.size) == pytest.approx([0.04, 0.06, 0.08], abs=1e-6)
 
 
-def test_a_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
+def test_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
     data = arm.save_scene()
     before = objects(arm)
     arm.ask(requests.Remove(name="gate"))
     arm.ask(requests.Fill(ml=10.0))
     until(lambda: "gate" not in objects(arm))
-    told = arm.load_scene(data)
-    assert told.objects == list(before)
+    loaded = arm.load_scene(data)
+    assert loaded.objects == list(before)
     until(lambda: objects(arm) == before)
     assert arm.save_scene() == data
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     assert sorted(files) == ["meshes/ring.stl", SCENE]
     text = files[SCENE].decode()
-    for wrong, said in (
+    for wrong, reason in (
         (text.replace("name: ring", "name: gate"), "two objects called 'gate'"),
         (text.replace("water: 80", "water: 5000"), "cannot hold 5000 ml"),
         (text.replace("meshes/ring.stl", "../ring.stl"), "no relative path"),
@@ -188,12 +190,12 @@ def test_a_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
         with zipfile.ZipFile(out, "w") as archive:
             for name, content in (files | {SCENE: wrong.encode()}).items():
                 archive.writestr(name, content)
-        with pytest.raises(RefusedError, match=said):
+        with pytest.raises(RefusedError, match=reason):
             arm.load_scene(out.getvalue())
         assert objects(arm) == before
 
 
-def test_what_is_too_much_is_refused(
+def test_uploads_beyond_the_limits_are_refused(
     server: AppServer, arm: Client, tokens: dict[str, str]
 ) -> None:
     url = f"{server.url}/api/v1"
@@ -201,17 +203,17 @@ def test_what_is_too_much_is_refused(
     def ask(url: str, **options: Any) -> tuple[int, dict[str, str], bytes]:
         return client.ask(url, Authorization=f"Bearer {tokens['operator']}", **options)
 
-    status, _, said = ask(f"{url}/mesh?name=a.stl", data=bytes(MAX_FILE_BYTES + 1))
-    assert (status, said) == (413, b"That is too long.")
+    status, _, body = ask(f"{url}/mesh?name=a.stl", data=bytes(MAX_FILE_BYTES + 1))
+    assert (status, body) == (413, f"The body is larger than {MAX_FILE_BYTES} bytes.".encode())
     for query in ("", "?name=a.exe", "?name=a.stl&unit=ft", f"?name={'a' * 200}.stl"):
-        status, _, said = ask(f"{url}/mesh{query}", data=b"x")
-        assert status in (422, 429), said
-        assert json.loads(said)["is"] == "refused"
+        status, _, body = ask(f"{url}/mesh{query}", data=b"x")
+        assert status in (422, 429), body
+        assert json.loads(body)["is"] == "refused"
     seen = set()
     for _ in range(int(UPLOAD_BURST) + 2):
         seen.add(ask(f"{url}/mesh?name=a.exe", data=b"")[0])
     assert 429 in seen
-    # From another site's page nothing comes in.
+    # Uploads from pages of other sites are refused.
     assert ask(f"{url}/mesh?name=a.stl", data=b"x", Origin="https://evil.example")[0] == 403
     assert arm.query(answers.State).status == "ok"
 
@@ -225,11 +227,11 @@ def test_spectator_cannot_upload(server: AppServer, ring: Path, tokens: dict[str
     assert ask(f"{server.url}/api/v1/scene")[0] == 401
 
 
-def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path) -> None:
+def test_invalid_scene_is_refused_before_the_server_starts(scene: Path) -> None:
     robot = describe_robot(Settings(), URDF_PATH, None)
     broken = scene.with_name("broken.yaml")
     whole = scene.read_text()
-    for text, said in (
+    for text, reason in (
         (whole.replace("shape: mesh", "form: mush"), "broken.yaml:\nline 7, .*mush'.$"),
         (whole.replace("10, -68", "10, 168").replace("shape: mesh", "shape: sphere"), "line 6"),
         ("scene: 1\njoints: [0, 168, 85, 8, 0]\n", "limits"),
@@ -237,11 +239,11 @@ def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path)
         ("scene: 1\nwater: 80\n", "no cup"),
     ):
         broken.write_text(text)
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=reason):
             load_initial_scene(robot.session, broken, [])
-    for told in ("/nowhere/it.stl", f"{scene}@1,2,x"):
+    for option in ("/nowhere/it.stl", f"{scene}@1,2,x"):
         with pytest.raises(InputError, match=r"it\.stl cannot be read|no format"):
-            load_initial_scene(robot.session, None, [told])
+            load_initial_scene(robot.session, None, [option])
 
 
 def _rows(T: Any) -> Matrix4:

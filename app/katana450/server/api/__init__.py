@@ -1,1 +1,1 @@
-"""What is said between the server and those who speak to it: version 1."""
+"""Messages between the server and its clients: API version 1."""

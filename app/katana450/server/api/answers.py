@@ -1,5 +1,6 @@
-"""What the server says: JSON objects whose ``is`` names what they are. Lengths in m, angles in rad,
-times in s.
+"""Answers of the server: JSON objects whose ``is`` names their kind.
+
+Lengths are in m, angles in rad, times in s.
 """
 
 from __future__ import annotations
@@ -59,10 +60,14 @@ __all__ = [
 
 
 class Welcome(Answer, frozen=True, kw_only=True):
-    """The first thing said: who you are here, and what you may do.
+    """The first message on a connection: the client's name, number and role.
 
-    ``name`` is as others see it. ``role``: viewer, operator or admin. ``heartbeat``: heartbeats are
-    to come so many seconds apart from whoever holds the arm.
+    Attributes:
+        name: Name that others see.
+        number: Number of the client, for ``give`` and ``decline``.
+        role: viewer, operator or admin.
+        heartbeat: Interval of the heartbeats that the holder of the lease sends [s].
+        api: Version of the API.
     """
 
     name: str
@@ -73,18 +78,26 @@ class Welcome(Answer, frozen=True, kw_only=True):
 
 
 class Echo(Answer, frozen=True, kw_only=True):
-    """To a heartbeat."""
+    """The answer to a heartbeat.
+
+    Attributes:
+        n: Number from the heartbeat.
+    """
 
     n: int
 
 
 class Margins(msgspec.Struct, frozen=True, kw_only=True):
-    """How near the arm is to what it cannot pass.
+    """Distances to joint limits, singularity and contact.
 
-    ``limit``: of the joint that is nearest to one of its limits, how far that is [rad], negative
-    beyond it; ``axis``: which joint, counted from 1. ``smallest_singular_value`` [1]: of the
-    Jacobian over the arm's own length; 0 in a singularity. ``clearance``: how far the two ``parts``
-    that are nearest to each other are apart [m]; both null where nothing is looked at.
+    Attributes:
+        limit: Distance of the joint nearest to one of its limits from that limit [rad]; negative
+            beyond it.
+        axis: Number of that joint, counted from 1.
+        smallest_singular_value: Smallest singular value of the Jacobian over the characteristic
+            length of the arm [1]; 0 in a singularity.
+        clearance: Distance of the two nearest parts [m]; null where contacts are not checked.
+        parts: The two nearest parts; null where contacts are not checked.
     """
 
     limit: float
@@ -95,7 +108,15 @@ class Margins(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Water(msgspec.Struct, frozen=True, kw_only=True):
-    """Where the water is [ml], and how far the cup's lip is above it [m], negative as it flows."""
+    """Water by its place.
+
+    Attributes:
+        cup_ml: Volume in the cup [ml].
+        basin_ml: Volume in the basin [ml].
+        air_ml: Volume in free flight [ml].
+        spilled_ml: Volume elsewhere [ml].
+        margin_to_rim: Height of the cup's lip above the water [m]; negative while water flows out.
+    """
 
     cup_ml: float
     basin_ml: float
@@ -105,12 +126,20 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Progress(msgspec.Struct, frozen=True, kw_only=True):
-    """The program that is planned or runs, or ran last.
+    """The program that is being planned, is running, or ran last.
 
-    ``by``: its owner. ``status``: planning, cancelled, refused, ready, running, paused, blocked,
-    done, stopped or failed. ``step`` of ``steps`` is under way, on ``line`` of the script, and
-    ``fraction`` of its ``task`` is done, or of all planning. ``seconds``: all motions at full
-    speed. ``why``: what is wrong with it, or why it was planned anew or not run.
+    Attributes:
+        name: Name of the program.
+        by: Name of its owner.
+        status: planning, cancelled, refused, ready, running, paused, blocked, done, stopped or
+            failed.
+        step: Number of the present step.
+        steps: Number of steps.
+        line: Line of the present step in the script.
+        task: Present task in words.
+        fraction: Fraction of the task that is done, or of all planning.
+        seconds: Duration of all motions at full speed [s].
+        why: What is wrong with the program, or why it was planned again or not run.
     """
 
     name: str
@@ -126,32 +155,49 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class State(Answer, frozen=True, kw_only=True):
-    """What the arm does.
+    """The state of the arm.
+
+    A mechanism that has only joints has null for ``tool``, ``T``, ``pitch``, ``roll``,
+    ``tool_speed``, ``margins``, ``branch`` and ``priority``; see ``arm``.
 
     Attributes:
-        t: when, on the server's clock, which only goes forwards; an arm at rest is as it was then.
-        sent: when this was sent, on the same clock. age: time since the arm's process last
-            answered; from 0.3 s on the state counts as unknown.
-        ticket: of the last command that is heeded in it. q: (n,) where the arm says it is.
-        setpoint, qd: (n,) where it is told to be, and how fast that moves.
-        goal: (n,) where it goes, the nearest to what was wished. gripper, gripper_goal: the finger
-            joint.
-        tool: the frame that ``T`` (4, 4), ``pitch`` and ``roll`` are of; T in the frame {S}.
-        tool_speed: of the tool point [m/s], by its setpoints. holding: (n,) torques [N m] that hold
-            the arm still there against its own weight, without what it carries; null where its
-            description tells no masses.
-        margins: how near the arm is to what it cannot pass. touching: the fingers that touch what
-            may be held. held: what both hold; null with an empty hand.
-        branch: shoulder and elbow. reading: which numbers of a target count.
-        Where there are only joints, tool to roll, tool_speed, margins, branch and reading are null;
-            see ``arm``.
-        status: ok, limited, paused, blocked, gap, stopped or fault. why: in words; else empty.
-        speed: fraction of full speed. holder: name of who holds the arm.
-        stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
-            newer than the request is stopped, then confirmed.
-        revocations: number of stops and of losses of the lease so far.
-        windows: pages and programs that are open. water: of the cup; null where there is none.
-        program: planned, running or run last. fields: of the VRML world that are watched.
+        t: Time of the state [s] on the server's monotonic clock. An arm at rest has not changed
+            since then.
+        sent: Time at which the state was sent [s], on the same clock.
+        ticket: Ticket of the last command that the state includes.
+        q: (n,) Joint angles that the arm reports [rad]; [m] for joints that slide.
+        setpoint: (n,) Joint angles that are sent to the arm.
+        qd: (n,) Rates of the setpoint.
+        goal: (n,) Posture to which the arm moves, the nearest to the target.
+        gripper: Finger joint [rad]; [m] for fingers that slide.
+        gripper_goal: Goal of the finger joint.
+        tool: Tool frame to which ``T``, ``pitch`` and ``roll`` refer.
+        T: (4, 4) Pose of the tool in the frame {S}.
+        pitch: Angle of the tool below the horizontal [rad].
+        roll: Angle about the tool's own axis [rad].
+        tool_speed: Speed of the tool point by its setpoints [m/s].
+        holding: (n,) Torques [N m] that hold the arm at rest against its own weight, without a
+            load; null where its description states no masses.
+        margins: Distances to joint limits, singularity and contact.
+        touching: Fingers that touch an object that can be held.
+        held: Object that both fingers hold; null with an empty hand.
+        branch: Shoulder and elbow.
+        priority: Part of a target that is kept when five axes cannot satisfy all of it.
+        status: ok, limited, paused, blocked, gap, stopped or fault.
+        moving: Whether the arm moves, or plans a path that it will follow.
+        why: Reason for the status in words; empty without one.
+        findings: Reasons for which the goal is not the target, or is not approached.
+        speed: Fraction of full speed.
+        holder: Name of the holder of the lease; null while the lease is free.
+        stopped: Reason for which the arm is stopped; null otherwise.
+        stop: requested, then confirmed once a state newer than the request is stopped; null
+            without a stop.
+        revocations: Number of stops and of losses of the lease so far.
+        age: Time since the arm's process last answered [s]. From 0.3 s the state counts as unknown.
+        windows: Number of open pages and programs.
+        water: Water of the cup; null without one.
+        program: Program that is being planned, is running, or ran last.
+        fields: Values of the watched fields of the VRML world.
     """
 
     t: float
@@ -191,18 +237,27 @@ class State(Answer, frozen=True, kw_only=True):
 
 
 class Arm(Answer, frozen=True, kw_only=True):
-    """What arm it is.
+    """The description of the arm.
+
+    Numbers of joints that turn are in rad, of joints that slide in m.
 
     Attributes:
-        joints: their names, in the order of every joint vector.
-        lower, upper, speed, acceleration, jerk: (n,) their limits.
-        ready: (n,) the posture that Home drives to.
-        tools: the tool frames by name, (4, 4) in {S} at the zero posture; default_tool: one.
-        gripper: closed and open [rad], and its speed [rad/s]; null without fingers.
-        gripper_slides: whether its fingers slide; its numbers are in m and m/s then.
-        T_base_shoulder: (4, 4) the frame {S} in the base frame; null where there are only joints.
-        slides: (n,) whether each joint slides; its numbers are in m then.
-        joints_only: why no tool can be brought to a pose; empty where one can.
+        name: Name of the arm.
+        joints: Names of the joints, in the order of every joint vector.
+        lower: (n,) Lower limits of the joints.
+        upper: (n,) Upper limits of the joints.
+        speed: (n,) Maximum speeds [1/s].
+        acceleration: (n,) Maximum accelerations [1/s^2].
+        jerk: (n,) Maximum jerks [1/s^3].
+        ready: (n,) Posture to which ``home`` moves.
+        tools: Tool frames by name, (4, 4) in {S} at the zero posture.
+        default_tool: Name of the tool frame that is used at first; null without tools.
+        gripper: Finger joint closed and open [rad], and its speed [rad/s]; null without fingers.
+        gripper_slides: Whether the fingers slide; the numbers of ``gripper`` are in m and m/s then.
+        T_base_shoulder: (4, 4) Frame {S} in the base frame; null for a mechanism that has only
+            joints.
+        slides: (n,) Whether each joint slides.
+        joints_only: Reason for which no tool can be moved to a pose; empty where one can.
     """
 
     name: str
@@ -223,7 +278,16 @@ class Arm(Answer, frozen=True, kw_only=True):
 
 
 class LogLine(msgspec.Struct, frozen=True, kw_only=True):
-    """A reason that began or ended, with the newest command then: whose, which, on what grounds."""
+    """A finding that began or ended, with the newest command at that time.
+
+    Attributes:
+        when: Time in UTC, in ISO 8601.
+        who: Name of the participant that gave the command; null for the server itself.
+        command: Name of the command.
+        grounds: Grounds on which the participant was allowed to give it.
+        began: Whether the finding began; otherwise it ended.
+        finding: The finding.
+    """
 
     when: str
     who: str | None
@@ -234,17 +298,25 @@ class LogLine(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EventLog(Answer, frozen=True, kw_only=True):
-    """What held the arm back of late, the oldest first."""
+    """Recent findings, the oldest first."""
 
     lines: list[LogLine]
 
 
 class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
-    """A branch that could be taken, and what it costs.
+    """A branch that can be chosen, and its cost.
 
-    ``position_error``, ``rotation_error``: what it misses the wished pose by. ``distance``: the
-    farthest any joint has to go; ``time``: at its full speed. ``contact``: the two parts that would
-    meet there.
+    Attributes:
+        shoulder: Shoulder, front or back.
+        elbow: Elbow, up or down.
+        q: (n,) Joint angles [rad].
+        within_limits: Whether all joints are inside their limits.
+        position_error: Distance from the target position [m].
+        rotation_error: Angle from the target orientation [rad].
+        distance: Maximum angle that a joint has to move [rad].
+        time: Minimum duration of the motion, at full speed [s].
+        smallest_singular_value: See ``Margins``.
+        contact: The two parts that would meet there; null without contact.
     """
 
     shoulder: str
@@ -260,16 +332,21 @@ class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Branches(Answer, frozen=True, kw_only=True):
-    """The ways to stand at the wished pose."""
+    """The branches for the target pose."""
 
     choices: list[BranchOption]
 
 
 class Loop(Answer, frozen=True, kw_only=True):
-    """How well the control loop has kept its period of late.
+    """The recent timing of the control loop.
 
-    ``ticks``: how many are looked at; ``late_p50``, ``late_p99``, ``late_max``: how much later
-    than due they came; ``lost``: that came more than a period late, since the start.
+    Attributes:
+        period: Period of the loop [s].
+        ticks: Number of ticks that are evaluated.
+        late_p50: Median delay of a tick [s].
+        late_p99: 99th percentile of the delay [s].
+        late_max: Maximum delay [s].
+        lost: Number of ticks since the start that came more than a period late.
     """
 
     period: float
@@ -302,10 +379,10 @@ _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)
 
 
 def decoded(text: str | bytes) -> AnyAnswer:
-    """The answer that ``text`` is; msgspec.MsgspecError for one that it is not."""
+    """Return the answer in ``text``. Raises msgspec.MsgspecError if it is invalid."""
     return _decoder.decode(text)
 
 
 def encoded(answer: Answer) -> str:
-    """As it is sent."""
+    """Return ``answer`` as JSON text."""
     return msgspec.json.encode(answer).decode()

@@ -1,4 +1,4 @@
-"""What requests and answers are made of: what they have in common, and their fields."""
+"""Base classes of requests and answers, and the types of their fields."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from msgspec import Meta
 VERSION = 1
 
 ROOT = f"/api/v{VERSION}"
-"""Where the API is by HTTP."""
+"""Path under which the API is served by HTTP."""
 
 MAX_REQUEST_BYTES = 1024
-"""Bytes of a request."""
+"""Maximum size of a request [bytes]."""
 
 MAX_LINEAR_RATE = 0.5
-"""[m/s] More than the arm can do; anything beyond is nobody's wish."""
+"""Maximum linear jog rate [m/s]: more than the arm can reach, so a larger value is a mistake."""
 
 MAX_ANGULAR_RATE = 3.0
-"""[rad/s] Likewise."""
+"""Maximum angular jog rate [rad/s], for the same reason."""
 
 MIN_SPEED, MAX_SPEED = 0.05, 1.0
-"""Fraction of full speed."""
+"""Limits of the fraction of full speed."""
 
 MAX_STATES_PER_SECOND = 100
-"""States a second that one can be told: as many as there are."""
+"""Maximum rate of states [1/s]: the rate of the control loop."""
 
 MAX_JOINTS = 32
 
 Rates = tuple[float, float, float, float, float]
-"""Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
+"""Velocity of the tool point (x, y, z) [m/s], then the rates of pitch and roll [rad/s]."""
 
 Numbers = list[float]
 Vector3 = tuple[float, float, float]
@@ -41,7 +41,7 @@ Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
 
 MAX_PRESS_LENGTH = 64
-"""Characters that tell one press of STOP from another."""
+"""Maximum length of the text that identifies one press of STOP."""
 
 Id = Annotated[int, Meta(ge=0, le=2**53 - 1)] | Annotated[str, Meta(max_length=64)] | None
 Press = Annotated[str, Meta(min_length=1, max_length=MAX_PRESS_LENGTH)] | None
@@ -52,51 +52,52 @@ Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
 
 
 class Frame(Enum):
-    """Whose coordinates a pose is in."""
+    """Frame in which a pose is given."""
 
     SHOULDER = "shoulder"
     """The paper's frame {S}, where axes 1 and 2 cross."""
     BASE = "base"
-    """On the table under the control box."""
+    """The base frame, on the table under the control box."""
 
 
 class Shape(Enum):
-    """What an object counts as where contacts are looked for."""
+    """Shape that stands for an object in collision checks."""
 
     BOX = "box"
     CYLINDER = "cylinder"
     SPHERE = "sphere"
     MESH = "mesh"
-    """A file that was uploaded; it counts as its convex hull."""
+    """An uploaded file; its convex hull is checked for contacts."""
 
 
 class Attachment(Enum):
-    """What an object can be fixed to."""
+    """Body to which an object can be fixed."""
 
     HAND = "hand"
-    """It goes with the hand, whatever the fingers do, and counts as a part of it."""
+    """The object moves with the hand and counts as a part of it, whatever the fingers do."""
     WORLD = "world"
-    """It stays where it is."""
+    """The object stays where it is."""
     TABLE = "table"
-    """Likewise, once it is put down upright on the table below."""
+    """The object is put down upright on the table below, and stays there."""
 
 
 def tag_of(name: str) -> str:
-    """Return the tag of the message class ``name``: ``ClearStop`` is ``clear_stop``."""
+    """Return the tag of the message class ``name``: ``clear_stop`` for ``ClearStop``."""
     return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
 
 
 @dataclass(frozen=True, kw_only=True)
 class RequestTraits:
-    """Traits of one class of requests. The default commands the arm.
+    """Traits of one class of requests. The defaults are those of a command to the arm.
 
     Attributes:
-        free: costs nothing of the budget, however much else was asked.
-        question: changes nothing.
-        answered: is answered without an ``id`` too.
-        stream: one of many in a row, answered at once, before the arm's process has taken it.
-        for_program: is given to the program that runs, if the sender is its owner.
-        safety: is never too frequent.
+        free: Whether the request costs nothing of the budget, even when that is used up.
+        question: Whether the request changes nothing.
+        answered: Whether the request is answered even without an ``id``.
+        stream: Whether the request is one of a stream. It is answered at once, before the arm's
+            process has taken it.
+        for_program: Whether the request goes to the running program if the sender is its owner.
+        safety: Whether the request is exempt from the rate limit.
     """
 
     free: bool = False
@@ -108,10 +109,10 @@ class RequestTraits:
 
 
 COMMAND = RequestTraits()
-"""Traits of a request for one command of the arm, which costs what it takes."""
+"""Traits of a request for one command of the arm. It costs the processor time that it takes."""
 
 LEASE = RequestTraits(free=True)
-"""Traits of a request about who holds the arm."""
+"""Traits of a request about the lease."""
 
 
 class Request(
@@ -124,8 +125,12 @@ class Request(
 ):
     """Base of all requests; ``do`` is the name of the class as ``tag_of`` gives it.
 
-    Each class declares ``traits``. ``revocations``: of a state or an answer; a command is refused
-    if there was a stop or a change of driver since then.
+    Each class declares ``traits``.
+
+    Attributes:
+        id: Number or text of the client's own, repeated in the answer.
+        revocations: Number from a state or an answer. A command is refused if there was a stop or
+            a change of driver since then.
     """
 
     traits: ClassVar[RequestTraits]
@@ -142,6 +147,6 @@ class Answer(
     tag_field="is",
     tag=tag_of,
 ):
-    """Base of all answers; ``is`` is the class name in lower case, ``id`` the request's."""
+    """Base of all answers; ``is`` names the class, and ``id`` is that of the request."""
 
     id: Id = None

@@ -20,13 +20,16 @@ class Take(Request, frozen=True):
 
 
 class Ask(Request, frozen=True):
-    """Ask the holder for the arm; the owner of the program that runs is asked for its program."""
+    """Ask the holder of the lease to hand it over.
+
+    While a program holds the lease, the owner of the program is asked.
+    """
 
     traits: ClassVar[RequestTraits] = LEASE
 
 
 class Withdraw(Request, frozen=True):
-    """Withdraw the own request for the arm."""
+    """Withdraw your own request for the lease."""
 
     traits: ClassVar[RequestTraits] = LEASE
 
@@ -38,9 +41,12 @@ class ReleaseLease(Request, frozen=True):
 
 
 class Give(Request, frozen=True, kw_only=True):
-    """Give the arm to the window or program of that number.
+    """Hand the lease over to another page or program.
 
-    The owner of the program that runs may do this too, which ends the program.
+    The holder may do this, and the owner of the running program, which ends the program.
+
+    Attributes:
+        to: Number of the page or program.
     """
 
     traits: ClassVar[RequestTraits] = LEASE
@@ -49,9 +55,12 @@ class Give(Request, frozen=True, kw_only=True):
 
 
 class Decline(Request, frozen=True, kw_only=True):
-    """Decline the request for the arm of the window or program of that number.
+    """Decline the request of another page or program for the lease.
 
-    For the holder of the arm, or the owner of the program that runs.
+    The holder may do this, and the owner of the running program.
+
+    Attributes:
+        to: Number of the page or program.
     """
 
     traits: ClassVar[RequestTraits] = LEASE

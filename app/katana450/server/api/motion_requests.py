@@ -1,4 +1,4 @@
-"""Requests that move the joints, one by one or with the tool."""
+"""Requests that move joints, the tool or the fingers."""
 
 from __future__ import annotations
 
@@ -23,9 +23,11 @@ from katana450.server.api.fields import (
 
 
 class Jog(Request, frozen=True, kw_only=True):
-    """Move for 0.2 s: (x, y, z) [m/s], pitch and roll [rad/s], along the axes of a frame.
+    """Move the tool at given rates for 0.2 s. Repeat the request to continue the motion.
 
-    To be said again while the motion shall last.
+    Attributes:
+        rates: Velocity of the tool point (x, y, z) [m/s], then rates of pitch and roll [rad/s].
+        frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(stream=True)
@@ -37,11 +39,16 @@ class Jog(Request, frozen=True, kw_only=True):
         limits = (MAX_LINEAR_RATE,) * 3 + (MAX_ANGULAR_RATE,) * 2
         for rate, limit in zip(self.rates, limits, strict=True):
             if not math.isfinite(rate) or abs(rate) > limit:
-                raise ValueError(f"{rate} is no rate between {-limit:g} and {limit:g}")
+                raise ValueError(f"the rate {rate} is not between {-limit:g} and {limit:g}")
 
 
 class Joint(Request, frozen=True, kw_only=True):
-    """Drive one joint; ``axis`` counts from 1. What slides is told in m."""
+    """Move one joint to a value.
+
+    Attributes:
+        axis: Number of the joint, counted from 1.
+        value: Target [rad]; [m] for a joint that slides.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -50,7 +57,11 @@ class Joint(Request, frozen=True, kw_only=True):
 
 
 class Joints(Request, frozen=True, kw_only=True):
-    """Drive all joints to ``q``; they arrive together, on a straight line in joint space."""
+    """Move all joints along a straight line in joint space; they arrive together.
+
+    Attributes:
+        q: (n,) Targets [rad]; [m] for joints that slide.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -58,10 +69,15 @@ class Joints(Request, frozen=True, kw_only=True):
 
 
 class Servo(Request, frozen=True, kw_only=True):
-    """One of a stream of joint angles, followed under the limits of speed, acceleration and jerk.
+    """Follow one sample of a stream of joint angles.
 
-    ``qd`` says how fast they change; without it that is seen from the stream, less exactly. When no
-    other comes for 0.2 s the arm comes to rest.
+    The motion keeps the limits of speed, acceleration and jerk. The arm comes to rest when no
+    other sample arrives for 0.2 s.
+
+    Attributes:
+        q: (n,) Joint angles [rad]; [m] for joints that slide.
+        qd: (n,) Rates of ``q``. Without them the rates are estimated from the stream, which is less
+            exact.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(stream=True)
@@ -71,7 +87,14 @@ class Servo(Request, frozen=True, kw_only=True):
 
 
 class Pose(Request, frozen=True, kw_only=True):
-    """Bring the tool to a pose, as near as five axes can; what gives way is the ``priority``'s."""
+    """Move the tool to a pose, or as near to it as five axes can.
+
+    The priority (``set_priority``) decides which part of the pose is kept.
+
+    Attributes:
+        T: (4, 4) Pose of the tool in ``frame``, translations in m.
+        frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -80,7 +103,12 @@ class Pose(Request, frozen=True, kw_only=True):
 
 
 class Position(Request, frozen=True, kw_only=True):
-    """Bring the tool point somewhere; pitch and roll stay as wished."""
+    """Move the tool point to a position; pitch and roll of the target are kept.
+
+    Attributes:
+        p: (3,) Position [m] in ``frame``.
+        frame: Frame of ``p``: {S} at the shoulder, or the base frame on the table.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -89,7 +117,12 @@ class Position(Request, frozen=True, kw_only=True):
 
 
 class Turn(Request, frozen=True, kw_only=True):
-    """Give the tool a pitch (positive downwards) and a roll; its point stays as wished."""
+    """Turn the tool to a pitch and a roll; the target of the tool point is kept.
+
+    Attributes:
+        pitch: Angle of the tool below the horizontal [rad], positive downwards.
+        roll: Angle about the tool's own axis [rad].
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -98,7 +131,12 @@ class Turn(Request, frozen=True, kw_only=True):
 
 
 class Gripper(Request, frozen=True, kw_only=True):
-    """Drive the finger joint; the arm's description says between which angles."""
+    """Move the fingers.
+
+    Attributes:
+        angle: Target of the finger joint [rad]; [m] for fingers that slide. The answer ``arm`` has
+            its range.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -112,12 +150,12 @@ class EndDrag(Request, frozen=True):
 
 
 class Home(Request, frozen=True):
-    """Drive to the ready posture."""
+    """Move to the ready posture."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 
 
 class GoToZero(Request, frozen=True):
-    """Drive to the zero posture, the arm stretched along x."""
+    """Move to the zero posture, in which the arm is stretched along x."""
 
     traits: ClassVar[RequestTraits] = COMMAND

@@ -10,9 +10,14 @@ from katana450.server.api.fields import Answer
 class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """A reason why the arm does not reach the target as it was given.
 
-    ``text``: the reason in words. ``amount`` in ``unit``: both null where there is no number.
-    ``axis`` counts from 1. ``parts``: the two parts that are about to meet. ``seconds``: duration
-    of a stop.
+    Attributes:
+        reason: Kind of the finding.
+        text: The reason in words.
+        amount: Amount in ``unit``; null for a reason without a number.
+        unit: Unit of ``amount``.
+        axis: Number of the joint, counted from 1.
+        parts: The two parts that are about to meet.
+        seconds: Duration of a stop [s].
     """
 
     reason: str
@@ -25,10 +30,13 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PartRefusal(msgspec.Struct, frozen=True, kw_only=True):
-    """A part of a request that took no effect while others did, and why.
+    """A part of a request that took no effect while other parts did.
 
-    ``part`` counts from 1 in the order of execution: the joints of a ``set`` are one part, the
-    first. ``command``: what it is for the arm, for example ``shift`` for an object.
+    Attributes:
+        part: Number of the part, counted from 1 in the order of execution. The joints of a ``set``
+            are one part, the first.
+        command: Command of the part, for example ``move_object``.
+        why: Reason in words.
     """
 
     part: int
@@ -37,16 +45,18 @@ class PartRefusal(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Done(Answer, frozen=True, kw_only=True):
-    """The request of that id is done.
+    """The request with this ``id`` is done.
 
     Attributes:
-        ticket: of a command of the arm: every state with this or a higher ticket includes it.
-        outcome: accepted; limited by the ``findings``, or because the parts in ``refused`` take no
-            effect; unknown if the arm's process does not report it within 1 s; for a stop,
-            requested: the state tells when it is confirmed.
-        rotation_misfit: of a pose: the largest entry of R^T R - I. The nearest rotation is used;
+        ticket: Number of the command. Every state with this or a higher ticket includes it.
+        outcome: Outcome of a command. ``accepted``; ``limited`` by the findings, or because the
+            parts in ``refused`` take no effect; ``unknown`` if the arm's process does not report
+            it within 1 s; ``requested`` for a stop, which later states confirm.
+        findings: Reasons for which the command is limited.
+        refused: Parts of the request that took no effect.
+        rotation_misfit: Largest entry of R^T R - I of the given pose. The nearest rotation is used;
             more than 1e-3 is refused.
-        revocations: the state's number when the command was accepted.
+        revocations: ``revocations`` of the state in which the command was accepted.
     """
 
     ticket: int | None = None
@@ -58,8 +68,11 @@ class Done(Answer, frozen=True, kw_only=True):
 
 
 class Refused(Answer, frozen=True, kw_only=True):
-    """The request is refused and has changed nothing. ``why``: the reason, and what to do.
-    ``retry``: time [s] after which to ask again.
+    """The request is refused and has changed nothing.
+
+    Attributes:
+        why: Reason, and what to do.
+        retry: Time [s] after which the request can be repeated.
     """
 
     why: str

@@ -1,8 +1,8 @@
-"""What may be asked of the server: JSON objects of exactly these shapes.
+"""Requests to the server: JSON objects of exactly these shapes.
 
-``do`` names the request. One with an ``id`` is answered; without one only a refusal is told.
-Lengths in m, angles in rad, times in s. A pose is of the tool, in the paper's frame {S} at the
-shoulder or in the base frame on the table.
+``do`` names the request. A request with an ``id`` is answered; without one only a refusal is
+sent. Lengths are in m, angles in rad, times in s. A pose is that of the tool, in the paper's frame
+{S} at the shoulder or in the base frame on the table.
 """
 
 from __future__ import annotations
@@ -122,7 +122,12 @@ __all__ = [
 
 
 class Hello(Request, frozen=True, kw_only=True):
-    """The first line on the TCP port: who speaks, and a link's token where one is asked for."""
+    """The first line on the TCP port: it identifies the program.
+
+    Attributes:
+        name: Name of the program that others see.
+        token: Token of an access link, where the server requires one.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -131,9 +136,10 @@ class Hello(Request, frozen=True, kw_only=True):
 
 
 class Heartbeat(Request, frozen=True, kw_only=True):
-    """A heartbeat; the number comes back, which gives the round trip.
+    """A heartbeat. The holder of the lease sends ten a second; otherwise a moving arm is stopped.
 
-    Whoever holds the arm gives ten a second. Without them a moving arm is stopped.
+    Attributes:
+        n: Number that the answer repeats, for measuring the round trip.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(free=True, answered=True)
@@ -142,10 +148,12 @@ class Heartbeat(Request, frozen=True, kw_only=True):
 
 
 class Stop(Request, frozen=True, kw_only=True):
-    """STOP: the arm comes to rest as fast as it can. Everybody may, at any time.
+    """Stop the arm as fast as possible. Every client may do this at any time.
 
-    Who says it again, for want of an answer, gives the same ``press``: it counts once, so that a
-    late one does not undo the ``clear_stop`` that came in between.
+    Attributes:
+        press: Name of this press of STOP. A client that repeats an unanswered stop sends the same
+            name, and the stop counts once: a late repetition does not undo a ``clear_stop`` in
+            between.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(free=True, safety=True)
@@ -154,13 +162,17 @@ class Stop(Request, frozen=True, kw_only=True):
 
 
 class ClearStop(Request, frozen=True):
-    """Accept motion again after a stop. Nothing moves by it; old targets are gone."""
+    """Clear a stop: the arm accepts motion again. Nothing moves, and old targets are dropped."""
 
     traits: ClassVar[RequestTraits] = RequestTraits(free=True)
 
 
 class Speed(Request, frozen=True, kw_only=True):
-    """How fast the arm is at most, as a fraction of full speed."""
+    """Set the maximum speed.
+
+    Attributes:
+        value: Fraction of full speed.
+    """
 
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
@@ -168,7 +180,11 @@ class Speed(Request, frozen=True, kw_only=True):
 
 
 class Tool(Request, frozen=True, kw_only=True):
-    """From now on targets and read-outs are of this tool frame. Nothing moves."""
+    """Choose the tool frame to which targets and read-outs refer. Nothing moves.
+
+    Attributes:
+        name: Name of the tool frame; the answer ``arm`` lists them.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -176,7 +192,11 @@ class Tool(Request, frozen=True, kw_only=True):
 
 
 class SetPriority(Request, frozen=True, kw_only=True):
-    """From now on this says which numbers of a target count when not all can be had."""
+    """Choose which part of a target is kept when five axes cannot satisfy all of it.
+
+    Attributes:
+        priority: The part that is kept first.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -184,7 +204,12 @@ class SetPriority(Request, frozen=True, kw_only=True):
 
 
 class Branch(Request, frozen=True, kw_only=True):
-    """Go to the wished pose with another shoulder or elbow."""
+    """Move to the target pose with another shoulder or elbow.
+
+    Attributes:
+        shoulder: Shoulder of the branch.
+        elbow: Elbow of the branch.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -193,9 +218,13 @@ class Branch(Request, frozen=True, kw_only=True):
 
 
 class Nudge(Request, frozen=True, kw_only=True):
-    """Drive one joint on by a relative angle; ``axis`` counts from 1. What slides moves by m.
+    """Move one joint by a relative angle, counted from its goal.
 
-    The angle counts from where the joint is going. Beyond the joint's range it is limited.
+    The new goal is limited to the range of the joint.
+
+    Attributes:
+        axis: Number of the joint, counted from 1.
+        by: Change of the goal [rad]; [m] for a joint that slides.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -205,31 +234,34 @@ class Nudge(Request, frozen=True, kw_only=True):
 
 
 class Hold(Request, frozen=True):
-    """Come to rest and forget the target."""
+    """Come to rest and drop the target."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 
 
 class Pause(Request, frozen=True):
-    """Come to rest on the way, and keep the target.
+    """Come to rest on the path and keep the target.
 
-    Pause, resume and speed also act on a program that runs, for its owner alone: the page or API
-    program that started it. A program that is planned meanwhile starts paused.
+    The requests ``pause``, ``resume`` and ``speed`` also act on a running program. Only its owner
+    may send them then: the page or API program that started it. A program that is being planned
+    starts paused.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
 
 class Resume(Request, frozen=True):
-    """Go on."""
+    """Resume the motion after a pause."""
 
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
 
 class Watch(Request, frozen=True, kw_only=True):
-    """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less.
+    """Send the state periodically from now on. A slow connection gets fewer states.
 
-    ``fields``: of the VRML world, whose values each state is to bring.
+    Attributes:
+        hz: Number of states per second; 0 ends the stream.
+        fields: Fields of the VRML world whose values each state includes.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(question=True)
@@ -239,8 +271,12 @@ class Watch(Request, frozen=True, kw_only=True):
 
 
 class Query(Request, frozen=True, kw_only=True):
-    """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
-    the objects around it, the VRML world, where its links are.
+    """Send one answer now.
+
+    Attributes:
+        at: Subject of the answer, which has the same name: the state, the description of the arm,
+            the event log, the branches, the timing of the control loop, the objects, the VRML
+            world, or the poses of the links.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
@@ -302,16 +338,16 @@ _names = msgspec.json.Decoder(_Named)
 
 
 class RequestDecoder:
-    """Decodes the requests of the core, and those that an extension adds."""
+    """Decoder of the requests of the core and of an extension."""
 
     def __init__(self, added: tuple[type[Request], ...] = ()) -> None:
-        """``added``: classes of an extension."""
+        """Accept the requests of the core, and those of the classes ``added`` by an extension."""
         kinds: Any = Union[(AnyRequest, *added)]
         self._decoder: msgspec.json.Decoder[Request] = msgspec.json.Decoder(kinds)
         self._known = {tag_of(kind.__name__) for kind in get_args(kinds)}
 
     def decoded(self, text: str | bytes) -> Request:
-        """Return the request in ``text``. Raises InputError with the reason where it holds none."""
+        """Return the request in ``text``. Raises InputError with the reason if it is invalid."""
         if len(text) > MAX_REQUEST_BYTES:
             raise InputError(f"A request has at most {MAX_REQUEST_BYTES} bytes.")
         try:
@@ -320,18 +356,18 @@ class RequestDecoder:
             name = _named(text).do
             if isinstance(name, str) and name not in self._known:
                 raise InputError(
-                    f"This server has no request {name!r}. {ROOT}/openapi.json lists those it has."
+                    f"This server has no request {name!r}. {ROOT}/openapi.json lists its requests."
                 ) from error
-            raise InputError(f"That is no request: {error}.") from error
+            raise InputError(f"This is not a valid request: {error}.") from error
 
 
 def id_of(text: str | bytes) -> Id:
-    """The id in ``text``, which may be no request otherwise."""
+    """Return the id in ``text``, which need not be a valid request; None without one."""
     return _named(text[:MAX_REQUEST_BYTES]).id
 
 
 def _named(text: str | bytes) -> _Named:
-    """Return id and name in ``text``, without those that it does not have."""
+    """Return the id and the name in ``text``; None for each that is missing."""
     try:
         return _names.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError):

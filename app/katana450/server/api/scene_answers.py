@@ -8,7 +8,13 @@ from katana450.server.api.fields import Answer, Numbers
 
 
 class Value(msgspec.Struct, frozen=True, kw_only=True):
-    """Value of a field of a node of the VRML world: a number, or as many as its type has."""
+    """Value of a field of a node of the VRML world.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+        value: One number, or as many as the type of the field has.
+    """
 
     node: str
     field: str
@@ -16,9 +22,14 @@ class Value(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SceneObject(msgspec.Struct, frozen=True, kw_only=True):
-    """An object that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
+    """A scene object. See ``place`` for the fields that are not listed here.
 
-    ``fixed``: whether it is fixed to the hand. ``colour``: null for the colour of its file.
+    Attributes:
+        T: (4, 4) Pose in the base frame.
+        held: Whether the fingers hold the object.
+        mesh: Key of the mesh; null for another shape.
+        colour: Colour such as "#94a3b8"; null for the colour of the file.
+        fixed: Whether the object is fixed to the hand.
     """
 
     name: str
@@ -36,7 +47,7 @@ class SceneObject(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Objects(Answer, frozen=True, kw_only=True):
-    """All objects."""
+    """All scene objects."""
 
     objects: list[SceneObject]
 
@@ -48,7 +59,14 @@ class Values(Answer, frozen=True, kw_only=True):
 
 
 class Field(msgspec.Struct, frozen=True, kw_only=True):
-    """A field of a node. ``type``: its name in VRML97. ``settable``: whether ``set`` can set it."""
+    """A field of a node.
+
+    Attributes:
+        field: Name of the field.
+        type: Name of its type in VRML97.
+        value: Present value.
+        settable: Whether ``set`` can set the field.
+    """
 
     field: str
     type: str
@@ -57,7 +75,14 @@ class Field(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Node(msgspec.Struct, frozen=True, kw_only=True):
-    """A node of the VRML world. ``node``: its DEF name. ``of``: its joint, link or object."""
+    """A node of the VRML world.
+
+    Attributes:
+        node: DEF name of the node.
+        kind: Type of the node.
+        of: Joint, link or object to which the node belongs.
+        fields: Fields of the node.
+    """
 
     node: str
     kind: str
@@ -72,22 +97,32 @@ class World(Answer, frozen=True, kw_only=True):
 
 
 class Link(msgspec.Struct, frozen=True, kw_only=True):
-    """Pose of a link: ``T`` (4, 4) in the base frame."""
+    """Pose of a link.
+
+    Attributes:
+        name: Name of the link.
+        T: (4, 4) Pose in the base frame.
+    """
 
     name: str
     T: list[Numbers]
 
 
 class Links(Answer, frozen=True, kw_only=True):
-    """All links, the base first."""
+    """Poses of all links, the base first."""
 
     links: list[Link]
 
 
 class Mesh(Answer, frozen=True, kw_only=True):
-    """An uploaded mesh. ``key``: for ``place``. ``name``: the file's, changed if an object has it.
+    """An uploaded mesh.
 
-    ``text``: a summary of what was read. ``size``: along x, y, z [m].
+    Attributes:
+        key: Key for ``place``.
+        name: Name of the file, changed if an object already has it.
+        text: Summary of the file's content in words.
+        size: Size along x, y, z [m].
+        triangles: Number of triangles.
     """
 
     key: str
@@ -98,7 +133,13 @@ class Mesh(Answer, frozen=True, kw_only=True):
 
 
 class Scene(Answer, frozen=True, kw_only=True):
-    """A scene that was uploaded and can now be loaded. ``key``: for ``load``."""
+    """An uploaded scene, which can now be loaded.
+
+    Attributes:
+        key: Key for ``load``.
+        objects: Names of its objects.
+        text: Summary of the scene in words.
+    """
 
     key: str
     objects: list[str]

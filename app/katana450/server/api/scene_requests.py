@@ -1,4 +1,4 @@
-"""The requests about what there is to be seen: objects, water, and nodes of the VRML world."""
+"""Requests about scene objects, water, and nodes of the VRML world."""
 
 from __future__ import annotations
 
@@ -23,15 +23,24 @@ from katana450.server.api.fields import (
 
 
 class Place(Request, frozen=True, kw_only=True):
-    """Put an object somewhere: a new one, or one that is there, of which what is not given stays.
+    """Create an object, or change one. Fields that are not given keep their values.
 
-    ``shape`` and ``size`` [m] are what it counts as where contacts are looked for: box (x, y, z),
-    cylinder (radius, height) or sphere (radius); of a mesh ``mesh`` is its key, as the upload told
-    it, and the size is the file's. Its frame is in the middle of its underside. A new object
-    without ``T`` stands in front of the arm where there is room. ``can_be_held``: the fingers may
-    touch it, and hold it when both do. Such an object, cup and basin are refused where nothing
-    carries them: they stand on the table or on another thing. ``colour``: as "#94a3b8", or "own"
-    for that of the file. ``hidden``: it is not drawn, and counts for contacts even so.
+    Attributes:
+        name: Name of the object.
+        T: (4, 4) Pose in ``frame``; the object's own frame is in the middle of its underside. A new
+            object without ``T`` is placed where there is room in front of the arm. An object that
+            can be held, the cup and the basin are refused where nothing carries them: they stand
+            on the table or on another object.
+        frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
+        shape: Shape that is checked for contacts.
+        size: Size of the shape [m]: box (x, y, z), cylinder (radius, height), sphere (radius). The
+            size of a mesh is that of its file.
+        mesh: Key of the mesh, from the answer to its upload.
+        can_be_held: Whether the fingers may touch the object; they hold it when both touch it.
+        scale: Factor on the size.
+        colour: Colour such as "#94a3b8", or "own" for the colour of the file.
+        opacity: Opacity, 1 for an opaque object.
+        hidden: Whether the object is not drawn. It is checked for contacts nevertheless.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -50,10 +59,14 @@ class Place(Request, frozen=True, kw_only=True):
 
 
 class Attach(Request, frozen=True, kw_only=True):
-    """Fix an object to the hand, as a camera or another tool, or to the world again.
+    """Fix an object to the hand, for example a camera or a tool, or release it to the world.
 
-    ``T``: where on the hand, in the frame of the arm's default tool; without it, it stays where it
-    is.
+    Attributes:
+        name: Name of the object.
+        to: Body to which the object is fixed. With `"table"` it is put down upright on the table
+            below.
+        T: (4, 4) Pose on the hand, in the frame of the arm's default tool. Without it the object
+            stays where it is.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -64,9 +77,10 @@ class Attach(Request, frozen=True, kw_only=True):
 
 
 class Load(Request, frozen=True, kw_only=True):
-    """Have the objects of a scene that was uploaded, in place of all there are, and its water.
+    """Replace all objects and the water by those of an uploaded scene. The arm does not move.
 
-    The arm stays where it is.
+    Attributes:
+        scene: Key of the scene, from the answer to its upload.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -75,7 +89,11 @@ class Load(Request, frozen=True, kw_only=True):
 
 
 class Remove(Request, frozen=True, kw_only=True):
-    """Take an object away."""
+    """Remove an object.
+
+    Attributes:
+        name: Name of the object.
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -83,7 +101,11 @@ class Remove(Request, frozen=True, kw_only=True):
 
 
 class Fill(Request, frozen=True, kw_only=True):
-    """Fill the cup with so many ml of water, and wipe up what is elsewhere."""
+    """Fill the cup with water, and remove all water elsewhere.
+
+    Attributes:
+        ml: Volume in the cup [ml].
+    """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -91,25 +113,41 @@ class Fill(Request, frozen=True, kw_only=True):
 
 
 class FieldName(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A field of a node of the VRML world, by its DEF name."""
+    """A field of a node of the VRML world.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+    """
 
     node: NodeName
     field: NodeName
 
 
 class FieldSetting(FieldName, frozen=True, kw_only=True):
-    """What such a field is to be; null for how it is made."""
+    """A field of a node of the VRML world, and its new value.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+        value: New value; null restores the original one.
+    """
 
     value: FieldValue
 
 
 class Set(Request, frozen=True, kw_only=True):
-    """Set a field of the VRML world by the DEF name of its node, as VR Sink does; ``more`` at once.
+    """Set fields of the VRML world by the DEF names of their nodes, as VR Sink does.
 
-    Either all are set or, where one cannot be, none. The names are those of `katana450 export
-    vrml`; ``look`` at ``world`` lists them. A joint is never put anywhere: its ``rotation`` is an
-    order to go there, by the rules of ``joints``. ``value`` null: a colour, a transparency or a
-    choice as it is made.
+    If one field cannot be set, none is. The names are those of `katana450 export vrml`; ``query``
+    with ``world`` lists them. A ``rotation`` of a joint does not place the joint: it is a command
+    to move there, under the rules of ``joints``.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+        value: New value. Null restores the original colour, transparency or choice.
+        more: Further fields to set at the same time.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -121,7 +159,13 @@ class Set(Request, frozen=True, kw_only=True):
 
 
 class Get(Request, frozen=True, kw_only=True):
-    """Tell what a field of the VRML world is now, as VR Source does, and ``more`` of them."""
+    """Read fields of the VRML world by the DEF names of their nodes, as VR Source does.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+        more: Further fields to read at the same time.
+    """
 
     traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
 

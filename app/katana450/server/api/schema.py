@@ -1,4 +1,4 @@
-"""The API described from the shapes alone: as OpenAPI for tools, and for the page of docs/api."""
+"""Description of the API from the message classes: OpenAPI for tools, and the page docs/api.md."""
 
 from __future__ import annotations
 
@@ -26,36 +26,41 @@ READABLE = {
 
 
 def kinds(union: Any) -> tuple[type[msgspec.Struct], ...]:
-    """The shapes of a union, in order."""
+    """Return the message classes of a union, in order."""
     return get_args(union)
 
 
 def summary(kind: type) -> str:
-    """The first line of what is said of ``kind``."""
+    """Return the first line of the docstring of ``kind``."""
     return (inspect.getdoc(kind) or "").partition("\n")[0]
 
 
 @functools.cache
 def openapi_json(added: tuple[type[Request], ...] = ()) -> bytes:
-    """OpenAPI 3.1, as JSON. ``added``: requests of an extension."""
+    """Return the OpenAPI 3.1 description as JSON. ``added``: requests of an extension."""
     every: Any = Union[(requests.AnyRequest, *added)]
     shapes = [every, answers.AnyAnswer]
     (request, answer), components = msgspec.json.schema_components(
         shapes, ref_template="#/components/schemas/{name}"
     )
     paths: dict[str, Any] = {
-        path: {"get": {"summary": summary(kind), "responses": {"200": _told("Now.", kind), **DOOR}}}
+        path: {
+            "get": {
+                "summary": summary(kind),
+                "responses": {"200": _response("The present value.", kind), **COMMON_RESPONSES},
+            }
+        }
         for path, kind in READABLE.items()
     }
     paths["stop"] = {
         "post": {
             "summary": summary(requests.Stop),
-            "responses": {"204": {"description": "The arm comes to rest."}, **DOOR},
+            "responses": {"204": {"description": "The stop is requested."}, **COMMON_RESPONSES},
         }
     }
     paths["do"] = {"post": _do(request, answer)}
     paths["mesh"] = {"post": _mesh()}
-    paths["scene"] = {"get": _scene_out(), "post": _scene_in()}
+    paths["scene"] = {"get": _scene_download(), "post": _scene_upload()}
     described = {
         "openapi": "3.1.0",
         "info": {"title": TITLE, "version": str(requests.VERSION)},
@@ -69,24 +74,24 @@ def openapi_json(added: tuple[type[Request], ...] = ()) -> bytes:
     return msgspec.json.encode(described)
 
 
-DOOR = {
-    "401": {"description": "A token is asked for."},
-    "503": {"description": "The arm is not there yet."},
+COMMON_RESPONSES = {
+    "401": {"description": "A token is required."},
+    "503": {"description": "The arm is not ready yet."},
 }
-"""Answers of every path."""
+"""Responses of every path."""
 
 
 def _do(request: Any, answer: Any) -> dict[str, Any]:
-    """Of single requests, by their shapes and those of their answers."""
+    """Describe the path of single requests, by the schemas of requests and answers."""
     return {
-        "summary": "Do one request; whoever holds the arm keeps asking, ten times a second.",
+        "summary": "Execute one request. The holder of the lease sends ten a second.",
         "parameters": [
             {
                 "name": "X-Program",
                 "in": "header",
                 "required": True,
                 "schema": {"type": "string", "pattern": "^[A-Za-z0-9_-]{16,64}$"},
-                "description": "A secret key that tells programs apart; nobody else is shown it.",
+                "description": "A secret key that identifies the program; others never see it.",
             },
             {
                 "name": "X-Name",
@@ -100,80 +105,80 @@ def _do(request: Any, answer: Any) -> dict[str, Any]:
             "content": {"application/json": {"schema": request}},
         },
         "responses": {
-            "200": _shaped("Done, or what was asked for.", answer),
-            "409": _told("Not now.", answers.Refused),
-            "422": _told("Not understood.", answers.Refused),
-            **DOOR,
+            "200": _json_response("The request is done, or its answer.", answer),
+            "409": _response("The request is refused at present.", answers.Refused),
+            "422": _response("The request is invalid.", answers.Refused),
+            **COMMON_RESPONSES,
         },
     }
 
 
 def _mesh() -> dict[str, Any]:
     return {
-        "summary": "Bring a mesh, to be placed by its key.",
+        "summary": "Upload a mesh, which `place` then uses by its key.",
         "parameters": [
             _query("name", "The file's name, with its ending.", required=True),
             _query(
                 "format",
-                "wrl, stl, obj, ply, off, glb, gltf, dae or 3mf, where the name has no ending.",
+                "wrl, stl, obj, ply, off, glb, gltf, dae or 3mf, for a name without an ending.",
             ),
-            _query("unit", "mm, cm, in or m; without it that is guessed, and said."),
+            _query("unit", "mm, cm, in or m. Without it the unit is guessed and reported."),
         ],
-        **_brought("application/octet-stream", answers.Mesh),
+        **_upload("application/octet-stream", answers.Mesh),
     }
 
 
-def _scene_in() -> dict[str, Any]:
+def _scene_upload() -> dict[str, Any]:
     return {
-        "summary": "Bring a scene, to be loaded by its key.",
-        **_brought("application/zip", answers.Scene),
+        "summary": "Upload a scene, which `load` then uses by its key.",
+        **_upload("application/zip", answers.Scene),
     }
 
 
-def _scene_out() -> dict[str, Any]:
+def _scene_download() -> dict[str, Any]:
     return {
-        "summary": "What stands around, as a .zip of scene.yaml and its meshes.",
+        "summary": "Download the scene as a .zip of scene.yaml and its meshes.",
         "responses": {
             "200": {
-                "description": "Now.",
+                "description": "The present scene.",
                 "content": {"application/zip": {"schema": {"type": "string"}}},
             },
-            "409": _told("Not now.", answers.Refused),
-            **DOOR,
+            "409": _response("The request is refused at present.", answers.Refused),
+            **COMMON_RESPONSES,
         },
     }
 
 
-def _brought(media: str, kept: type) -> dict[str, Any]:
-    """Of a file that is sent, and answered as ``kept``."""
+def _upload(media: str, kept: type) -> dict[str, Any]:
+    """Describe an upload of type ``media`` that is answered with ``kept``."""
     return {
         "requestBody": {
             "required": True,
             "content": {media: {"schema": {"type": "string", "format": "binary"}}},
         },
         "responses": {
-            "200": _told("It is kept.", kept),
-            "422": _told("It cannot be read.", answers.Refused),
-            "413": {"description": "It is too long."},
-            "429": _told("Too many at once.", answers.Refused),
-            **DOOR,
+            "200": _response("The file is kept.", kept),
+            "422": _response("The file cannot be read.", answers.Refused),
+            "413": {"description": "The file is too large."},
+            "429": _response("Too many files are being uploaded.", answers.Refused),
+            **COMMON_RESPONSES,
         },
     }
 
 
-def _told(what: str, kind: type) -> dict[str, Any]:
-    return _shaped(what, {"$ref": f"#/components/schemas/{kind.__name__}"})
+def _response(description: str, kind: type) -> dict[str, Any]:
+    return _json_response(description, {"$ref": f"#/components/schemas/{kind.__name__}"})
 
 
-def _shaped(what: str, schema: Any) -> dict[str, Any]:
-    return {"description": what, "content": {"application/json": {"schema": schema}}}
+def _json_response(description: str, schema: Any) -> dict[str, Any]:
+    return {"description": description, "content": {"application/json": {"schema": schema}}}
 
 
-def _query(name: str, said: str, *, required: bool = False) -> dict[str, Any]:
+def _query(name: str, description: str, *, required: bool = False) -> dict[str, Any]:
     return {
         "name": name,
         "in": "query",
         "required": required,
         "schema": {"type": "string"},
-        "description": said,
+        "description": description,
     }

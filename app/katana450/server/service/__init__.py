@@ -1,1 +1,1 @@
-"""Requests of people and programs: who may drive, and what the arm does for them."""
+"""Execution of the requests of pages and programs, and the rules of the lease."""

@@ -1,4 +1,4 @@
-"""The arm as the gateway sees it: what it asks of it, and what it can tell of it."""
+"""Access of the gateway to one arm: its state, its properties, and commands to it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from katana450.server.service.nodes import Nodes
 
 
 class ArmHandle:
-    """One arm. Reads are for everybody; ``deliver`` is for ``CommandGate`` alone."""
+    """Handle of one arm. Everything may read it; only ``CommandGate`` may call ``deliver``."""
 
     def __init__(
         self,
@@ -39,8 +39,10 @@ class ArmHandle:
         planning_worker: PlanningWorker | None,
         nodes: Nodes,
     ) -> None:
-        """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
-        has a name in its VRML world.
+        """Connect the arm to ``link``.
+
+        ``planning_worker``: None for a mechanism that has only joints. ``nodes``: everything that
+        has a name in the VRML world of the arm.
         """
         self.robot = robot
         self.nodes = nodes
@@ -57,48 +59,51 @@ class ArmHandle:
 
     @property
     def snapshot(self) -> Snapshot:
-        """The newest."""
+        """The newest snapshot."""
         return self._state_publisher.snapshot
 
     @property
     def ready(self) -> FloatArray:
-        """(n,) the posture that Home drives to [rad]."""
+        """(n,) Posture to which Home moves [rad]."""
         return self.session.ready
 
     @property
     def environment(self) -> Environment:
-        """Knows where objects are."""
+        """The environment, which computes the poses of objects."""
         return self.session.environment
 
     @property
     def pouring(self) -> Pouring | None:
-        """Knows where water is."""
+        """The model of the water; None without one."""
         return self.session.pouring
 
     @property
     def arm(self) -> MountedArm:
-        """The arm. Raises InputError with the reason where there are only joints."""
+        """The arm. Raises InputError with the reason for a mechanism that has only joints."""
         if self.robot.arm is None:
             raise InputError(self.robot.joint_group.refusal)
         return self.robot.arm
 
     @property
     def loop_timing(self) -> LoopTiming:
-        """How well the control loop keeps its period."""
+        """The recent timing of the control loop."""
         return self._state_publisher.loop_timing
 
     @property
     def holding(self) -> FloatArray | None:
-        """(n,) torques that hold it still [N m]; None where nobody knows what it weighs."""
+        """(n,) Torques that hold the arm at rest [N m]; None where its masses are unknown."""
         return self._posture()[1] if self._loads else None
 
     @property
     def margins(self) -> Margins:
-        """How near it is to what it cannot pass. Raises InputError where there are only joints."""
+        """Distances to limits, singularity and contact.
+
+        Raises InputError for a mechanism that has only joints.
+        """
         return self._posture()[0]
 
     def _posture(self) -> tuple[Margins, FloatArray | None]:
-        """Worked out once for everybody who asks, and anew when something has changed."""
+        """Return margins and torques, computed again only when tool, world or posture change."""
         state = self.state
         world, x = self.session.world_at(state), state.x
         key = (state.tool, world, x.tobytes())
@@ -109,42 +114,42 @@ class ArmHandle:
         return self._measured[1]
 
     def choices(self) -> tuple[BranchOption, ...]:
-        """The branches there are to choose from. Raises InputError where there are none."""
+        """Return the branches that can be chosen. Raises InputError where there are none."""
         return self.session.choices(self.state)
 
     def deliver(self, command: cmd.Command, actor: Actor) -> int:
-        """Send ``command`` of ``actor``, which may give it; return its ticket.
+        """Send ``command`` of ``actor``, whose right was checked; return its ticket.
 
-        Raises InputError for a command that the arm cannot be given.
+        Raises InputError for a command that the arm cannot accept.
         """
         return self._sink.deliver(command, actor)
 
     def outcome(self, ticket: int) -> Future[Outcome]:
-        """Return what became of the command of ``ticket``, once the arm's process has told."""
+        """Return the outcome of the command of ``ticket``, once the arm's process reports it."""
         return self._state_publisher.outcomes.of(ticket)
 
     @property
     def state(self) -> State:
-        """The newest."""
+        """The newest state."""
         return self._state_publisher.snapshot.state
 
     @property
     def event_log(self) -> tuple[LogEntry, ...]:
-        """What held it back of late, oldest first."""
+        """Recent entries of the event log, the oldest first."""
         return self._state_publisher.event_log
 
     @property
     def caught_up(self) -> bool:
-        """Whether the newest state has every command in it."""
+        """True if the newest state includes every command."""
         return self.snapshot.ticket == self._link.last_ticket
 
     @property
     def busy(self) -> bool:
-        """Whether a way is being worked out that the arm will then go."""
+        """True while a path is being planned that the arm will then follow."""
         return self._planning_worker is not None and self._planning_worker.busy
 
     def heartbeat(self) -> None:
-        """Tell the arm that somebody watches over it."""
+        """Send a heartbeat of the server to the arm's process."""
         self._link.heartbeat()
 
     @property

@@ -1,4 +1,4 @@
-"""The only path of a command to the arm. Lease and stop are checked here and nowhere else."""
+"""The only path of a command to the arm. Only this module checks the lease and the stop."""
 
 from __future__ import annotations
 
@@ -23,43 +23,43 @@ PROTECTIVE = (cmd.Stop, cmd.Hold, cmd.SpeedScale)
 
 
 class RunningProgram(NamedTuple):
-    """The participant as which a program holds the lease, and the key of its owner."""
+    """Participant as which a program holds the lease, and the key of the program's owner."""
 
     person: Person
     owner: str
 
 
 class CommandGate:
-    """Accepts or refuses each command. Every method may be called in any thread.
+    """Gate that accepts or refuses each command. Every method may be called in any thread.
 
     A lock puts commands, stops and changes of the lease into one order. A gesture can be older than
-    that order shows: it waits in viser's socket while a stop comes and is cleared. So each gesture
-    carries the number of revocations at its receipt (``Actor.seen``), and an older number is
-    refused.
+    its place in that order: it can wait in viser's socket while a stop arrives and is cleared. So
+    each gesture carries the number of revocations at its receipt (``Actor.seen``), and the gate
+    refuses an older number.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """``clock``: in seconds."""
+        """Create a gate without an arm. ``clock`` is in seconds."""
         self._clock = clock
         self._lock = threading.RLock()
         self.lease = Lease()
         self.stopped: StopRecord | None = None
         self.arm: ArmInterface | None = None
-        """None until the arm is there."""
+        """The arm; None until it is ready."""
         self.program: RunningProgram | None = None
-        """None while no program runs."""
+        """The running program; None without one."""
         self.revocations = 0
-        """Number of stops, and of times that a holder lost the lease."""
+        """Number of stops and of losses of the lease."""
         self.on_stop: Callable[[], None] = lambda: None
-        """Called at each stop, before the arm is stopped."""
+        """Callback at each stop, before the arm gets it."""
         self._jogged = -cmd.JOG_TIME
 
     def submit(self, command: cmd.Command, actor: Actor) -> int:
-        """Give ``command`` of ``actor`` to the arm; return its ticket.
+        """Send ``command`` of ``actor`` to the arm; return its ticket.
 
-        The ticket of a stop, or of clearing one, is 0 while there is no arm. Raises LeaseError with
-        the reason why ``actor`` may not give it now, and InputError for a command that the arm
-        cannot be given. Takes the lease for ``actor`` if it is free.
+        Acquire the lease for ``actor`` if it is free. The ticket of a stop, or of clearing one, is
+        0 while there is no arm. Raises LeaseError if ``actor`` may not give the command now, and
+        InputError for a command that the arm cannot accept.
         """
         with self._lock:
             if isinstance(command, cmd.Stop):
@@ -67,11 +67,11 @@ class CommandGate:
             if not all(each.traits.while_stopped for each in command.parts):
                 self.check_runs()
             if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
-                raise LeaseError("The server itself does not move the arm.")
+                raise LeaseError("The server itself may not move the arm.")
             granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
             clears = isinstance(command, cmd.ClearStop)
             if not clears:
-                # Without an arm nothing can be done but to clear a stop.
+                # Without an arm only a stop can be cleared.
                 self.present()
             ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
             if clears:
@@ -81,18 +81,17 @@ class CommandGate:
             return ticket
 
     def claim(self, actor: Actor, *, pacing: bool = False) -> Actor:
-        """Return ``actor`` with the grounds on which it may command now; command nothing.
+        """Return ``actor`` with the grounds on which it may command now; send no command.
 
-        For a gesture that gives no command yet, or none at all, such as taking hold of a handle.
-        ``pacing``: the gesture pauses, resumes or slows down. Raises and takes a free lease as
-        ``submit`` does.
+        A gesture without a command, such as grabbing a handle, uses this. ``pacing``: the gesture
+        pauses, resumes or slows down. Raises, and acquires a free lease, as ``submit`` does.
         """
         with self._lock:
             self.check_runs()
             return self._granted(actor, pacing=pacing)
 
     def check_runs(self) -> ArmInterface:
-        """Return the arm. Raises LeaseError while there is none, or it is stopped."""
+        """Return the arm. Raises LeaseError while it is missing or stopped."""
         arm = self.present()
         self.check_not_stopped()
         return arm
@@ -106,7 +105,7 @@ class CommandGate:
         """Raise LeaseError for a gesture that is older than a stop or a loss of the lease."""
         if not self.is_current(actor):
             raise LeaseError(
-                "The arm was stopped or changed hands after you began this. Do it again."
+                "After you began this, the arm was stopped or the driver changed. Do it again."
             )
 
     def is_current(self, actor: Actor) -> bool:
@@ -114,29 +113,29 @@ class CommandGate:
         return actor.seen is None or actor.seen == self.revocations
 
     def present(self) -> ArmInterface:
-        """Return the arm. Raises LeaseError while there is none yet."""
+        """Return the arm. Raises LeaseError until it is ready."""
         if self.arm is None:
-            raise LeaseError("The arm is not there yet.")
+            raise LeaseError("The arm is not ready yet.")
         return self.arm
 
     # Lease
 
     def acquire(self, person: Person) -> None:
-        """Give the free lease to ``person``. Raises LeaseError."""
+        """Acquire the free lease for ``person``. Raises LeaseError if another person holds it."""
         with self._lock:
             self.lease = self.lease.acquire(person, self._clock())
 
     def change(self, event: Callable[[Lease, float], Lease], by: Actor = SERVER) -> None:
-        """Apply ``event`` to the lease at the present time; another holder finds an arm at rest.
+        """Apply ``event`` to the lease at the present time. A change of holder holds the arm.
 
-        ``by``: the giver of the hold at a change of holder. Raises LeaseError.
+        ``by``: actor in whose name the arm holds. Raises the LeaseError of ``event``.
         """
         with self._lock:
             lease = event(self.lease, self._clock())
             if lease.holder != self.lease.holder:
                 self._revoke()
                 if self.arm is not None:
-                    # The mailbox is full, or the arm's process does not answer.
+                    # InputError: the mailbox is full, or the arm's process does not answer.
                     with suppress(InputError):
                         grounds = Grounds.SERVER if by is SERVER else Grounds.LEASE
                         self.arm.deliver(cmd.Hold(), replace(by, grounds=grounds))
@@ -145,12 +144,12 @@ class CommandGate:
     # Stop
 
     def protect(self, why: str) -> None:
-        """Stop the arm on the server's own account, for the reason ``why``."""
+        """Stop the arm in the name of the server, for the reason ``why``."""
         with self._lock:
             self._stop(StopRecord(None, why), SERVER)
 
     def reconcile(self) -> None:
-        """Make gate and arm agree on whether the arm is stopped; to be called often."""
+        """Make gate and arm agree on whether the arm is stopped. Call this often."""
         with self._lock:
             arm = self.arm
             if arm is None:
@@ -161,13 +160,13 @@ class CommandGate:
                 self.stopped = self.stopped.seen(snapshot)
                 sent = self.stopped.ticket
                 if not stopped and (sent is None or snapshot.ticket >= sent):
-                    # An arm that came after the stop, or an error that undid it.
+                    # The arm started after the stop, or an error undid the stop.
                     self.stopped = self._requested(self.stopped, arm, SERVER)
             elif stopped and arm.caught_up:
-                self.protect("The arm lost the server and stopped.")
+                self.protect("The arm lost the connection to the server and stopped.")
 
     def moves(self) -> bool:
-        """Return whether the arm moves, or is about to."""
+        """Return whether the arm moves or is about to move."""
         with self._lock:
             jogged = self._clock() - self._jogged < cmd.JOG_TIME
             return self.arm is not None and (self.arm.state.moving or jogged)
@@ -189,7 +188,7 @@ class CommandGate:
         return stopped.requested(arm.deliver(cmd.Stop(), replace(actor, grounds=grounds)))
 
     def _revoke(self) -> None:
-        """Void every gesture that was received before now."""
+        """Void every gesture received so far."""
         self.revocations += 1
         self._jogged = -cmd.JOG_TIME
 

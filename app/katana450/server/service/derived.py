@@ -1,4 +1,4 @@
-"""Answers that follow from a snapshot alone, worked out once for everybody who asks."""
+"""Cache of answers that depend on a snapshot alone, shared by all clients."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from katana450.arm.runtime.state_publisher import Snapshot
 T = TypeVar("T")
 
 _FOUND: WeakKeyDictionary[Snapshot, dict[str, Any]] = WeakKeyDictionary()
-"""By snapshot and name; they go with the snapshot. For the gateway's thread alone."""
+"""Values by snapshot and name, dropped with the snapshot. For the gateway's thread alone."""
 
 
 def once(snapshot: Snapshot, name: str, work: Callable[[], T]) -> T:
-    """Return what ``work`` made when ``name`` was first asked of ``snapshot``.
+    """Return the result of ``work``, computed at the first request of ``name`` for ``snapshot``.
 
     An error is raised and not kept.
     """

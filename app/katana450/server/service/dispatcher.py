@@ -32,16 +32,15 @@ COMMANDS: dict[type[requests.Request], cmd.Command] = {
 }
 """Commands of the requests that have no fields."""
 
-
 ACCEPTED, UNKNOWN, REQUESTED = Verdict.ACCEPTED.value, "unknown", "requested"
 """Outcomes in answers that do not come from the arm's process."""
 
 OUTCOME_SECONDS = 1.0
-"""[s] Time in which the arm's process reports the outcome of a command; a tick takes 10 ms."""
+"""Timeout [s] for the outcome of a command from the arm's process; a tick takes 10 ms."""
 
 
 def driver_key(hub: Hub, window: Window) -> str:
-    """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
+    """Return the key of ``window`` if it drives or owns the running program, else ``""``."""
     holder, key = hub.lease.holder, window.person.key
     return key if holder == window.person or hub.gate.program == (holder, key) else ""
 
@@ -55,22 +54,22 @@ class Dispatcher:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._placing = ObjectRequests(hub)
+        self._objects = ObjectRequests(hub)
 
     def handle(self, window: Window, request: requests.Request, budget: Budget) -> answers.Answer:
         """Execute ``request`` and return its answer. Counts as a heartbeat of ``window``.
 
-        The outcome of a command may be still to come, see ``is_pending``.
+        The outcome of a command may still be pending, see ``is_pending``.
 
-        The processor time is taken from ``budget``; raises BusyError when that is used up. A
-        ``free`` request costs nothing, and neither do commands of the driver.
+        The processor time is charged to ``budget``; raises BusyError when that is used up. A
+        ``free`` request and a command of the driver cost nothing.
         """
         question, driver = request.traits.question, driver_key(self._hub, window)
         free = request.traits.free or (driver and not question)
         with nullcontext() if free else budget.charged(driver, question=question):
-            return msgspec.structs.replace(self._done(window, request), id=request.id)
+            return msgspec.structs.replace(self._execute(window, request), id=request.id)
 
-    def _done(self, window: Window, request: requests.Request) -> answers.Answer:
+    def _execute(self, window: Window, request: requests.Request) -> answers.Answer:
         hub = self._hub
         hub.heartbeat(window)
         match request:
@@ -82,25 +81,25 @@ class Dispatcher:
                 arm, first = hub.present(), requests.FieldName(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
             case requests.Stop(press=press):
-                # Waits for nothing: the states tell when the arm has confirmed it.
+                # Answered at once: later states confirm the stop.
                 return _done(hub.stop(window.actor, press), REQUESTED)
         if isinstance(request, hub.runner.request_types):
             return hub.runner.handle(window, request)
         command = self._command(request)
         if command is None:
-            self._arrange(window, request)
+            self._change_lease(window, request)
             return answers.Done()
-        # Read before: a stop that comes in between is newer than the answer.
+        # Read before the move: a stop in between is newer than the answer.
         revocations = hub.gate.revocations
         ticket = hub.move(window, command, request.revocations)
-        # A stream is not held up by its answers, and what is planned first has no ticket yet.
+        # A stream does not wait for its answers. A command that is planned first has no ticket yet.
         at_once = request.traits.stream or command.traits.planned or not ticket
         done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))
         return msgspec.structs.replace(done, revocations=revocations)
 
     @staticmethod
     def is_pending(answer: answers.Answer) -> bool:
-        """Return whether ``answer`` is that of a command whose outcome is still to come."""
+        """Return whether ``answer`` belongs to a command whose outcome is not known yet."""
         if not isinstance(answer, answers.Done):
             return False
         return answer.ticket is not None and answer.outcome is None
@@ -119,8 +118,8 @@ class Dispatcher:
             return msgspec.structs.replace(pending, outcome=UNKNOWN)
         return serialize.concluded(pending, outcome)
 
-    def _arrange(self, window: Window, request: requests.Request) -> None:
-        """Execute a request about the lease, which is no command."""
+    def _change_lease(self, window: Window, request: requests.Request) -> None:
+        """Execute a request about the lease."""
         hub = self._hub
         match request:
             case requests.Acquire():
@@ -139,7 +138,7 @@ class Dispatcher:
                 hub.decline(window, number)
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
-        """Return the command of ``request``; None for a request that is none."""
+        """Return the command of ``request``; None for a request about the lease."""
         if type(request) in COMMANDS:
             return COMMANDS[type(request)]
         match request:
@@ -159,7 +158,7 @@ class Dispatcher:
                 return cmd.SetGripper(angle)
             case requests.Set():
                 return self._setting(request)
-        return self._tool_command(request) or self._placing.command(request)
+        return self._tool_command(request) or self._objects.command(request)
 
     def _tool_command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of a request about the tool; None for another request."""
@@ -178,20 +177,20 @@ class Dispatcher:
                 return cmd.TakeBranch(Branch(shoulder, elbow))
         return None
 
-    def _setting(self, asked: requests.Set) -> cmd.Command:
+    def _setting(self, request: requests.Set) -> cmd.Command:
         """Return the command that sets fields of the VRML world, all at once."""
         arm = self._hub.present()
-        first = requests.FieldSetting(node=asked.node, field=asked.field, value=asked.value)
-        return arm.nodes.command(arm.state, (first, *asked.more))
+        first = requests.FieldSetting(node=request.node, field=request.field, value=request.value)
+        return arm.nodes.command(arm.state, (first, *request.more))
 
     def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
-        """(4, 4) from ``frame`` into {S}."""
+        """Return the transform (4, 4) from ``frame`` to {S}."""
         if frame is requests.Frame.SHOULDER:
             return np.eye(4)
         return se3.inverse(self._hub.present().arm.T_base_shoulder)
 
     def query(self, at: str) -> answers.Answer:
-        """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
+        """Return the answer to a ``query`` of ``at``. Raises LeaseError while there is no arm."""
         hub = self._hub
         match at:
             case "event_log":
@@ -204,7 +203,7 @@ class Dispatcher:
         return once(arm.snapshot, at, lambda: self._derived(arm, at))
 
     def _derived(self, arm: ArmInterface, at: str) -> answers.Answer:
-        """What follows from the newest snapshot alone."""
+        """Return the answer to a query that depends on the newest snapshot alone."""
         match at:
             case "arm":
                 return serialize.arm(arm.robot, arm.ready.tolist())
@@ -220,12 +219,12 @@ class Dispatcher:
 
 
 def _done(ticket: int | None, outcome: str | None, misfit: float | None = None) -> answers.Done:
-    """Return the answer to a command; a ``ticket`` of 0 is none."""
+    """Return the answer to a command; a ``ticket`` of 0 stands for no ticket."""
     return answers.Done(ticket=ticket or None, outcome=outcome, rotation_misfit=misfit)
 
 
 def _misfit(request: requests.Request) -> float | None:
-    """Return `so3.misfit` of the pose in ``request``; None where it has none."""
+    """Return ``so3.misfit`` of the pose in ``request``; None without a pose."""
     if isinstance(request, requests.Pose | requests.Place | requests.Attach) and request.T:
         return so3.misfit(np.array(request.T)[:3, :3])
     return None

@@ -1,4 +1,4 @@
-"""Why the arm did not reach its target, and whose command it was: for programs and the log."""
+"""Event log with times of day: findings of the arm and the commands that caused them."""
 
 from __future__ import annotations
 
@@ -33,34 +33,34 @@ UNITS = {
     Reason.LOPSIDED: "m",
     Reason.NOT_AT_START: "rad",
 }
-"""Of the amounts; the other reasons have none."""
+"""Units of the amounts; the other reasons have no amount."""
 
 
 @dataclass(frozen=True)
 class LogLine:
-    """An entry of the event log. when: in UTC."""
+    """An entry of the event log with its time of day in UTC, ``when``."""
 
     entry: LogEntry
     when: datetime
 
     @property
     def who(self) -> str | None:
-        """Name of the participant whose command it was; None where the server acted itself."""
+        """Name of the participant that gave the command; None for the server itself."""
         actor = self.entry.actor
         return None if actor is None or actor.channel is CommandChannel.SERVER else actor.name
 
 
 class EventLog:
-    """The newest lines."""
+    """The newest lines of the event log."""
 
     def __init__(self) -> None:
         self._lines: deque[LogLine] = deque(maxlen=MAX_KEPT_ENTRIES)
         self._seen: LogEntry | None = None
-        # Entries are on the loop's clock; people have another.
+        # Entries have times of the loop's monotonic clock.
         self._epoch = time.time() - time.perf_counter()
 
     def follow(self, event_log: Sequence[LogEntry]) -> None:
-        """Take down what ``event_log`` has that it had not before."""
+        """Add the new entries of ``event_log``."""
         for entry in _newer(event_log, self._seen):
             when = datetime.fromtimestamp(self._epoch + entry.t, UTC)
             self._lines.append(LogLine(entry, when))
@@ -71,12 +71,12 @@ class EventLog:
 
     @property
     def lines(self) -> tuple[LogLine, ...]:
-        """The oldest first."""
+        """All lines, the oldest first."""
         return tuple(self._lines)
 
 
 def _credit(entry: LogEntry) -> str:
-    """Return who did what on what grounds, as the beginning of a log line."""
+    """Return participant, channel, grounds and command, as the beginning of a log line."""
     actor = entry.actor
     if actor is None or actor.grounds is None:
         return ""

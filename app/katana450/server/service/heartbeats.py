@@ -1,4 +1,4 @@
-"""When each participant last gave a heartbeat, by the time its message was received."""
+"""Time of the newest heartbeat of each participant, by the receipt of its message."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from collections.abc import Callable
 from katana450.arm.runtime.readiness import SocketChannel, data_age, readable
 
 KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
-"""[s, s, probes] A host that is gone without a word is noticed within 11 s."""
+"""Keepalive of TCP [s, s, probes]. A host that disappears is detected within 11 s."""
 
 
 class LastHeartbeat:
-    """The newest heartbeat of one participant, stamped as it is handled."""
+    """The newest heartbeat of one participant, stamped when its message is handled."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """``clock``: in seconds; the participant is alive now."""
+        """Count the participant as alive now. ``clock`` is in seconds."""
         self._clock = clock
         self._newest = clock()
 
     def note(self) -> None:
-        """A message of the participant is being handled."""
+        """Note that a message of the participant is being handled."""
         self._newest = max(self._newest, self._clock() - self._age())
 
     @property
@@ -30,26 +30,27 @@ class LastHeartbeat:
         return self._newest
 
     def _age(self) -> float:
-        """Age of the newest message [s]."""
+        """Return the age of the newest message [s]."""
         return 0.0
 
 
 class Arrival(LastHeartbeat):
     """The newest heartbeat on one TCP connection, stamped by the kernel on arrival.
 
-    A message counts from when it arrived: one that is handled late is no later heartbeat, and
-    one that waits because the server is late is no silence.
+    A message counts from its arrival. Late handling does not make the heartbeat later, and a
+    message that waits for a busy server does not count as silence.
     """
 
     def __init__(
         self, line: SocketChannel | None, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """``line``: the socket; None where there is none, so that handling counts."""
+        """Stamp by ``line``, the socket; by the time of handling if it is None."""
         self._line = line
         super().__init__(clock)
 
     @property
     def newest(self) -> float:
+        """Time of the newest heartbeat [s], including a message that is not read yet."""
         if self._line is not None and readable(self._line.fileno()):
             self.note()
         return self._newest
@@ -59,7 +60,7 @@ class Arrival(LastHeartbeat):
 
 
 def keep_alive(listening: socket.socket) -> None:
-    """Have the kernel probe idle connections that ``listening`` accepts from now on."""
+    """Make the kernel probe idle connections that ``listening`` accepts from now on."""
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in KEEPALIVE.items():
         if hasattr(socket, name):

@@ -1,6 +1,6 @@
-"""Participants, and the watch over the one who drives.
+"""Participants, and the watch over the driver.
 
-Lives in the gateway's one thread; `CommandGate` decides which commands reach the arm.
+Runs in the gateway's one thread; ``CommandGate`` decides which commands reach the arm.
 """
 
 from __future__ import annotations
@@ -27,15 +27,23 @@ from katana450.server.service.stop_state import Presses, StopRecord
 from katana450.settings import Settings
 
 TICK = 0.02
-"""[s] Between two looks at whether somebody has fallen silent."""
+"""Interval of the checks for silence [s]."""
 
 REMEMBERED = 256
-"""Pages that are known again when they come back."""
+"""Number of pages that are recognised when they return."""
 
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """One open page; ``tell`` leaves it a notice, ``heartbeat`` is its newest heartbeat."""
+    """The record of one connected page or program.
+
+    Attributes:
+        person: Person and role.
+        number: Number, counted up from 1.
+        tell: Function that queues a notice to the client.
+        heartbeat: Newest heartbeat.
+        channel: Channel of its commands.
+    """
 
     person: Person
     number: int
@@ -45,19 +53,19 @@ class Window:
 
     @property
     def actor(self) -> Actor:
-        """The participant as the giver of a command that is handled on receipt."""
+        """The participant as the actor of a command that is handled on receipt."""
         return Actor(self.person, self.channel)
 
 
 class Takeover(NamedTuple):
-    """The newest take-over of the arm. drivers: keys of the windows that drove until then."""
+    """The newest take-over of the lease. ``drivers``: keys of the windows that drove before."""
 
     taker: Person
     drivers: frozenset[str]
 
 
 class Hub:
-    """The participants and their heartbeats. Times are in seconds."""
+    """All participants and their heartbeats. Times are in seconds."""
 
     def __init__(
         self,
@@ -66,8 +74,10 @@ class Hub:
         meshes: Meshes | None = None,
         runner: Callable[[Hub], Runner] | None = None,
     ) -> None:
-        """``hold_after``: silence of whoever drives [s] that stops an arm that moves. ``meshes``:
-        those there are at first. ``runner``: makes its ``Runner``, None for one that never
+        """Create a hub without participants.
+
+        ``hold_after``: heartbeat timeout of the driver [s] after which a moving arm is stopped.
+        ``meshes``: initial meshes. ``runner``: factory of the ``Runner``; None for one that never
         drives.
         """
         self.clock = clock
@@ -88,20 +98,20 @@ class Hub:
 
     @property
     def arm(self) -> ArmInterface | None:
-        """The arm; None until it is there."""
+        """The arm; None until it is ready."""
         return self.gate.arm
 
     @property
     def lease(self) -> Lease:
-        """Who drives."""
+        """The lease, which names the driver."""
         return self.gate.lease
 
     @property
     def stopped(self) -> StopRecord | None:
-        """Why nothing moves; None while the arm is not stopped."""
+        """The present stop; None while the arm is not stopped."""
         return self.gate.stopped
 
-    # Coming and going
+    # Participants
 
     def join(
         self,
@@ -111,10 +121,10 @@ class Hub:
         heartbeat: LastHeartbeat | None = None,
         channel: CommandChannel = CommandChannel.PAGE,
     ) -> Window:
-        """A page opens its control socket; one that comes back is who it was.
+        """Add a page or program; a page that returns keeps its person and number.
 
-        ``heartbeat``: its newest heartbeat; without one, what ``beat`` says. ``channel``: where
-        it gives its commands.
+        ``heartbeat``: its newest heartbeat; without one, calls of ``heartbeat`` count. ``channel``:
+        channel of its commands.
         """
         key = key_of(identity, page)
         person, number = self._known(key, identity)
@@ -124,7 +134,10 @@ class Hub:
         return window
 
     def leave(self, window: Window, *, for_good: bool = False) -> None:
-        """Its control socket is closed. ``for_good``: a program, which does not come back."""
+        """Remove ``window``, whose control socket is closed.
+
+        ``for_good``: the participant is a program, which does not return.
+        """
         person = window.person
         if self._windows.get(person.key) is not window:
             return
@@ -140,18 +153,18 @@ class Hub:
             self.release_lease(window)
 
     def present(self) -> ArmInterface:
-        """The arm. Raises LeaseError while there is none yet."""
+        """Return the arm. Raises LeaseError until it is ready."""
         return self.gate.present()
 
     def window(self, key: str) -> Window | None:
-        """The window of that key, if its control socket is open."""
+        """Return the window of ``key``; None unless its control socket is open."""
         return self._windows.get(key)
 
     def at_scene(self, key: str, seen: int) -> Actor:
-        """Return the giver of a gesture at viser's controls, in any thread.
+        """Return the actor of a gesture at viser's controls. For any thread.
 
-        ``key``: of the window; ``seen``: revocations at the receipt of the gesture. Raises
-        LeaseError where the window has no control socket.
+        ``key``: key of the window. ``seen``: number of revocations at the receipt of the gesture.
+        Raises LeaseError if the window has no control socket.
         """
         window = self._windows.get(key)
         if window is None:
@@ -159,51 +172,53 @@ class Hub:
         return Actor(window.person, CommandChannel.SCENE, seen)
 
     def show(self, key: str, picture: MeasuresAge) -> None:
-        """A page opens its way to viser; ``picture``: how far it is behind."""
+        """Add the connection of a page to viser. ``picture`` measures the age of its picture."""
         self._pictures[picture] = key
 
     def hide(self, picture: MeasuresAge) -> None:
-        """It is closed."""
+        """Remove the closed connection of a page to viser."""
         del self._pictures[picture]
 
     @property
     def watching(self) -> int:
-        """Browsers that are sent pictures."""
+        """Number of browsers that get pictures."""
         return len(self._pictures)
 
     def age(self, window: Window) -> float:
-        """How old the picture is that the window shows [s]."""
-        of_it = [each for each, key in self._pictures.items() if key == window.person.key]
-        return of_it[-1].age(self.clock()) if of_it else 0.0
+        """Return the age of the picture that the window shows [s]."""
+        pictures = [each for each, key in self._pictures.items() if key == window.person.key]
+        return pictures[-1].age(self.clock()) if pictures else 0.0
 
     @property
     def windows(self) -> list[Window]:
-        """All that are open, the oldest first."""
+        """All open windows, the oldest first."""
         return sorted(self._windows.values(), key=lambda window: window.number)
 
     def announce(self, why: str) -> None:
-        """Tell everybody why something that was asked is not done. For any thread."""
+        """Send all windows the reason for which a request is refused. For any thread."""
         for window in self.windows:
             window.tell({"is": "refused", "why": why})
 
-    # What people do
+    # Requests
 
     def stop(self, actor: Actor, press: str | None = None) -> int:
-        """Stop the arm for ``actor``, who may be anybody; return the ticket.
+        """Stop the arm for ``actor``, which needs no right to drive; return the ticket.
 
         A repeated ``press`` counts once: it changes nothing, and the ticket is 0.
         """
         return self.gate.submit(cmd.Stop(), actor) if self._presses.is_new(press) else 0
 
     def may_clear_stop(self, window: Window) -> bool:
-        """Return whether the window may clear a stop."""
+        """Return whether ``window`` may clear a stop."""
         holder = self.lease.holder
         return window.person.role.may_drive and holder in (None, window.person)
 
     def acquire(self, window: Window) -> None:
+        """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
         self.gate.acquire(window.person)
 
     def take(self, window: Window) -> None:
+        """Take the lease from its holder for ``window``. Raises LeaseError if not allowed."""
         driving = [
             each.person.key for each in self.windows if self.giver(each) == self.lease.holder
         ]
@@ -211,37 +226,40 @@ class Hub:
         self._takeover = Takeover(window.person, frozenset(driving))
 
     def request(self, window: Window) -> None:
+        """Request the lease from its holder for ``window``. Raises LeaseError."""
         self.gate.change(lambda lease, _: lease.request(window.person))
 
     def withdraw(self, window: Window) -> None:
+        """Withdraw the request of ``window`` for the lease."""
         self.gate.change(lambda lease, _: lease.withdraw(window.person))
 
     def taken_by(self, window: Window) -> str | None:
-        """Return who took the arm over from ``window`` and still holds it."""
+        """Return the name of the person who took the lease from ``window`` and still holds it."""
         takeover = self._takeover
         if takeover is None or window.person.key not in takeover.drivers:
             return None
         return takeover.taker.name if self.lease.holder == takeover.taker else None
 
     def release_lease(self, window: Window) -> None:
+        """Release the lease of ``window``. Raises LeaseError if another holds it."""
         self.gate.change(lambda lease, _: lease.release(window.person), window.actor)
         self._takeover = None
 
     def hand_over(self, window: Window, number: int) -> None:
-        """Give the arm to the window of that number; a program of ``window`` that holds it ends."""
+        """Hand the lease to the window of ``number``; a running program of ``window`` ends."""
         taker = self._numbered(number)
         self.gate.change(
             lambda lease, t: lease.hand_over(self.giver(window), taker.person, t), window.actor
         )
 
     def decline(self, window: Window, number: int) -> None:
-        """Decline the request for the arm of the window of that number, and tell it."""
-        asker = self._numbered(number)
-        self.gate.change(lambda lease, _: lease.decline(self.giver(window), asker.person))
-        asker.tell({"is": "refused", "why": f"{window.person.name} declined your request."})
+        """Decline the request of the window of ``number`` for the lease, and notify it."""
+        requester = self._numbered(number)
+        self.gate.change(lambda lease, _: lease.decline(self.giver(window), requester.person))
+        requester.tell({"is": "refused", "why": f"{window.person.name} declined your request."})
 
     def giver(self, window: Window) -> Person:
-        """Return as whom ``window`` may give the arm away: as its program, if that holds it."""
+        """Return the person as which ``window`` may hand over: its running program, or itself."""
         program = self.gate.program
         owns = program is not None and program.owner == window.person.key
         return program.person if program is not None and owns else window.person
@@ -249,27 +267,27 @@ class Hub:
     def _numbered(self, number: int) -> Window:
         found = next((each for each in self.windows if each.number == number), None)
         if found is None:
-            raise LeaseError("That window or program is gone.")
+            raise LeaseError("That window or program is no longer connected.")
         return found
 
     def heartbeat(self, window: Window) -> None:
-        """A message of the window is being handled: a heartbeat as of when it was received."""
+        """Count a message of ``window`` as a heartbeat at the time of its receipt."""
         window.heartbeat.note()
-        self._hear()
+        self._update_lease()
 
     def move(self, window: Window, command: cmd.Command, seen: int | None = None) -> int:
         """Submit ``command`` of ``window``; return its ticket. ``seen``: see ``Actor``."""
         return self.gate.submit(command, replace(window.actor, seen=seen))
 
-    # What time does
+    # Watch
 
     def tick(self) -> None:
-        """Look whether whoever drives is still there, and the arm; to be called every TICK."""
+        """Check that the driver and the arm are alive. Call this every ``TICK``."""
         arm = self.arm
-        self._hear()
-        silent = self._listen_for_silence(self.clock())
+        self._update_lease()
+        silent = self._check_driver(self.clock())
         if arm is not None:
-            # The arm stops by itself where nobody answers for whoever drives.
+            # Without heartbeats of the server the arm stops by itself.
             if not silent:
                 arm.heartbeat()
             self._watch(arm)
@@ -277,8 +295,8 @@ class Hub:
             self.gate.reconcile()
             self.runner.tick()
 
-    def _hear(self) -> None:
-        """Take over the newest heartbeat of whoever drives, by when it was received."""
+    def _update_lease(self) -> None:
+        """Renew the lease by the newest heartbeat of the driver, at the time of its receipt."""
         holder = self.lease.holder
         window = None if holder is None else self._windows.get(holder.key)
         if window is not None:
@@ -286,37 +304,37 @@ class Hub:
             self.gate.change(lambda lease, _: lease.hear(window.person, newest))
 
     def _watch(self, arm: ArmInterface) -> None:
-        """Stop an arm whose process does not answer: it stops once it is there again."""
+        """Stop an arm whose process does not answer; it stops once the process answers again."""
         age, due = arm.age, self.gate.moves() or not arm.caught_up
         if self.stopped is None and due and age > 2 * self._hold_after:
             self.gate.protect(f"The arm's process did not answer for {age:.1f} s.")
 
-    def _listen_for_silence(self, t: float) -> bool:
-        """Whether whoever drives is silent; an arm that moves is stopped then."""
+    def _check_driver(self, t: float) -> bool:
+        """Stop a moving arm if the driver is silent; return whether the driver is silent."""
         holder = self.lease.holder
         if holder is None or self.arm is None:
             return False
         silent = self.lease.silence(t) >= self._hold_after
         if silent and self.stopped is None and self.gate.moves():
-            there = holder.key in self._windows
-            why = "fell silent" if there else "lost the connection"
+            connected = holder.key in self._windows
+            why = "fell silent" if connected else "lost the connection"
             self.gate.protect(f"{holder.name} {why} while the arm moved.")
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
 
     def person_of(self, identity: Identity, page: str) -> Person:
-        """Return who speaks for ``page``, whether or not its control socket is open now."""
+        """Return the person at ``page``, whether or not its control socket is open now."""
         return self._known(key_of(identity, page), identity)[0]
 
     def _known(self, key: str, identity: Identity) -> tuple[Person, int]:
-        """Return person and number of the page of that key; a new page gets new ones."""
-        known = self._remembered.pop(key, None) or self._meet(key, identity)
+        """Return person and number of the page of ``key``; a new page gets new ones."""
+        known = self._remembered.pop(key, None) or self._new_person(key, identity)
         self._remembered[key] = known
         while len(self._remembered) > REMEMBERED:
             self._remembered.pop(next(iter(self._remembered)))
         return known
 
-    def _meet(self, key: str, identity: Identity) -> tuple[Person, int]:
+    def _new_person(self, key: str, identity: Identity) -> tuple[Person, int]:
         self._numbers += 1
         number = self._numbers
         name = identity.name or f"Window {number}"
@@ -327,11 +345,11 @@ class Hub:
 
 
 def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
-    """Return ``visitor`` as a giver of commands without a window of its own."""
+    """Return ``identity`` as the actor of a command, without a window."""
     person = Person(identity.session, identity.name or "Somebody", identity.role)
     return Actor(person, channel)
 
 
 def key_of(identity: Identity, page: str) -> str:
-    """What ties the sockets of one page together."""
+    """Return the key that the sockets of one page have in common."""
     return f"{identity.session}/{page}"

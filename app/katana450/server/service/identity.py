@@ -1,4 +1,4 @@
-"""Identity of a client that may come in."""
+"""Identity of an accepted client."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from katana450.arm.control.lease import Role
 
 @dataclass(frozen=True)
 class Identity:
-    """A client that was let in.
+    """Identity of an accepted client.
 
     Attributes:
-        session: tells browsers and programs apart.
-        name: that of the access link; None without one.
-        role: what the client may do.
+        session: Text that identifies the browser, the program or the access link.
+        name: Name of the access link; None without one.
+        role: Role of the client.
     """
 
     session: str

@@ -1,4 +1,4 @@
-"""The arm and the pictures, as the hub asks of them."""
+"""Interfaces of the arm and of the pictures that the hub uses."""
 
 from __future__ import annotations
 
@@ -24,66 +24,87 @@ from katana450.server.service.nodes import Nodes
 
 
 class ArmInterface(Protocol):
-    """What the gateway asks of the arm; ``ArmHandle`` is one."""
+    """Interface of the arm for the gateway; ``ArmHandle`` implements it."""
 
     @property
-    def robot(self) -> Robot: ...
+    def robot(self) -> Robot:
+        """The robot: an arm, or a mechanism that has only joints."""
 
     @property
-    def arm(self) -> MountedArm: ...
+    def arm(self) -> MountedArm:
+        """The arm. Raises InputError for a mechanism that has only joints."""
 
     @property
-    def nodes(self) -> Nodes: ...
+    def nodes(self) -> Nodes:
+        """Everything that has a name in the VRML world of the arm."""
 
     @property
-    def snapshot(self) -> Snapshot: ...
+    def snapshot(self) -> Snapshot:
+        """The newest snapshot."""
 
     @property
-    def state(self) -> State: ...
+    def state(self) -> State:
+        """The newest state."""
 
     @property
-    def ready(self) -> FloatArray: ...
+    def ready(self) -> FloatArray:
+        """(n,) Posture to which Home moves [rad]."""
 
     @property
-    def session(self) -> Session: ...
+    def session(self) -> Session:
+        """The rules of the robot."""
 
     @property
-    def loop_timing(self) -> LoopTiming: ...
+    def loop_timing(self) -> LoopTiming:
+        """The recent timing of the control loop."""
 
     @property
-    def environment(self) -> Environment: ...
+    def environment(self) -> Environment:
+        """The environment, which computes the poses of objects."""
 
     @property
-    def pouring(self) -> Pouring | None: ...
+    def pouring(self) -> Pouring | None:
+        """The model of the water; None without one."""
 
     @property
-    def holding(self) -> FloatArray | None: ...
+    def holding(self) -> FloatArray | None:
+        """(n,) Torques that hold the arm at rest [N m]; None where its masses are unknown."""
 
     @property
-    def margins(self) -> Margins: ...
+    def margins(self) -> Margins:
+        """Distances to limits, singularity and contact. Raises InputError without an arm."""
 
     @property
-    def event_log(self) -> Sequence[LogEntry]: ...
+    def event_log(self) -> Sequence[LogEntry]:
+        """Recent entries of the event log, the oldest first."""
 
     @property
-    def caught_up(self) -> bool: ...
+    def caught_up(self) -> bool:
+        """True if the newest state includes every command."""
 
     @property
-    def busy(self) -> bool: ...
+    def busy(self) -> bool:
+        """True while a path is being planned that the arm will then follow."""
 
     @property
-    def age(self) -> float: ...
+    def age(self) -> float:
+        """Time since the arm's process last proved that its control loop runs [s]."""
 
-    def heartbeat(self) -> None: ...
+    def heartbeat(self) -> None:
+        """Send a heartbeat of the server to the arm's process."""
 
-    def deliver(self, command: cmd.Command, actor: Actor) -> int: ...
+    def deliver(self, command: cmd.Command, actor: Actor) -> int:
+        """Send ``command`` of ``actor``; return its ticket. Raises InputError if refused."""
 
-    def outcome(self, ticket: int) -> Future[Outcome]: ...
+    def outcome(self, ticket: int) -> Future[Outcome]:
+        """Return the outcome of the command of ``ticket``, once it is reported."""
 
-    def choices(self) -> tuple[BranchOption, ...]: ...
+    def choices(self) -> tuple[BranchOption, ...]:
+        """Return the branches that can be chosen. Raises InputError where there are none."""
 
 
 class MeasuresAge(Protocol):
-    """How far a window's picture is behind; ``Flow`` is one."""
+    """Interface for the age of a window's picture; ``Flow`` implements it."""
 
-    def age(self, t: float) -> float: ...
+    def age(self, t: float) -> float:
+        """Return the age of the picture [s] at time ``t`` [s]."""

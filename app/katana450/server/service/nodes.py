@@ -1,4 +1,4 @@
-"""The links of a running arm by their names, and what an extension names besides."""
+"""Access to the links of a running arm by name; an extension adds the nodes of the VRML world."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from katana450.server.api import answers, requests
 
 
 class Nodes:
-    """Where the links are. An extension that names more overrides the other methods."""
+    """Poses of the links. An extension with further nodes overrides the other methods."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
 
     def links(self, state: State) -> answers.Links:
-        """Return where every link is."""
+        """Return the poses of all links."""
         frames = self._robot.frames(self._values(state))
         return answers.Links(links=[answers.Link(name=n, T=T.tolist()) for n, T in frames.items()])
 
@@ -30,13 +30,13 @@ class Nodes:
         return answers.World(nodes=[])
 
     def read(self, state: State, asked: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:  # noqa: ARG002
-        """Return what the fields are now. Raises InputError for a name that there is not."""
+        """Return the present values of the fields. Raises InputError for an unknown name."""
         raise _not_installed()
 
     def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:  # noqa: ARG002
-        """Return what sets all of these. Raises InputError if one of them cannot be set."""
+        """Return the command that sets all fields. Raises InputError if one cannot be set."""
         raise _not_installed()
 
 
 def _not_installed() -> InputError:
-    return InputError("There are no nodes: the extension that names them is not installed.")
+    return InputError("There are no nodes. Install the extension that provides them.")

@@ -1,4 +1,4 @@
-"""What is asked of the objects around: put, fixed to the hand, taken away, filled."""
+"""Commands for the requests about scene objects and water."""
 
 from __future__ import annotations
 
@@ -20,13 +20,16 @@ from katana450.server.service.hub import Hub
 
 
 class ObjectRequests:
-    """Makes commands of it, or raises the InputError or LeaseError that says why not."""
+    """Translates requests about scene objects and water into commands.
+
+    Raises InputError or LeaseError with the reason for a refusal.
+    """
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
 
     def command(self, request: requests.Request) -> cmd.Command | None:
-        """What the arm is told; None for a request about something else."""
+        """Return the command of ``request``; None for a request about something else."""
         match request:
             case requests.Place():
                 return cmd.PlaceObject(self._object(request))
@@ -37,25 +40,25 @@ class ObjectRequests:
             case requests.Fill(ml=ml):
                 return cmd.Fill(ML * ml)
             case requests.Remove(name=name):
-                self._out_of_the_hand(name)
+                self._known(name)
                 return cmd.Remove(name)
         return None
 
-    def _object(self, asked: requests.Place) -> SceneObject:
-        """What is to be put where; what is not said of it stays as it is."""
+    def _object(self, request: requests.Place) -> SceneObject:
+        """Return the requested object at its place; fields that are not given keep their values."""
         arm = self._hub.present()
-        known = self._out_of_the_hand(asked.name)
+        known = self._known(request.name)
         if known is None and len(arm.state.objects) >= MAX_OBJECTS:
-            raise InputError(f"There are {MAX_OBJECTS} objects already: take one away.")
-        scene_object = self._shaped(asked, known)
-        if asked.T is None:
+            raise InputError(f"There are {MAX_OBJECTS} objects already: remove one first.")
+        scene_object = self._shaped(request, known)
+        if request.T is None:
             return (
                 scene_object
                 if known is not None
                 else replace(scene_object, T=free_place(scene_object, arm.state.objects))
             )
-        T = se3.printed(asked.T, f"The pose of {asked.name!r}")
-        if asked.frame is requests.Frame.SHOULDER:
+        T = se3.printed(request.T, f"The pose of {request.name!r}")
+        if request.frame is requests.Frame.SHOULDER:
             T = arm.arm.T_base_shoulder @ T
         if scene_object.fixed:
             T = arm.environment.into_hand(T, arm.state.x)
@@ -64,84 +67,88 @@ class ObjectRequests:
             check_carried(arm.environment.table, arm.state.objects, placed)
         return placed
 
-    def _shaped(self, asked: requests.Place, known: SceneObject | None) -> SceneObject:
-        """What it is, wherever that is."""
-        form = None if known is None else known.shape
+    def _shaped(self, request: requests.Place, known: SceneObject | None) -> SceneObject:
+        """Return the requested object, not moved yet. ``known``: the object of that name."""
+        shape = None if known is None else known.shape
         size = None if known is None else known.size
         solid = None if known is None else known.solid
-        if asked.shape is not None:
-            form = Shape(asked.shape.value)
-        if asked.mesh is not None:
-            solid = self._hub.meshes.need(asked.mesh).solid
-        if asked.size is not None:
-            size = tuple(asked.size)
-        if form is Shape.MESH:
+        if request.shape is not None:
+            shape = Shape(request.shape.value)
+        if request.mesh is not None:
+            solid = self._hub.meshes.need(request.mesh).solid
+        if request.size is not None:
+            size = tuple(request.size)
+        if shape is Shape.MESH:
             if solid is None:
-                raise InputError(f"Say the mesh of {asked.name!r}: the key that the upload told.")
+                raise InputError(
+                    f"{request.name!r} needs `mesh`: the key in the answer to its upload."
+                )
             size = solid.size
-        elif asked.mesh is not None:
-            raise InputError(f"{asked.name!r} has a mesh when its form is mesh.")
+        elif request.mesh is not None:
+            raise InputError(f"{request.name!r} can have `mesh` only with the shape `mesh`.")
         else:
             solid = None
-        if form is None or size is None:
-            raise InputError(f"There is no {asked.name!r} yet: say its form and size.")
+        if shape is None or size is None:
+            raise InputError(f"There is no {request.name!r} yet: give its `shape` and `size`.")
         scale = 1.0 if known is None else known.scale
-        if asked.scale is not None:
-            scale = asked.scale
-        if scale != 1.0 and asked.name in (CUP, BASIN):
-            raise InputError(f"The {asked.name} is as large as the water in it counts on.")
+        if request.scale is not None:
+            scale = request.scale
+        if scale != 1.0 and request.name in (CUP, BASIN):
+            raise InputError(
+                f"The {request.name} cannot be scaled: the water model depends on its size."
+            )
         can_be_held = known is not None and known.can_be_held
-        if asked.can_be_held is not None:
-            can_be_held = asked.can_be_held
+        if request.can_be_held is not None:
+            can_be_held = request.can_be_held
         return SceneObject(
-            asked.name,
-            form,
+            request.name,
+            shape,
             size,
             np.eye(4) if known is None else known.T,
             can_be_held,
             solid=solid,
             scale=scale,
-            appearance=_look(asked, PLAIN if known is None else known.appearance),
+            appearance=_appearance(request, PLAIN if known is None else known.appearance),
             fixed=known is not None and known.fixed,
         )
 
-    def _attached(self, asked: requests.Attach) -> cmd.Command:
-        """Where it is, or where on the hand it is to be."""
+    def _attached(self, request: requests.Attach) -> cmd.Command:
+        """Return the command that fixes the object where it is, or at a pose on the hand."""
         arm = self._hub.present()
-        scene_object = self._out_of_the_hand(asked.name)
+        scene_object = self._known(request.name)
         if scene_object is None:
-            raise InputError(f"There is no {asked.name!r}.")
-        to = Attachment(asked.to.value)
+            raise InputError(f"There is no {request.name!r}.")
+        to = Attachment(request.to.value)
         hand = arm.environment.hand
-        if asked.T is None or hand is None:
+        if request.T is None or hand is None:
             check_mounted(arm.environment, arm.state.objects, scene_object, to, arm.state.x)
-            return cmd.Attach(asked.name, to)
+            return cmd.Attach(request.name, to)
         if to is not Attachment.HAND:
-            raise InputError("T is where on the hand it is to be; to put it elsewhere, `place` it.")
-        T = hand.T_palm_tool @ se3.printed(asked.T)
+            raise InputError("`T` is a pose on the hand. Use `place` for a pose elsewhere.")
+        T = hand.T_palm_tool @ se3.printed(request.T)
         return cmd.PlaceObject(replace(scene_object, T=T, fixed=True))
 
-    def _out_of_the_hand(self, name: str) -> SceneObject | None:
-        """The object of that name, if there is one. Raises InputError when it is held."""
+    def _known(self, name: str) -> SceneObject | None:
+        """Return the object of ``name``; None without one. Raises InputError while it is held."""
         arm = self._hub.present()
         if any(link.name == name for link in arm.robot.links) or name == "table":
-            raise InputError(f"{name!r} is no object that can be put elsewhere.")
+            raise InputError(f"{name!r} is not an object that can be moved.")
         known = named(arm.state.objects, name)
         if known is not None and known.held:
             raise InputError(f"{name!r} is held: open the gripper first.")
         return known
 
 
-def _look(asked: requests.Place, known: ObjectAppearance) -> ObjectAppearance:
-    """How it is to be drawn."""
+def _appearance(request: requests.Place, known: ObjectAppearance) -> ObjectAppearance:
+    """Return the requested appearance; fields that are not given are those of ``known``."""
     colour = known.colour
-    if asked.colour is not None:
+    if request.colour is not None:
         colour = None
-        if asked.colour != "own":
-            red, green, blue = bytes.fromhex(asked.colour[1:])
+        if request.colour != "own":
+            red, green, blue = bytes.fromhex(request.colour[1:])
             colour = (red, green, blue)
     return ObjectAppearance(
         colour,
-        known.opacity if asked.opacity is None else asked.opacity,
-        known.hidden if asked.hidden is None else asked.hidden,
+        known.opacity if request.opacity is None else request.opacity,
+        known.hidden if request.hidden is None else request.hidden,
     )

@@ -1,4 +1,4 @@
-"""Base of what drives the arm over time: an extension overrides its methods, as for programs."""
+"""Base class of runners, which drive the arm over time. The extension for programs overrides it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 
 
 class StatusLine(NamedTuple):
-    """The state line of the page: the colour of its lamp, two or three words, one sentence."""
+    """The state line of the page: the colour of its lamp, a headline, and one sentence."""
 
     mood: str
     headline: str
@@ -27,14 +27,14 @@ class StatusLine(NamedTuple):
 
 
 class Runner:
-    """Drives the arm over time as a participant of its own, on behalf of an owner. This one: never.
+    """A runner drives the arm over time on behalf of an owner. This base class never does.
 
-    A run joins the hub as a participant, holds the lease, and submits its commands as everybody
-    does; ``CommandGate.program`` names it and its owner meanwhile. The hub calls the methods below
-    in the server's thread, except where they name another. There is one runner in a server.
+    A run joins the hub as a participant, holds the lease, and submits its commands through the
+    gate. Meanwhile ``CommandGate.program`` names the run and its owner. The hub calls the methods
+    below in the server's thread, except where they name another. A server has one runner.
 
     Attributes:
-        request_types: Classes of the requests that ``handle`` answers, beside those of the core.
+        request_types: Classes of the requests that ``handle`` answers, in addition to the core's.
         controls: Labels of its controls in the panel. ``check_may_touch`` decides who may use them.
     """
 
@@ -42,7 +42,7 @@ class Runner:
     controls: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, hub: Hub, options: Namespace) -> None:  # noqa: ARG002
-        """``options``: of ``katana450 serve``."""
+        """Create a runner for ``hub``. ``options``: those of ``katana450 serve``."""
         self.hub = hub
 
     def handle(self, window: Window, request: Request) -> answers.Answer:
@@ -59,24 +59,24 @@ class Runner:
         """Look at the arm and continue. Called every ``TICK`` after the watch over the driver."""
 
     def stopped(self) -> None:
-        """Note a stop, before the arm gets it: nothing asked for earlier may begin afterwards.
+        """Note a stop, before the arm gets it. No earlier request may begin afterwards.
 
-        Called in any thread, under the lock of the gate: it must return at once.
+        Called in any thread, under the lock of the gate, so it must return at once.
         """
 
     def redirected(self) -> None:
-        """Note that the arm got a command that supersedes what waits to begin. In any thread."""
+        """Note a command that supersedes a run that waits to begin. Called in any thread."""
 
     def leave(self, window: Window) -> None:
-        """Note that ``window`` is gone for good."""
+        """Note that ``window`` is closed and will not return."""
 
     def progress(self) -> answers.Progress | None:
-        """Return the progress of the present or last run, which is a part of the state."""
+        """Return the progress of the present or last run; the state includes it."""
 
     def status_line(self, state: State, line: StatusLine) -> StatusLine:  # noqa: ARG002
-        """Return the state line of the page in place of ``line``, which tells of ``state``.
+        """Return the state line of the page in place of ``line``, which describes ``state``.
 
-        It is not called while the arm is stopped, blocked or at fault.
+        Not called while the arm is stopped, blocked or at fault.
         """
         return line
 
@@ -95,6 +95,6 @@ def guarded(note: Callable[[], None]) -> Callable[[], None]:
         try:
             note()
         except Exception:
-            log.exception("The runner met an error.")
+            log.exception("Error in the runner.")
 
     return noted

@@ -1,4 +1,4 @@
-"""Scenes that wait to be loaded, and the names of what stands around."""
+"""Uploaded scenes that wait to be loaded, and free names for objects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from katana450.server.service.interfaces import ArmInterface
 
 MAX_WAITING_SCENES = 4
-"""Scenes that were brought and not loaded yet."""
+"""Maximum number of uploaded scenes that are not loaded yet."""
 
 
 class _Waiting(NamedTuple):
@@ -24,7 +24,7 @@ class _Waiting(NamedTuple):
 
 
 class Scenes:
-    """Scenes by their keys, each a command that loads it and the meshes of its objects."""
+    """Uploaded scenes by their keys: the command that loads each, and the meshes of its objects."""
 
     def __init__(self, meshes: Meshes) -> None:
         self._meshes = meshes
@@ -33,9 +33,9 @@ class Scenes:
     def keep(
         self, key: str, command: cmd.ReplaceScene, meshes: Collection[Mesh], arm: ArmInterface
     ) -> None:
-        """Keep a scene under ``key``; the oldest gives way.
+        """Keep a scene under ``key``, and drop the oldest if there are too many.
 
-        Raises InputError if ``arm`` cannot have it, or there is no room for ``meshes``.
+        Raises InputError if ``arm`` refuses the scene, or there is no room for ``meshes``.
         """
         arm.session.check(command)
         self._meshes.put(meshes, used_in(arm.state))
@@ -44,10 +44,13 @@ class Scenes:
             self._waiting.pop(next(iter(self._waiting)))
 
     def furnishing(self, key: str, arm: ArmInterface) -> cmd.ReplaceScene:
-        """What loads the scene. Raises InputError, LeaseError with the reason why not."""
+        """Return the command that loads the scene.
+
+        Raises InputError for an unknown key, and LeaseError while an object is held.
+        """
         waiting = self._waiting.get(key)
         if waiting is None:
-            raise InputError("There is no scene of that key, or no more: upload it again.")
+            raise InputError(f"There is no scene {key!r}, or it was dropped. Upload it again.")
         held = arm.state.held
         if held is not None:
             raise LeaseError(f"{held.name!r} is held: open the gripper first.")
@@ -64,6 +67,6 @@ def used_in(state: State | None) -> frozenset[str]:
 
 
 def free_name(name: str, taken: set[str]) -> str:
-    """Return ``name``, with a number behind it if it is ``taken``."""
-    tried = [name, *(f"{name[:36]} {number}" for number in range(2, MAX_OBJECTS + 3))]
-    return next(each for each in tried if each not in taken)
+    """Return ``name``, with a number appended if it is ``taken``."""
+    candidates = [name, *(f"{name[:36]} {number}" for number in range(2, MAX_OBJECTS + 3))]
+    return next(each for each in candidates if each not in taken)

@@ -1,4 +1,4 @@
-"""What programs are told of the arm: its state, what it is, what held it back, its branches."""
+"""Conversion of states, findings, objects and other values into API answers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from katana450.server.service.interfaces import ArmInterface
 
 
 def finding(found: control.Finding) -> answers.Finding:
-    """A reason with its number, in SI units."""
+    """Return a finding as a part of an answer, in SI units."""
     unit = UNITS.get(found.reason)
     return answers.Finding(
         reason=found.reason.value,
@@ -47,7 +47,7 @@ def finding(found: control.Finding) -> answers.Finding:
 
 
 def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | answers.Refused:
-    """Return ``done`` with the outcome of its command, or the refusal that this is."""
+    """Return ``done`` with the outcome of its command; ``Refused`` for a refused command."""
     if outcome.verdict is control.Verdict.REFUSED:
         return answers.Refused(id=done.id, why=reason(outcome))
     return msgspec.structs.replace(
@@ -62,7 +62,7 @@ def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | an
 
 
 def state(hub: Hub) -> answers.State:
-    """The newest. Raises LeaseError while there is no arm yet."""
+    """Return the newest state. Raises LeaseError until there is an arm."""
     arm = hub.present()
     snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
     return msgspec.structs.replace(
@@ -80,7 +80,7 @@ def state(hub: Hub) -> answers.State:
 
 
 def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
-    """What follows from ``snapshot`` alone; the rest is filled in for each answer."""
+    """Return the part that depends on ``snapshot`` alone; ``state`` fills in the rest."""
     now = snapshot.state
     tool = None if arm.robot.arm is None else _Tool.of(arm.robot.arm, now)
     return answers.State(
@@ -121,7 +121,7 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
 
 
 def margins(found: Margins) -> answers.Margins:
-    """How near the arm is to what it cannot pass."""
+    """Return the distances to limits, singularity and contact as a part of an answer."""
     nearest = found.nearest
     return answers.Margins(
         limit=found.limit,
@@ -133,7 +133,7 @@ def margins(found: Margins) -> answers.Margins:
 
 
 class _Tool(NamedTuple):
-    """Where the tool of an arm is: T (4, 4) in {S}, pitch and roll [rad]; and how fast [m/s]."""
+    """Tool of an arm: pose ``T`` (4, 4) in {S}, pitch and roll [rad], speed [m/s]."""
 
     T: list[answers.Numbers]
     pitch: float
@@ -142,6 +142,7 @@ class _Tool(NamedTuple):
 
     @classmethod
     def of(cls, arm: MountedArm, now: control.State) -> _Tool:
+        """Return the tool of ``arm`` in the state ``now``."""
         chain = arm.chain_to(now.tool)
         five = ToolTarget.at(chain, now.q)
         speed = tool_speed(chain, now.setpoint, now.motion.qd)
@@ -149,7 +150,7 @@ class _Tool(NamedTuple):
 
 
 def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
-    """Where it is."""
+    """Return the water as a part of an answer; None without a cup."""
     if pouring is None or now.poured is None:
         return None
     water = now.poured.water
@@ -163,16 +164,16 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
 
 
 def arm(robot: Robot, ready: list[float]) -> answers.Arm:
-    """``ready``: the posture that Home drives to."""
+    """Return the description of ``robot``. ``ready``: posture to which Home moves."""
     found = robot.arm
     if found is None:
         joints = robot.joint_group
         jointed = _Jointed(joints.names, joints.slides, joints.limits, joints.why)
-        return jointed.told(robot.name, ready)
+        return jointed.description(robot.name, ready)
     names, gripper = found.chain.names, found.gripper
     jointed = _Jointed(names, (False,) * len(names), found.limits)
     return msgspec.structs.replace(
-        jointed.told(robot.name, ready),
+        jointed.description(robot.name, ready),
         tools={name: M.tolist() for name, M in found.tools.items()},
         default_tool=found.default_tool,
         gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
@@ -182,15 +183,15 @@ def arm(robot: Robot, ready: list[float]) -> answers.Arm:
 
 
 class _Jointed(NamedTuple):
-    """What every mechanism has. why: no tool of it can be brought to a pose."""
+    """Joints of a mechanism. ``why``: reason for which no tool can be moved to a pose."""
 
     names: tuple[str, ...]
     slides: tuple[bool, ...]
     limits: Limits
     why: str = ""
 
-    def told(self, name: str, ready: list[float]) -> answers.Arm:
-        """Without tools."""
+    def description(self, name: str, ready: list[float]) -> answers.Arm:
+        """Return the description of a mechanism without tools."""
         return answers.Arm(
             name=name,
             joints=list(self.names),
@@ -211,12 +212,12 @@ class _Jointed(NamedTuple):
 
 
 def event_log(lines: Sequence[LogLine]) -> answers.EventLog:
-    """What held the arm back of late."""
-    return answers.EventLog(lines=[line(each) for each in lines])
+    """Return lines of the event log as an answer."""
+    return answers.EventLog(lines=[log_line(each) for each in lines])
 
 
-def line(line: LogLine) -> answers.LogLine:
-    """One of the journal's."""
+def log_line(line: LogLine) -> answers.LogLine:
+    """Return one line of the event log as a part of an answer."""
     actor = line.entry.actor
     grounds = None if actor is None or actor.grounds is None else actor.grounds.value
     return answers.LogLine(
@@ -230,7 +231,7 @@ def line(line: LogLine) -> answers.LogLine:
 
 
 def branch_option(choice: BranchOption) -> answers.BranchOption:
-    """One that a person could take."""
+    """Return a branch that can be chosen as a part of an answer."""
     metrics, contact = choice.metrics, choice.contact
     return answers.BranchOption(
         shoulder=metrics.branch.shoulder,
@@ -247,7 +248,7 @@ def branch_option(choice: BranchOption) -> answers.BranchOption:
 
 
 def objects(arm: ArmInterface) -> answers.Objects:
-    """What stands around or is held."""
+    """Return all scene objects as an answer."""
     now = arm.state
     x = now.x
     return answers.Objects(
@@ -274,13 +275,13 @@ def objects(arm: ArmInterface) -> answers.Objects:
 
 
 def hexadecimal(colour: Colour) -> str:
-    """As "#94a3b8"."""
+    """Return ``colour`` as text such as "#94a3b8"."""
     red, green, blue = colour
     return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def loop(loop_timing: LoopTiming) -> answers.Loop:
-    """How well the loop keeps its period."""
+    """Return the timing of the control loop as an answer."""
     return answers.Loop(
         period=loop_timing.period,
         ticks=loop_timing.count,

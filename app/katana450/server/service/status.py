@@ -1,4 +1,4 @@
-"""What a page is told of the arm and of who drives it."""
+"""Status of the arm and of the lease, as a page shows it."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from katana450.server.service.hub import Hub, Window
 from katana450.server.service.runner import StatusLine
 
 NO_STATE = 0.3
-"""[s] Without a word of the arm's process, after which its state counts as unknown."""
+"""Silence of the arm's process [s] after which its state counts as unknown."""
 
 FIRST = (Status.FAULT, Status.STOPPED, Status.BLOCKED)
-"""States of the arm that the page tells whatever drives it."""
+"""States of the arm that have priority over the status of a runner."""
 
-AGE_WORTH_TELLING = 0.2
-"""[s] A picture that is younger counts as now."""
+MIN_SHOWN_AGE = 0.2
+"""Minimum age of a picture [s] that the page shows."""
 
 
 def silence(hub: Hub) -> float | None:
-    """Time since the arm's process last answered [s], once it is longer than NO_STATE."""
+    """Return the time since the arm's process last answered [s]; None up to ``NO_STATE``."""
     age = 0.0 if hub.arm is None else hub.arm.age
     return age if age > NO_STATE else None
 
 
 def health(hub: Hub) -> str | None:
-    """What is wrong with the server, in words; None when it is well."""
+    """Return what is wrong with the server, in words; None if nothing is."""
     if hub.arm is None:
-        return "The arm is not there yet."
+        return "The arm is not ready yet."
     age = silence(hub)
-    return None if age is None else f"No word from the arm's process for {age:.1f} s."
+    return None if age is None else f"No answer from the arm's process for {age:.1f} s."
 
 
 def common(hub: Hub) -> dict[str, Any]:
-    """The part that is the same for all."""
+    """Return the part of the status that is the same for all pages."""
     state = hub.arm.state if hub.arm is not None else None
     stopped, holder, age = hub.stopped, hub.lease.holder, silence(hub)
     now = StatusLine("starting", "Starting", "")
@@ -45,9 +45,9 @@ def common(hub: Hub) -> dict[str, Any]:
     if stopped is not None:
         now = StatusLine("stopped", "Stopped", "")
     if age is not None:
-        now = StatusLine("lost", "No word from the arm", f"What is shown is {age:.1f} s old.")
+        now = StatusLine("lost", "No answer from the arm", f"The state shown is {age:.1f} s old.")
     if stopped is not None and not stopped.confirmed:
-        why = f"The arm has not confirmed it. {now.why}".rstrip()
+        why = f"The arm has not confirmed the stop. {now.why}".rstrip()
         now = StatusLine("stopped", "Stop requested", why)
     return {
         **now._asdict(),
@@ -60,16 +60,16 @@ def common(hub: Hub) -> dict[str, Any]:
 
 
 def of(hub: Hub, window: Window) -> dict[str, Any]:
-    """The part that is its own."""
+    """Return the part of the status that is for ``window`` alone."""
     person, lease = window.person, hub.lease
     mine = lease.holder == person
-    # The owner of a program decides while the program drives.
+    # While a program drives, its owner decides on requests for the lease.
     decides = hub.giver(window) == lease.holder
     program = hub.runner.progress()
     taker = hub.taken_by(window)
     age = hub.age(window)
     clears = hub.may_clear_stop(window)
-    other = lease.holder.name if lease.holder is not None else "whoever may drive"
+    other = lease.holder.name if lease.holder is not None else "an operator"
     until = "Clear stop is pressed" if clears else f"{other} clears the stop"
     return {
         "may_clear_stop": clears,
@@ -91,5 +91,5 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
         "taken": "" if taker is None else f"{taker} took over from you.",
         "planning": program is not None and program.status == "planning",
         "orders": list(hub.runner.orders(window)) if hub.arm is not None else [],
-        "age": round(age, 1) if age >= AGE_WORTH_TELLING else 0,
+        "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
     }

@@ -1,4 +1,4 @@
-"""Why nothing moves, and whether the arm has confirmed it."""
+"""Reason of a stop, and whether the arm has confirmed it."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import Self
 from katana450.arm.runtime.state_publisher import Snapshot
 
 REMEMBERED = 256
-"""Presses of STOP that are known when they are repeated."""
+"""Number of presses of STOP whose repetitions are recognised."""
 
 
 @dataclass(frozen=True)
 class StopRecord:
-    """Why nothing moves.
+    """A stop and its reason.
 
     Attributes:
-        by: name of the participant who pressed STOP; None when the gateway itself stopped the arm.
-        why: the reason in words.
-        ticket: of the newest stop that was sent to the arm; None before one was sent.
-        confirmed: whether a state of the arm, newer than the request, is stopped.
+        by: Name of the participant who pressed STOP; None when the gateway itself stopped the arm.
+        why: Reason in words.
+        ticket: Ticket of the newest stop sent to the arm; None before one was sent.
+        confirmed: Whether a state of the arm that is newer than the request is stopped.
     """
 
     by: str | None
@@ -30,28 +30,28 @@ class StopRecord:
 
     @property
     def stage(self) -> str:
-        """``requested``, or ``confirmed`` once the arm has shown that it is stopped."""
+        """Stage of the stop: ``requested``, then ``confirmed`` by a state of the arm."""
         return "confirmed" if self.confirmed else "requested"
 
     def requested(self, ticket: int) -> Self:
-        """The stop was sent (again) as ``ticket`` and is not confirmed yet."""
+        """Return the record of the stop sent (again) as ``ticket``, not confirmed yet."""
         return replace(self, ticket=ticket, confirmed=False)
 
     def seen(self, snapshot: Snapshot) -> Self:
-        """Confirmed, once ``snapshot`` has the request in it and is stopped; else as it was."""
+        """Return the record, confirmed if ``snapshot`` includes the request and is stopped."""
         if self.confirmed or self.ticket is None or snapshot.ticket < self.ticket:
             return self
         return self if snapshot.state.stopped is None else replace(self, confirmed=True)
 
 
 class Presses:
-    """Presses of STOP that were counted."""
+    """Recent presses of STOP, each of which counts once."""
 
     def __init__(self) -> None:
         self._counted: deque[str] = deque(maxlen=REMEMBERED)
 
     def is_new(self, press: str | None) -> bool:
-        """Count ``press``; whether it was not counted before. Without a name each is new."""
+        """Count ``press``; return whether it is new. A press without a name is always new."""
         if press is None:
             return True
         if press in self._counted:

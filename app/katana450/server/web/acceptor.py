@@ -1,9 +1,9 @@
-"""Accepts connections, few at a time, and closes those that say nothing or are too many.
+"""Acceptor of connections in small batches, which closes idle and surplus connections.
 
-A connection is *waiting* until somebody known asks for something on it, and again once that is
-answered. Only so many may wait: one more takes the place of the one that has waited longest among
-those of the address that has most. So no address can keep others out, not even a reverse proxy's,
-from which everybody comes.
+A connection is *waiting* until a known client sends a request on it, and again once that is
+answered. The number of waiting connections is bounded. One more replaces the oldest waiting
+connection of the address that has the most of them. So no address can keep others out, not even
+that of a reverse proxy, from which all connections come.
 """
 
 from __future__ import annotations
@@ -23,43 +23,44 @@ from katana450.platform_support import raise_open_file_limit
 log = logging.getLogger(__name__)
 
 MAX_WAITING = 64
-"""Connections that may wait at a time, of everybody together."""
+"""Maximum number of waiting connections of all clients together."""
 
 WAITING_TIMEOUT = 10.0
-"""[s] After which a waiting connection is closed: nothing said, half a request, half a handshake
-of TLS, or nothing more."""
+"""Timeout [s] after which a waiting connection is closed: without a request, with half a request or
+half a TLS handshake, or idle after an answer."""
 
 SEND_TIMEOUT = 120.0
-"""[s] In which an answer has left for a slow reader, or is given up."""
+"""Timeout [s] for sending an answer to a slow reader."""
 
 ACCEPT_BATCH = 8
-"""Connections accepted in one turn of the event loop: STOP waits for this many at most."""
+"""Connections accepted in one turn of the event loop: STOP waits for at most this many."""
 
 CHECK_EVERY = 0.5
-"""[s] Between two looks at who has waited too long."""
+"""Interval of the timeout checks [s]."""
 
 BACK_OFF = 0.2
-"""[s] Without accepting, after the system had no room for another connection."""
+"""Pause [s] in accepting after the system had no room for another connection."""
 
 LOG_EVERY = 10.0
-"""[s] Between two lines in the log about the same trouble."""
+"""Minimum interval [s] of log lines about the same problem."""
 
 DESCRIPTORS = 1024
-"""Files and sockets that may have to be open at once: two or three for each of the connections that
-are allowed, and a reserve for libraries, files and pipes."""
+"""Maximum number of files and sockets open at once: two or three for each allowed connection, and a
+reserve for libraries, files and pipes."""
 
 WANTED_DESCRIPTORS = 4096
+"""Limit of open files that the server requests from the system."""
 
 NO_DESCRIPTOR_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 
 
 def raise_descriptor_limit() -> None:
-    """Let this process open WANTED_DESCRIPTORS files, or as many as the system allows."""
+    """Raise the limit of open files to ``WANTED_DESCRIPTORS``, or as far as the system allows."""
     limit = raise_open_file_limit(WANTED_DESCRIPTORS)
     if limit is not None and limit < DESCRIPTORS:
         log.warning(
-            "Only %d files can be open at once: a crowd can use them up, and STOP from a new "
-            "connection fails then. Raise the limit to %d (`ulimit -n`).",
+            "Only %d files can be open at once. Many clients can use them up, and STOP from a new "
+            "connection then fails. Raise the limit to %d (`ulimit -n`).",
             limit,
             DESCRIPTORS,
         )
@@ -67,7 +68,7 @@ def raise_descriptor_limit() -> None:
 
 @dataclass(eq=False)
 class _Connection:
-    """One that is open. since: when it began to wait, or was found to be closing [s]."""
+    """An open connection. ``since``: time at which it began to wait or was found closing [s]."""
 
     sock: socket.socket
     client: tuple[str, int]
@@ -78,10 +79,11 @@ class _Connection:
 
     @property
     def open(self) -> bool:
+        """True while the socket is open."""
         return self.sock.fileno() >= 0
 
     def close(self) -> None:
-        """Close it at once; what was not sent is lost."""
+        """Close the connection at once; unsent data is lost."""
         if self.transport is not None:
             self.transport.abort()
         elif self.opening is not None:
@@ -89,10 +91,10 @@ class _Connection:
 
 
 class Acceptor:
-    """Accepts the connections of one listening socket and hands each to a protocol."""
+    """Accepts the connections of one listening socket and passes each to a protocol."""
 
     def __init__(self, listening: socket.socket, waiting: int = MAX_WAITING) -> None:
-        """``waiting``: connections that may wait at a time."""
+        """Prepare to accept from ``listening``. ``waiting``: maximum of waiting connections."""
         self._listening = listening
         self._maximum = waiting
         self._waiting: dict[tuple[str, int], _Connection] = {}
@@ -103,26 +105,26 @@ class Acceptor:
     def start(
         self, protocol: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None = None
     ) -> Acceptor:
-        """Accept from now on, in the running event loop."""
+        """Start to accept connections in the running event loop."""
         self._listening.setblocking(False)
         work = (self._accept(protocol, tls), self._watch())
         self._tasks = [asyncio.create_task(each) for each in work]
         return self
 
     def close(self) -> None:
-        """Accept no more; what is open stays so."""
+        """Stop accepting; open connections stay open."""
         for task in self._tasks:
             task.cancel()
 
     async def wait_closed(self) -> None:
-        """Return once nothing more is accepted, and close what still waits."""
+        """Wait until accepting has ended, then close the waiting connections."""
         await asyncio.gather(*self._tasks, return_exceptions=True)
         for connection in tuple(self._waiting.values()):
             connection.close()
 
     @contextmanager
     def kept(self, client: tuple[str, int] | None) -> Iterator[None]:
-        """Spare the connection of ``client`` while something is done for it."""
+        """Exempt the connection of ``client`` from closing inside the ``with`` block."""
         connection = None if client is None else self._waiting.pop(client, None)
         if connection is None:
             yield
@@ -156,7 +158,7 @@ class Acceptor:
                 self._wait(connection)
                 if len(self._waiting) > self._maximum:
                     self._make_room(self._maximum)
-            # An accept that need not wait gives nobody else a turn.
+            # An accept that returns at once does not yield to other tasks.
             await asyncio.sleep(0)
 
     async def _open(
@@ -166,15 +168,15 @@ class Acceptor:
         tls: ssl.SSLContext | None,
     ) -> None:
         loop = asyncio.get_running_loop()
-        patience = None if tls is None else WAITING_TIMEOUT
+        timeout = None if tls is None else WAITING_TIMEOUT
         with suppress(OSError):
             connection.transport, _ = await loop.connect_accepted_socket(
-                protocol, connection.sock, ssl=tls, ssl_handshake_timeout=patience
+                protocol, connection.sock, ssl=tls, ssl_handshake_timeout=timeout
             )
 
     def _wait(self, connection: _Connection) -> None:
         connection.since = asyncio.get_running_loop().time()
-        # The newest stands last, even where a port of the other side is used again.
+        # The newest comes last, even where the client uses a port again.
         self._waiting.pop(connection.client, None)
         self._waiting[connection.client] = connection
 
@@ -183,7 +185,7 @@ class Acceptor:
             del self._waiting[connection.client]
 
     def _make_room(self, maximum: int) -> None:
-        """Close the oldest of the address with most of them, if more than ``most`` wait."""
+        """Close the oldest connection of the commonest address if more than ``maximum`` wait."""
         for connection in tuple(self._waiting.values()):
             if not connection.open:
                 self._forget(connection)
@@ -202,7 +204,7 @@ class Acceptor:
         while True:
             await asyncio.sleep(CHECK_EVERY)
             before, t = t, loop.time()
-            # What came while the loop was held up itself is not read yet.
+            # Data that arrived while the loop itself was delayed is not read yet.
             held_up = max(t - before - 2.0 * CHECK_EVERY, 0.0)
             for connection in tuple(self._waiting.values()):
                 connection.since += held_up
@@ -214,17 +216,17 @@ class Acceptor:
                     self._forget(connection)
                     connection.close()
             for connection in tuple(self._busy.values()):
-                # A peer that reads nothing never lets it end.
+                # If the peer reads nothing, closing never ends by itself.
                 if connection.transport is not None and connection.transport.is_closing():
                     if not connection.closing:
                         connection.closing, connection.since = True, t
                     elif t - connection.since > WAITING_TIMEOUT:
                         connection.close()
 
-    def _report(self, what: str) -> None:
-        """Log it, unless it was logged just now."""
+    def _report(self, problem: str) -> None:
+        """Log ``problem``, but not more often than every ``LOG_EVERY``."""
         t = asyncio.get_running_loop().time()
-        if t - self._logged.get(what, -LOG_EVERY) >= LOG_EVERY:
+        if t - self._logged.get(problem, -LOG_EVERY) >= LOG_EVERY:
             self._logged = {key: at for key, at in self._logged.items() if t - at < LOG_EVERY}
-            self._logged[what] = t
-            log.warning("%s", what)
+            self._logged[problem] = t
+            log.warning("%s", problem)

@@ -1,7 +1,7 @@
-"""Access links: who was given one, for how long, and the secret that signs them.
+"""Access links: their names, roles and expiries, and the secret that signs them.
 
-All of it is in one file that its owner alone can read. A link holds a signed token with a number
-and an expiry; what the number stands for is in the file, so striking it out there ends it at once.
+All of this is in one file that only its owner can read. A link holds a signed token with a number
+and an expiry. The grant of the number is in the file, so deleting it there ends the link at once.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MAX_TOKEN_LENGTH = 400
 
 
 class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What one link is good for. ``expires``: seconds since the epoch."""
+    """Rights of one link. ``expires``: seconds since the epoch."""
 
     name: str
     role: Role
@@ -41,9 +41,9 @@ class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass
 class AccessFile:
-    """The links that were given out; read again whenever the file has changed.
+    """The links that were given out. The file is read again whenever it has changed.
 
-    A file that cannot be read any more while it is in use takes nobody's link away.
+    If the file becomes unreadable while it is in use, the last links read stay valid.
     """
 
     path: Path
@@ -53,28 +53,31 @@ class AccessFile:
 
     @classmethod
     def open(cls, path: Path) -> AccessFile:
-        """Of a file that is there. Raises ConfigurationError with what to do about it."""
+        """Open an existing file. Raises ConfigurationError with what to do if that fails."""
         file = cls(path)
         file._refresh()
         return file
 
     @classmethod
     def create(cls, path: Path) -> AccessFile:
-        """Likewise; made with a new secret if it is not there."""
+        """Open a file; create it with a new secret if it does not exist."""
         if not path.exists():
             cls(path)._write(_Content(secrets.token_urlsafe(32), {}))
         return cls.open(path)
 
     @property
     def grants(self) -> dict[str, Grant]:
-        """By number, those that have expired too."""
+        """Grants by number, including expired ones."""
         self._refresh()
         return dict(self._content.grants)
 
     def give(self, name: str, role: Role, expires: float) -> str:
-        """A token for a new link, good until ``expires`` [s since the epoch]."""
+        """Return a token for a new link, valid until ``expires`` [s since the epoch].
+
+        Raises InputError for an invalid name.
+        """
         if not (name.isprintable() and 0 < len(name) <= MAX_NAME_LENGTH):
-            raise InputError(f"A name has 1 to {MAX_NAME_LENGTH} characters that can be printed.")
+            raise InputError(f"A name needs 1 to {MAX_NAME_LENGTH} printable characters.")
         self._refresh()
         number = secrets.token_hex(8)
         grants = self._content.grants | {number: Grant(name, role, expires)}
@@ -82,7 +85,7 @@ class AccessFile:
         return str(self._signer().dumps([number, expires]))
 
     def revoke(self, number: str) -> Grant:
-        """Strike a link out. Raises InputError when there is none of that number."""
+        """Delete the link of ``number``; return its grant. Raises InputError if there is none."""
         grants = self.grants
         if number not in grants:
             raise InputError(f"There is no link {number!r}; `katana450 access list` shows them.")
@@ -91,7 +94,7 @@ class AccessFile:
         return grant
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
-        """The number and grant of a token that is good at ``now`` [s since the epoch], or None."""
+        """Return number and grant of a token valid at ``now`` [s since the epoch], or None."""
         if len(token) > MAX_TOKEN_LENGTH:
             return None
         self._refresh_or_keep()
@@ -110,31 +113,31 @@ class AccessFile:
         return URLSafeSerializer(self._content.secret, salt=SALT)
 
     def _refresh_or_keep(self) -> None:
-        """Read the file again; while that fails the last good links count, which is logged once."""
+        """Read the file again. If that fails, log it once; the last links read stay valid."""
         try:
             self._refresh()
         except ConfigurationError as error:
             if self._failure != str(error):
                 self._failure = str(error)
-                log.error("The last good links count until this is mended. %s", error)
+                log.error("The last links that could be read stay valid. %s", error)
         else:
             self._failure = None
 
     def _refresh(self) -> None:
         try:
-            about = self.path.stat()
+            status = self.path.stat()
         except OSError as error:
             raise ConfigurationError(
                 f"The access file {self.path} cannot be read: {error.strerror}. "
                 "`katana450 access give --file PATH` makes one."
             ) from error
-        read_at = (about.st_mtime_ns, about.st_size, about.st_ino)
+        read_at = (status.st_mtime_ns, status.st_size, status.st_ino)
         if read_at == self._read_at:
             return
-        if readable_by_others(about):
+        if readable_by_others(status):
             raise ConfigurationError(
-                f"Others can read the access file {self.path}: chmod 600 {self.path}, and if "
-                "somebody may have read it, delete it and give new links."
+                f"Other users can read the access file {self.path}. Run `chmod 600 {self.path}`. "
+                "If it may have been read, delete it and give new links."
             )
         try:
             self._content = msgspec.json.decode(self.path.read_bytes(), type=_Content)

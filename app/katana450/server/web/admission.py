@@ -1,7 +1,7 @@
 """Identity of each client, and the limits on its connections and requests.
 
-Sits between the security headers and the application. A connection on which somebody known asks for
-something is spared by the acceptor for as long; all others may be closed to make room.
+This middleware runs between the security headers and the application. While a known client has a
+request on a connection, the acceptor keeps it open. All others may be closed to make room.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
 
 SOCKETS, SOCKETS_EACH = 256, 32
-"""Websockets at a time, of all together and of one identity; a page has two, a program one."""
+"""Maximum of open websockets, in total and of one identity. A page has two, a program one."""
 
 REQUESTS, REQUESTS_EACH = 128, 16
-"""HTTP requests that are answered at a time."""
+"""Maximum of concurrent HTTP requests, in total and of one identity."""
 
 STOP_PATHS = ("/stop", f"{ROOT}/stop")
-"""Always answered. They read no body, so they end at once."""
+"""Paths that are always answered. They read no body, so they end at once."""
 
 TOO_MANY = 429
 
@@ -33,35 +33,36 @@ LIMIT_CLOSE_CODE = 4429
 RETRY = {"Retry-After": "1"}
 
 
-def identity(authenticator: Authenticator, asked: HTTPConnection) -> str | None:
-    """Whose budget and places ``asked`` takes from: of a link or cookie, else of an address.
+def identity(authenticator: Authenticator, connection: HTTPConnection) -> str | None:
+    """Return the link, cookie or address to whose limits ``connection`` counts.
 
-    None for a stranger where the server asks for a link.
+    Return None for an unknown client where the server requires a link.
     """
-    found = authenticator.identity(asked.cookies)
+    found = authenticator.identity(connection.cookies)
     if found is None and authenticator.asks:
-        found = authenticator.program("", asked.headers.get("authorization", ""))
+        found = authenticator.program("", connection.headers.get("authorization", ""))
     if found is not None:
         return found.session
-    return None if authenticator.asks else address_of(asked)
+    return None if authenticator.asks else address_of(connection)
 
 
-def address_of(asked: HTTPConnection) -> str:
-    """The address that ``asked`` comes from."""
-    return "" if asked.client is None else asked.client.host
+def address_of(connection: HTTPConnection) -> str:
+    """Return the host address of the client of ``connection``."""
+    return "" if connection.client is None else connection.client.host
 
 
 async def refuse(socket: WebSocket, why: str) -> None:
-    """Close a websocket that was asked for, and say why.
+    """Close a requested websocket with the reason ``why``.
 
-    It is accepted first: browsers and our client show nobody the answer to a handshake that fails.
+    The websocket is accepted first: browsers and our client do not show the answer to a handshake
+    that fails.
     """
     await socket.accept()
     await socket.close(LIMIT_CLOSE_CODE, why)
 
 
 class Admission:
-    """Middleware that refuses more than there are places for."""
+    """Middleware that limits concurrent requests and websockets."""
 
     def __init__(self, app: ASGIApp, authenticator: Authenticator, acceptor: Acceptor) -> None:
         self._app = app
@@ -71,20 +72,22 @@ class Admission:
         self._sockets = ConnectionLimit(SOCKETS, SOCKETS_EACH)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        asked = HTTPConnection(scope)
-        who = identity(self._authenticator, asked)
+        """Pass the request on, or refuse it if a limit is reached."""
+        connection = HTTPConnection(scope)
+        who = identity(self._authenticator, connection)
         socket = scope["type"] == "websocket"
         if who is None or (not socket and scope["path"] in STOP_PATHS):
             await self._app(scope, receive, send)
             return
-        client = None if asked.client is None else (asked.client.host, asked.client.port)
+        peer = connection.client
+        client = None if peer is None else (peer.host, peer.port)
         with (self._sockets if socket else self._requests).taken(who) as free:
             if free:
                 with self._acceptor.kept(client):
                     await self._app(scope, receive, send)
             elif socket:
-                why = "Too many connections of yours are open. Close some windows or programs."
+                why = "You have too many open connections. Close some windows or programs."
                 await refuse(WebSocket(scope, receive, send), why)
             else:
-                why = "Too many requests of yours at once. Wait for their answers."
+                why = "You sent too many requests at once. Wait for their answers."
                 await PlainTextResponse(why, TOO_MANY, RETRY)(scope, receive, send)

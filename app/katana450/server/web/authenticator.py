@@ -1,4 +1,4 @@
-"""Who stands at the door: the same machine's people without a word, others by their links."""
+"""Authentication of clients: by access links, or without them on the same machine."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from katana450.server.service.identity import Identity
 from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile
 
 SESSION_SIZE = 22
-"""Characters of a session's name: 16 random bytes."""
+"""Length of a session's name in characters: 16 random bytes."""
 
 CHECK_EVERY = 1.0
-"""[s] Between two looks at whether somebody is still welcome."""
+"""Interval [s] of the checks whether a client is still authorised."""
 
 SIGN_IN_CLOSE_CODE = 4401
-"""Close code for who must come in (again) by the front page."""
+"""Close code for a client that must sign in (again) at the start page."""
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 @dataclass(frozen=True)
 class Address:
-    """Under which names the server may be spoken to.
+    """Names and addresses under which the server accepts requests.
 
     Attributes:
-        names: host names besides bare addresses of this machine.
-        any_address: whether a bare address is one of ours; not so on loopback alone.
-        secure: whether the server speaks TLS itself.
-        public: origin of a reverse proxy in front, such as ``https://arm.example.org``.
+        names: Host names that are accepted.
+        any_address: Whether every bare IP address is accepted; False on loopback alone.
+        secure: Whether the server itself uses TLS.
+        public: Origin of a reverse proxy in front, such as ``https://arm.example.org``.
     """
 
     names: frozenset[str]
@@ -49,12 +49,13 @@ class Address:
 
     @property
     def cookies_are_secure(self) -> bool:
+        """True if clients use HTTPS, so that cookies can be marked as secure."""
         return self.secure or (self.public or "").startswith("https:")
 
     def is_ours(self, host: str) -> bool:
-        """Whether ``host``, of a Host header, names this server.
+        """Return whether ``host``, of a Host header, names this server.
 
-        A page on the web can point a name of its own here, and would then count as our origin.
+        Without this check another site could point its own name here and count as our origin.
         """
         if self.public is not None and host.lower() == urlsplit(self.public).netloc:
             return True
@@ -71,13 +72,13 @@ class Address:
         return self.any_address
 
     def is_our_page(self, origin: str, host: str) -> bool:
-        """Whether ``origin``, of an Origin header, is our own page's, asked for at ``host``."""
+        """Return whether ``origin``, of an Origin header, is that of our own page at ``host``."""
         scheme = "https" if self.secure else "http"
         return origin in (f"{scheme}://{host}", self.public)
 
 
 def public_origin(url: str) -> str:
-    """The origin of ``url``. Raises ConfigurationError when it is none."""
+    """Return the origin of ``url``. Raises ConfigurationError if it has none or has a path."""
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.netloc or parts.path not in ("", "/"):
         raise ConfigurationError(
@@ -87,22 +88,22 @@ def public_origin(url: str) -> str:
 
 
 class Authenticator:
-    """Knows visitors by their cookies."""
+    """Identifies clients by their cookies and tokens."""
 
     def __init__(self, access: AccessFile | None, port: int, address: Address) -> None:
-        """Without ``access`` everyone who can reach the port may do everything."""
+        """Check clients against ``access``; None makes every client an admin."""
         self._access = access
         self._secure = address.cookies_are_secure
-        # Cookies do not tell ports apart.
+        # Browsers send cookies to all ports of a host.
         self._cookie = f"katana450-{port}"
 
     @property
     def asks(self) -> bool:
-        """Whether one needs a link."""
+        """True if the server requires an access link."""
         return self._access is not None
 
     def identity(self, cookies: Mapping[str, str]) -> Identity | None:
-        """Who sends these cookies, if they may come in."""
+        """Return the identity of the sender of ``cookies``; None if it is not authorised."""
         value = cookies.get(self._cookie, "")
         if self._access is not None:
             known = self._access.check(value, time.time())
@@ -114,9 +115,10 @@ class Authenticator:
     def program(
         self, name: str, authorization: str = "", cookies: Mapping[str, str] | None = None
     ) -> Identity | None:
-        """Who sends this Authorization header or these cookies, if they may come in.
+        """Return the identity of the program that sends this Authorization header or ``cookies``.
 
-        ``name``: what the program calls itself; behind that of the link where one is asked for.
+        ``name``: the program's own name; it follows the name of the link where one is required.
+        Return None if the program is not authorised.
         """
         name = name if name.isprintable() and 0 < len(name) <= MAX_NAME_LENGTH else "Program"
         if self._access is None:
@@ -132,7 +134,7 @@ class Authenticator:
     async def while_welcome(
         self, identity: Callable[[], Identity | None], work: Coroutine[Any, Any, None]
     ) -> bool:
-        """Do ``work`` as long as there is a ``visitor``; whether it came to its own end."""
+        """Run ``work`` as long as ``identity`` returns one; return whether it ended by itself."""
         task = asyncio.create_task(work)
         try:
             while True:

@@ -1,4 +1,4 @@
-"""What comes and goes in the body of an HTTP message."""
+"""Bodies of HTTP requests and responses."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from starlette.responses import Response
 from katana450.server.api import answers
 
 NOT_NOW, TOO_SLOW, TOO_LONG, NOT_UNDERSTOOD, TOO_MANY = 409, 408, 413, 422, 429
-"""Status of an answer that refuses."""
-
+"""HTTP status codes of refusals."""
 
 BODY_SECONDS = 5.0
-"""[s] In which a small body has come."""
+"""Timeout for receiving a small body [s]."""
 
 
 async def body_of(request: Request, largest: int, seconds: float = BODY_SECONDS) -> bytes:
-    """Return what is sent by POST.
+    """Return the body of ``request``.
 
-    Raises HTTPException for more than ``largest`` bytes, and when it takes more than ``seconds``.
+    Raises HTTPException for more than ``largest`` bytes, or after ``seconds``.
     """
     body = bytearray()
     try:
@@ -29,13 +28,13 @@ async def body_of(request: Request, largest: int, seconds: float = BODY_SECONDS)
             async for chunk in request.stream():
                 body += chunk
                 if len(body) > largest:
-                    raise HTTPException(TOO_LONG, "That is too long.")
+                    raise HTTPException(TOO_LONG, f"The body is larger than {largest} bytes.")
     except TimeoutError as error:
-        why = f"The request did not come within {seconds:g} s."
+        why = f"The request was not received within {seconds:g} s."
         raise HTTPException(TOO_SLOW, why, {"Connection": "close"}) from error
     return bytes(body)
 
 
 def as_json(answer: answers.Answer, status: int = 200) -> Response:
-    """``answer``, to be sent."""
+    """Return ``answer`` as an HTTP response."""
     return Response(answers.encoded(answer), status, media_type="application/json")

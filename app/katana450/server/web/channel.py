@@ -1,6 +1,6 @@
-"""Requests up, answers down.
+"""Channels that receive requests and send answers.
 
-The line shares nothing with viser's, which holds back what is sent and forgets all but the newest.
+They are separate from the connections of viser, which delays messages and keeps only the newest.
 """
 
 from __future__ import annotations
@@ -28,37 +28,41 @@ from katana450.server.web.token_bucket import TokenBucket
 log = logging.getLogger(__name__)
 
 ARRIVAL = "katana450.arrival"
-"""Where a websocket's scope has its ``Arrival``."""
+"""Key of the ``Arrival`` in the scope of a websocket."""
 
 MAX_WAITING_ANSWERS = 64
-"""Answers that may wait for a slow line; of more, the oldest are forgotten."""
+"""Maximum number of answers that wait for a slow connection; beyond it the oldest are dropped."""
 
 BAD_REQUEST_CLOSE_CODE = 1008
-"""Close code for who says what is no request, again and again."""
+"""Close code for a client that sends too many invalid requests."""
 
 CLOSE_FRAME_TIMEOUT = 1.0
-"""[s] That who is sent away has for being told so: who reads nothing cannot be told."""
+"""Timeout [s] for sending the close frame: some clients never read it."""
 
 
 class GoneError(Exception):
-    """The other side has hung up."""
+    """Raised when the other side has closed the connection."""
 
 
 class JsonChannel(Protocol):
-    """Texts both ways. Each method raises GoneError once the other side is."""
+    """Exchange of JSON texts. ``receive`` and ``send`` raise GoneError on a closed connection."""
 
     @property
-    def arrival(self) -> Arrival: ...
+    def arrival(self) -> Arrival:
+        """Newest heartbeat on the connection, by the time of its receipt."""
 
-    async def receive(self) -> str | bytes: ...
+    async def receive(self) -> str | bytes:
+        """Return the next message."""
 
-    async def send(self, text: str) -> None: ...
+    async def send(self, text: str) -> None:
+        """Send ``text``."""
 
-    async def close(self, code: int, why: str, /) -> None: ...
+    async def close(self, code: int, why: str, /) -> None:
+        """Close the connection with a close code and a reason."""
 
 
 class WebSocketJsonChannel:
-    """A websocket, accepted."""
+    """JSON texts on an accepted websocket."""
 
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
@@ -66,31 +70,36 @@ class WebSocketJsonChannel:
         self.arrival = Arrival(None) if arrival is None else arrival
 
     async def receive(self) -> str | bytes:
+        """Return the next message. Raises GoneError on a closed connection."""
         message = await self._socket.receive()
         if message["type"] == "websocket.disconnect":
             raise GoneError
-        # Binary messages are no requests, which is said of an empty text too.
+        # A binary message becomes an empty text, which is refused as an invalid request.
         return message.get("text") or ""
 
     async def send(self, text: str) -> None:
+        """Send ``text``. Raises GoneError on a closed connection."""
         try:
             await self._socket.send_text(text)
         except (WebSocketDisconnect, RuntimeError) as error:
             raise GoneError from error
 
     async def close(self, code: int, why: str) -> None:
+        """Close the websocket with the close code ``code`` and the reason ``why``."""
         with suppress(WebSocketDisconnect, RuntimeError):
             await self._socket.close(code, why)
 
 
 class Channel(ABC):
-    """One window's; what is told unasked is its kind's."""
+    """Channel of one window. A subclass decides which messages are sent without a request."""
 
     def __init__(
         self, hub: Hub, line: JsonChannel, budget: Budget, *, often: TokenBucket, bad: TokenBucket
     ) -> None:
-        """``budget``: of whoever asks, and of all their other windows. ``often``: how much may be
-        asked here. ``bad``: how much of it may be nonsense.
+        """Create a channel on ``line``.
+
+        ``budget``: that of the identity, shared by all its windows. ``often``: rate limit of all
+        requests. ``bad``: rate limit of invalid requests.
         """
         self.hub = hub
         self.budget = budget
@@ -103,33 +112,33 @@ class Channel(ABC):
         self._concluding: set[asyncio.Task[None]] = set()
 
     def tell(self, notice: Any) -> None:
-        """Send ``notice``, anything that is JSON, as soon as the line allows."""
+        """Queue ``notice``, any JSON value; send it as soon as the connection allows."""
         self._notices.append(notice)
         self._news.set()
 
     @abstractmethod
     def unasked(self) -> tuple[Any, float | None]:
-        """What is to be told now, None for nothing; and in how long there may be more [s]."""
+        """Return the message to send now, or None, and the time until the next call [s]."""
 
     def answer(self, window: Window, request: requests.Request) -> None:
-        """Do it and tell the answer, if the request has an id or is a question."""
+        """Execute ``request``; send the answer if it has an id or is always answered."""
         answer = self._dispatcher.handle(window, request, self.budget)
-        told = request.id is not None or request.traits.answered
+        wanted = request.id is not None or request.traits.answered
         if self._dispatcher.is_pending(answer):
-            task = asyncio.ensure_future(self._conclude(answer, told=told))
+            task = asyncio.ensure_future(self._conclude(answer, wanted=wanted))
             self._concluding.add(task)
             task.add_done_callback(self._concluding.discard)
-        elif told:
+        elif wanted:
             self.tell(answer)
 
-    async def _conclude(self, pending: answers.Answer, *, told: bool) -> None:
-        """Tell what became of a command, or only that it is refused."""
+    async def _conclude(self, pending: answers.Answer, *, wanted: bool) -> None:
+        """Send the outcome of a command; if no answer is ``wanted``, only a refusal."""
         answer = await self._dispatcher.concluded(pending)
-        if told or isinstance(answer, answers.Refused):
+        if wanted or isinstance(answer, answers.Refused):
             self.tell(answer)
 
     async def run(self, window: Window) -> None:
-        """Until one side hangs up."""
+        """Receive and send until one side closes the connection."""
         tasks = [asyncio.create_task(each) for each in (self._send(), self._receive(window))]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -138,62 +147,62 @@ class Channel(ABC):
                 task.cancel()
             for ended in await asyncio.gather(*tasks, *self._concluding, return_exceptions=True):
                 if isinstance(ended, Exception) and not isinstance(ended, GoneError):
-                    log.error("A conversation met an error.", exc_info=ended)
+                    log.error("Error on a channel.", exc_info=ended)
 
     async def _receive(self, window: Window) -> None:
         while True:
-            # One request a turn of the loop: who has sent a thousand keeps nobody else waiting.
+            # One request per turn of the loop, so that a flooding client does not delay others.
             await asyncio.sleep(0)
             text = await self._line.receive()
             try:
                 request = self.hub.requests.decoded(text)
             except InputError as error:
-                log.warning("A bad request of %s: %s", window.person.name, error)
+                log.warning("Invalid request from %s: %s", window.person.name, error)
                 if not self._bad.take(self.hub.clock()):
-                    await self._send_away(BAD_REQUEST_CLOSE_CODE, "Too many bad requests.")
+                    await self._disconnect(BAD_REQUEST_CLOSE_CODE, "Too many invalid requests.")
                     return
                 self.refuse(str(error), requests.id_of(text))
                 continue
-            # A hand that hammers on STOP is never too fast.
+            # STOP is exempt from the rate limit.
             if not self._often.take(self.hub.clock()) and not request.traits.safety:
-                log.warning("%s asks too much at once and is sent away.", window.person.name)
-                await self._send_away(LIMIT_CLOSE_CODE, "Too many requests.")
+                log.warning("%s sends too many requests: disconnected.", window.person.name)
+                await self._disconnect(LIMIT_CLOSE_CODE, "Too many requests.")
                 return
             try:
                 self.answer(window, request)
             except BusyError as error:
                 if error.gone:
-                    log.warning("%s asks on regardless and is sent away.", window.person.name)
-                    await self._send_away(LIMIT_CLOSE_CODE, str(error))
+                    log.warning("%s exceeds its budget: disconnected.", window.person.name)
+                    await self._disconnect(LIMIT_CLOSE_CODE, str(error))
                     return
                 self.refuse(str(error), request.id, retry=error.retry)
             except (LeaseError, InputError) as error:
                 self.refuse(str(error), request.id)
 
-    async def _send_away(self, code: int, why: str) -> None:
+    async def _disconnect(self, code: int, why: str) -> None:
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSE_FRAME_TIMEOUT):
                 await self._line.close(code, why)
 
-    def refuse(self, why: str, named: Id, **more: float) -> None:
-        """Say that what was asked is not done. ``more``: of ``answers.Refused``."""
-        self.tell({"is": "refused", "why": why, "id": named, **more})
+    def refuse(self, why: str, request_id: Id, **more: float) -> None:
+        """Send a refusal of the request of ``request_id``. ``more``: fields of ``Refused``."""
+        self.tell({"is": "refused", "why": why, "id": request_id, **more})
 
     def wake(self) -> None:
-        """There may be something to tell now."""
+        """Wake the sender, because there may be a message to send."""
         self._news.set()
 
     async def _send(self) -> None:
         while True:
             self._news.clear()
             while self._notices:
-                await self._say(self._notices.popleft())
-            notice, again = self.unasked()
+                await self._send_json(self._notices.popleft())
+            notice, pause = self.unasked()
             if notice is not None:
-                await self._say(notice)
+                await self._send_json(notice)
             with suppress(TimeoutError):
-                async with asyncio.timeout(again):
+                async with asyncio.timeout(pause):
                     await self._news.wait()
 
-    async def _say(self, notice: Any) -> None:
+    async def _send_json(self, notice: Any) -> None:
         await self._line.send(msgspec.json.encode(notice).decode())

@@ -1,4 +1,4 @@
-"""A bounded number of places, of which one identity takes only some."""
+"""Limit on concurrent connections, in total and per identity."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from contextlib import contextmanager
 
 
 class ConnectionLimit:
-    """Places that are taken for a while, for example by open sockets."""
+    """Places for concurrent connections or requests."""
 
     def __init__(self, maximum: int, each: int) -> None:
-        """``most``: of everybody together. ``each``: of one identity."""
+        """Provide ``maximum`` places in total, and at most ``each`` for one identity."""
         self._maximum = maximum
         self._each = each
         self._taken: Counter[str] = Counter()
 
     @contextmanager
     def taken(self, identity: str) -> Iterator[bool]:
-        """Take a place; False if there is none left, and then none is taken."""
+        """Take a place inside the ``with`` block; yield False if there is none left."""
         free = self._taken.total() < self._maximum and self._taken[identity] < self._each
         if not free:
             yield False

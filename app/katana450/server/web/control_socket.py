@@ -1,6 +1,6 @@
-"""The page's own socket: STOP, heartbeats, the lease, jogging and knobs up, the status down.
+"""Control socket of a page: it receives requests such as STOP and jog, and sends the status.
 
-States come down only as they are asked for, a few at a time, so a slow line has no backlog of them.
+States are sent only on request, a few at a time, so a slow connection has no backlog of them.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChan
 from katana450.server.web.token_bucket import TokenBucket
 
 PAGE = re.compile(r"[A-Za-z0-9_-]{16,64}")
-"""The name a page gives itself; nobody else can guess it."""
+"""Form of the secret key that a page chooses for itself."""
 
 RATE, BURST = 160.0, 320.0
-"""Requests a second, and at once: ten heartbeats, 25 jogs, 30 looks, and hands on knobs and
-buttons."""
+"""Maximum rate [1/s] and burst of requests: per second ten heartbeats, 25 jogs, 30 queries, and the
+use of knobs and buttons."""
 
 PUSH_EVERY = 0.1
-"""[s] Between two looks at whether there is news."""
+"""Interval [s] of status updates."""
 
 MAX_BAD_REQUESTS = 4
-"""Requests that are none; at one more the socket is closed."""
+"""Maximum number of invalid requests; one more closes the socket."""
 
 
 class ControlSocket(Channel):
-    """One page's: it is told what is new of the status, on a slow line less often."""
+    """Control socket of one page; it sends changes of the status, less often if it is slow."""
 
     def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
         t = hub.clock()
@@ -44,11 +44,12 @@ class ControlSocket(Channel):
             often=TokenBucket(RATE, BURST, t),
             bad=TokenBucket(0.0, MAX_BAD_REQUESTS, t),
         )
-        self._told: dict[str, Any] = {}
-        self._looked_at = float("-inf")
+        self._sent: dict[str, Any] = {}
+        self._checked_at = float("-inf")
         self.window: Window | None = None
 
     def answer(self, window: Window, request: requests.Request) -> None:
+        """Execute ``request``, send its answer, and confirm the receipt of a stop."""
         super().answer(window, request)
         if isinstance(request, requests.Stop):
             self.tell({"is": "stopped"})
@@ -56,27 +57,28 @@ class ControlSocket(Channel):
             self.wake()
 
     def unasked(self) -> tuple[Any, float | None]:
+        """Return the changes of the status, or None, and the time until the next call [s]."""
         t = self.hub.clock()
-        if self.window is None or t - self._looked_at < PUSH_EVERY / 2:
+        if self.window is None or t - self._checked_at < PUSH_EVERY / 2:
             return None, PUSH_EVERY
-        self._looked_at = t
+        self._checked_at = t
         now = status.common(self.hub) | status.of(self.hub, self.window)
-        news = {key: value for key, value in now.items() if self._told.get(key, self) != value}
-        if not news:
+        changes = {key: value for key, value in now.items() if self._sent.get(key, self) != value}
+        if not changes:
             return None, PUSH_EVERY
-        self._told = now
-        return {"is": "status", **news}, PUSH_EVERY
+        self._sent = now
+        return {"is": "status", **changes}, PUSH_EVERY
 
 
 async def serve(
     hub: Hub, authenticator: Authenticator, budgets: Budgets, socket: WebSocket
 ) -> None:
-    """Answer a request for a control socket."""
+    """Serve a control socket until it closes or its client is no longer authorised."""
     identity = authenticator.identity(socket.cookies)
     page = socket.query_params.get("page", "")
     await socket.accept()
     if identity is None or not PAGE.fullmatch(page):
-        await socket.close(SIGN_IN_CLOSE_CODE, "Come in by the front page.")
+        await socket.close(SIGN_IN_CLOSE_CODE, "Sign in at the start page first.")
         return
     line = WebSocketJsonChannel(socket)
     control = ControlSocket(hub, line, budgets.of(identity.session))
@@ -85,6 +87,6 @@ async def serve(
         if not await authenticator.while_welcome(
             lambda: authenticator.identity(socket.cookies), control.run(window)
         ):
-            await line.close(SIGN_IN_CLOSE_CODE, "Your link is no good any more.")
+            await line.close(SIGN_IN_CLOSE_CODE, "Your link has expired or was revoked.")
     finally:
         hub.leave(window)

@@ -1,4 +1,4 @@
-"""The API over HTTP: what can be read, STOP, and single requests of a program that keeps asking."""
+"""The API over HTTP: readable values, STOP, and single requests of a program."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_js
 log = logging.getLogger(__name__)
 
 QUESTIONS = ("state", "arm", "event_log", "branches", "loop", "objects", "world", "links")
-"""Each is a path of its own."""
+"""Subjects of ``query``; each has its own path."""
 
 PROGRAM = re.compile(r"[A-Za-z0-9_-]{16,64}")
-"""The key of a program that asks by POST: whoever knows it speaks for the program, so nobody else
-is shown it. The name that others see is in NAME."""
+"""Form of the key of a program that sends requests by POST. The key identifies the program and is
+secret; others see the name in ``NAME``."""
 
 KEY, NAME = "x-program", "x-name"
 """Headers of the key and the name of a program."""
@@ -44,16 +44,16 @@ KEY, NAME = "x-program", "x-name"
 RETRY_STATUS = 503
 
 MAX_PAUSE = 0.5
-"""[s] Before too frequent a request is refused."""
+"""Maximum delay [s] of the refusal of a too frequent request."""
 
 
 class RouteContext(NamedTuple):
-    """What a route of an extension can use.
+    """Context that a route of an extension can use.
 
     Attributes:
-        hub: The arm and who drives it.
-        door: Knows people by their cookies and links.
-        visitor: Returns who sends a request, or raises the HTTPException that refuses it.
+        hub: The hub with the arm and the lease.
+        authenticator: Identifies clients by their cookies and links.
+        identity: Returns the identity of a request's sender, or raises HTTPException.
     """
 
     hub: Hub
@@ -62,11 +62,11 @@ class RouteContext(NamedTuple):
 
 
 RouteProvider = Callable[[RouteContext], list[BaseRoute]]
-"""Returns routes of an extension."""
+"""Function that returns the routes of an extension."""
 
 
 class Api:
-    """Its routes."""
+    """The HTTP routes of the API."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class Api:
         budgets: Budgets,
         provided: Sequence[RouteProvider] = (),
     ) -> None:
-        """``provided``: routes of the extensions."""
+        """Serve ``hub``. ``provided``: functions that return the routes of extensions."""
         self._hub = hub
         self._budgets = budgets
         self._authenticator = authenticator
@@ -85,7 +85,7 @@ class Api:
         self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
 
     def routes(self) -> list[BaseRoute]:
-        """All of them."""
+        """Return all routes of the API and of the extensions."""
 
         async def openapi(_request: Request) -> Response:
             described = schema.openapi_json(self._hub.runner.request_types)
@@ -107,7 +107,7 @@ class Api:
         async def read(request: Request) -> Response:
             identity, driver = self._identity(request), ""
             if self._key(request, identity) in self._posting:
-                # A program that looks is alive; a stranger's look is nothing.
+                # A read counts as a heartbeat only of a program that has sent requests.
                 window = self._window(request, identity)
                 driver = driver_key(self._hub, window)
                 self._hub.heartbeat(window)
@@ -131,17 +131,17 @@ class Api:
         identity = self._identity(request)
         if not PROGRAM.fullmatch(request.headers.get(KEY, "")):
             why = (
-                "A header X-Program with a key of 16 to 64 letters and digits of your own tells "
-                "you apart. Keep it to yourself; X-Name has the name that others see."
+                "The header X-Program is missing or invalid. Choose a key of 16 to 64 letters and "
+                "digits, and keep it secret. X-Name is the name that others see."
             )
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.MAX_REQUEST_BYTES)
         try:
-            asked = self._hub.requests.decoded(body)
-            if isinstance(asked, requests.Hello | requests.Watch):
-                raise InputError("That is for a connection that lasts: the socket or the TCP port.")
+            decoded = self._hub.requests.decoded(body)
+            if isinstance(decoded, requests.Hello | requests.Watch):
+                raise InputError("Send this request on the websocket or the TCP port.")
             window = self._window(request, identity)
-            answer = self._dispatcher.handle(window, asked, self._budget(request))
+            answer = self._dispatcher.handle(window, decoded, self._budget(request))
             if self._dispatcher.is_pending(answer):
                 answer = await self._dispatcher.concluded(answer)
             return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
@@ -162,11 +162,11 @@ class Api:
             headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
         )
         if identity is None:
-            raise HTTPException(401, "A token is asked for; `katana450 access give` makes one.")
+            raise HTTPException(401, "A token is required. `katana450 access give` makes one.")
         return identity
 
     def _window(self, request: Request, identity: Identity) -> Window:
-        """That of the program that asks; it closes when nothing is heard of it for a while."""
+        """Return the window of the program; it closes after ``LEASE_TIMEOUT`` without a request."""
         key = self._key(request, identity)
         known = self._posting.pop(key, None)
         if known is None:
@@ -184,7 +184,7 @@ class Api:
         return window
 
     def _key(self, request: Request, identity: Identity) -> str:
-        """What ties the requests of one program together."""
+        """Return the key that the requests of one program have in common."""
         session = identity.session if self._authenticator.asks else "programs"
         return f"{session}/{request.headers.get(KEY, '')}"
 
@@ -194,7 +194,7 @@ class Api:
 
 
 async def _too_much(error: BusyError, id: Id = None) -> Response:
-    # Who asks again at once is slowed down; STOP comes by another route.
+    # The delay slows down immediate repetitions. STOP has a route of its own.
     await asyncio.sleep(min(error.retry, MAX_PAUSE))
     answer = as_json(answers.Refused(why=str(error), id=id, retry=error.retry), TOO_MANY)
     answer.headers["Retry-After"] = str(math.ceil(error.retry))

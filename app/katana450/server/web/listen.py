@@ -1,4 +1,4 @@
-"""The port that a person asked for, or a sentence that says why not."""
+"""Listening sockets, with clear errors for ports and addresses that cannot be used."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from katana450.platform_support import claim_port
 BACKLOG = 128
 
 LOOPBACK = "127.0.0.1"
-"""This machine alone."""
+"""Address that only programs of this machine can reach."""
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket that listens on ``host``:``port``; port 0 takes a free one.
+    """Return a socket that listens on ``host``:``port``; port 0 takes a free one.
 
-    Raises ConfigurationError when the port is busy or cannot be had: which, and what to do.
+    Raises ConfigurationError, with what to do, if the address or the port cannot be used.
     """
     try:
         family, _, _, _, address = socket.getaddrinfo(
@@ -40,7 +40,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def reaches_beyond(listening: socket.socket) -> bool:
-    """Whether other machines can reach the socket."""
+    """Return whether other machines can reach the socket."""
     return not ip_address(listening.getsockname()[0].partition("%")[0]).is_loopback
 
 

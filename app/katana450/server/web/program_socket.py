@@ -1,4 +1,4 @@
-"""Programs that speak to the server: on a websocket, or a line of JSON at a time on a TCP port."""
+"""Channels of programs: websockets, and JSON lines on a TCP port."""
 
 from __future__ import annotations
 
@@ -41,29 +41,28 @@ from katana450.server.web.token_bucket import TokenBucket
 log = logging.getLogger(__name__)
 
 RATE, BURST = 400.0, 800.0
-"""Requests a second, and at once: a stream of joint angles may come quicker than the arm ticks."""
+"""Maximum rate [1/s] and burst of requests: a stream may be faster than the ticks of the arm."""
 
 MAX_BAD_REQUESTS, FORGIVEN_PER_SECOND = 20, 1.0
-"""Requests that are none: so many at once, and so many more a second."""
+"""Maximum burst and rate [1/s] of invalid requests."""
 
 COMPLAINT_INTERVAL = 5.0
-"""[s] Between two words to a program that watches more than its budget allows."""
+"""Minimum interval [s] of the messages to a program that watches more than its budget allows."""
 
 HELLO_SECONDS = 5.0
-"""[s] A line that says nothing for so long is closed."""
+"""Timeout [s] for the first line of a TCP connection."""
 
 MAX_UNSENT_BYTES = 4096
-"""Bytes that may wait to be sent: a state or two, so that what is told is new."""
+"""Maximum of bytes that wait to be sent: one or two states, so that a slow client gets new ones."""
 
 LINES, LINES_EACH = 16, 8
-"""TCP connections at a time, of everybody together and of one identity."""
+"""Maximum of TCP connections, of all together and of one identity."""
 
-
-TOO_MUCH_ASKED = "Too much is asked by your programs together. Wait a moment, and ask less often."
+BUDGET_EXHAUSTED = "Your programs together send too many requests. Wait, and send fewer requests."
 
 
 class ProgramChannel(Channel):
-    """One program's: it is told the state as often as it wants."""
+    """Channel of one program, which sends states at the requested rate."""
 
     def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
         t = hub.clock()
@@ -79,6 +78,7 @@ class ProgramChannel(Channel):
         self._watched: tuple[requests.FieldName, ...] = ()
 
     def answer(self, window: Window, request: requests.Request) -> None:
+        """Execute ``request`` and send its answer; a ``watch`` sets the rate of states."""
         if isinstance(request, requests.Watch):
             if request.fields:
                 arm = self.hub.present()
@@ -90,6 +90,7 @@ class ProgramChannel(Channel):
         self.wake()
 
     def unasked(self) -> tuple[Any, float | None]:
+        """Return the state if one is due, or None, and the time until the next call [s]."""
         if self._period is None or self.hub.arm is None:
             return None, self._period
         t = self.hub.clock()
@@ -105,11 +106,11 @@ class ProgramChannel(Channel):
             if t - self._complained < COMPLAINT_INTERVAL:
                 return None, self._due - t
             self._complained = t
-            why = f"States come less often than they are watched. {error}"
+            why = f"States are sent less often than requested. {error}"
             return answers.Refused(why=why, retry=error.retry), self._due - t
 
     def _state(self, arm: ArmInterface) -> answers.State:
-        """With the fields that are watched; those of an object that is gone are left out."""
+        """Return the state with the watched fields, except those of removed objects."""
         now = serialize.state(self.hub)
         values: list[answers.Value] = []
         for each in self._watched:
@@ -118,7 +119,7 @@ class ProgramChannel(Channel):
         return msgspec.structs.replace(now, fields=tuple(values))
 
     def greet(self, window: Window) -> None:
-        """Say who they are here."""
+        """Send the name, number and role of the program."""
         self._window, person = window, window.person
         self.tell(
             answers.Welcome(
@@ -133,7 +134,7 @@ class ProgramChannel(Channel):
 async def serve_socket(
     hub: Hub, authenticator: Authenticator, budgets: Budgets, socket: WebSocket
 ) -> None:
-    """Answer a program that asks for a websocket."""
+    """Serve a websocket of a program until it closes."""
     name = socket.query_params.get("name", "")
 
     def current_identity() -> Identity | None:
@@ -141,15 +142,17 @@ async def serve_socket(
 
     budget = budgets.of(identity(authenticator, socket) or address_of(socket))
     if budget.is_exhausted():
-        await refuse(socket, TOO_MUCH_ASKED)
+        await refuse(socket, BUDGET_EXHAUSTED)
         return
     await socket.accept()
     await _serve(hub, authenticator, budget, WebSocketJsonChannel(socket), current_identity)
 
 
 class LineServer:
-    """The TCP port. Only programs of this machine reach it; a first line that is no ``hello`` ends
-    the connection, so that a page's request, which begins otherwise, gets nowhere.
+    """The TCP port for JSON lines, which only programs of this machine reach.
+
+    A first line other than ``hello`` ends the connection. So a request that a page sends to this
+    port has no effect.
     """
 
     def __init__(self, hub: Hub, authenticator: Authenticator, budgets: Budgets) -> None:
@@ -162,7 +165,7 @@ class LineServer:
 
     @asynccontextmanager
     async def open(self, listening: socket.socket | None) -> AsyncIterator[None]:
-        """Serve whoever connects to ``listening``, if there is one, until this ends."""
+        """Serve the clients of ``listening``, if it is a socket, inside the ``with`` block."""
         if listening is None:
             yield
             return
@@ -181,14 +184,14 @@ class LineServer:
         return asyncio.StreamReaderProtocol(reader, self.serve)
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """One connection, to its end."""
+        """Serve one connection until it closes."""
         writer.transport.set_write_buffer_limits(high=MAX_UNSENT_BYTES)
         line = _TcpLine(reader, writer)
         self._writers.add(writer)
         try:
             hello = await self._hello(line)
             if hello is not None:
-                await self._converse(line, hello, writer.get_extra_info("peername"))
+                await self._serve_program(line, hello, writer.get_extra_info("peername"))
         except GoneError:
             return
         finally:
@@ -197,7 +200,7 @@ class LineServer:
             with suppress(ConnectionError):
                 await writer.wait_closed()
 
-    async def _converse(
+    async def _serve_program(
         self, line: _TcpLine, hello: requests.Hello, client: tuple[str, int]
     ) -> None:
         def current_identity() -> Identity | None:
@@ -205,7 +208,7 @@ class LineServer:
 
         found = current_identity()
         session = "" if found is None else found.session
-        # Without links all programs of this machine are one to the budget, but have places enough.
+        # Without links all programs of this machine share one budget, but not their places.
         budget = self._budgets.of(session if self._authenticator.asks else client[0])
         acceptor = self._acceptor
         kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
@@ -213,7 +216,7 @@ class LineServer:
             if free:
                 await _serve(self._hub, self._authenticator, budget, line, current_identity)
             else:
-                why = f"No more than {LINES} programs at a time, and {LINES_EACH} of one link."
+                why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
                 await line.close(0, why)
 
     async def _hello(self, line: _TcpLine) -> requests.Hello | None:
@@ -221,7 +224,7 @@ class LineServer:
             async with asyncio.timeout(HELLO_SECONDS):
                 request = self._hub.requests.decoded(await line.receive())
         except TimeoutError:
-            await line.close(0, 'Nothing was said. Begin with {"do": "hello", "name": "..."}.')
+            await line.close(0, 'No request came. Begin with {"do": "hello", "name": "..."}.')
         except InputError as error:
             await line.close(0, f'{error} Begin with {{"do": "hello", "name": "..."}}.')
         else:
@@ -241,7 +244,7 @@ async def _serve(
     found = current_identity()
     if found is None:
         await line.close(
-            SIGN_IN_CLOSE_CODE, "A token is asked for; `katana450 access give` makes one."
+            SIGN_IN_CLOSE_CODE, "A token is required. `katana450 access give` makes one."
         )
         return
     program = ProgramChannel(hub, line, budget)
@@ -250,13 +253,13 @@ async def _serve(
     program.greet(window)
     try:
         if not await authenticator.while_welcome(current_identity, program.run(window)):
-            await line.close(SIGN_IN_CLOSE_CODE, "The token is no good any more.")
+            await line.close(SIGN_IN_CLOSE_CODE, "The token has expired or was revoked.")
     finally:
         hub.leave(window, for_good=True)
 
 
 class _TcpLine:
-    """A line of JSON each way, ended by a line feed."""
+    """JSON lines on a TCP connection, each ended by a line feed."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader = reader
@@ -264,12 +267,13 @@ class _TcpLine:
         self.arrival = Arrival(writer.get_extra_info("socket"))
 
     async def receive(self) -> str | bytes:
+        """Return the next line. Raises GoneError on a closed connection."""
         try:
             line = await self._reader.readline()
         except ConnectionError as error:
             raise GoneError from error
         except ValueError as error:
-            # The reader's word for a line that does not end.
+            # The reader raises ValueError for a line beyond its limit.
             await self.close(
                 BAD_REQUEST_CLOSE_CODE, f"A request has at most {requests.MAX_REQUEST_BYTES} bytes."
             )
@@ -279,6 +283,7 @@ class _TcpLine:
         return line
 
     async def send(self, text: str) -> None:
+        """Send one line. Raises GoneError on a closed connection."""
         try:
             self._writer.write(text.encode() + b"\n")
             await self._writer.drain()
@@ -286,6 +291,7 @@ class _TcpLine:
             raise GoneError from error
 
     async def close(self, _code: int, why: str) -> None:
+        """Send a refusal with the reason ``why``, then close the connection."""
         with suppress(GoneError):
             await self.send(answers.encoded(answers.Refused(why=why)))
         self._writer.close()

@@ -1,4 +1,4 @@
-"""What every answer says to the browser, and which requests are answered at all."""
+"""Security headers of every response, and the check of Host and Origin of every request."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ EVERYWHERE = {
 }
 
 FOR_PROGRAMS = "/api/"
-"""Programs are no pages and have no origin to name. Whatever a browser sends there names one."""
+"""Prefix of the paths that need no Origin header. Programs have none, but browsers send one."""
 
 TLS_ONLY = "max-age=31536000"
 
 
 def page_policy() -> str:
-    """Content security policy of our own page: nothing but its own files."""
+    """Return the content security policy of our own page, which allows only its own files."""
     return content_policy(
         default=("'none'",),
         script=("'self'",),
@@ -48,43 +48,43 @@ def content_policy(*, ends: Iterable[str], **sources: Iterable[str]) -> str:
 
 
 class SecurityMiddleware:
-    """Around the application: turns away what was not meant for it, and adds the headers."""
+    """Middleware that refuses requests for other hosts or from other sites, and adds headers."""
 
     def __init__(self, app: ASGIApp, address: Address) -> None:
         self._app = app
         self._address = address
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on with security headers added, or refuse it."""
         objection = self._objection(scope)
         if objection is None:
-            await self._app(scope, receive, self._dressed(send))
+            await self._app(scope, receive, self._with_headers(send))
         elif scope["type"] == "websocket":
-            # Before it was accepted: the answer is 403.
+            # The websocket is not accepted yet, so the response is 403.
             await receive()
             await send({"type": "websocket.close", "code": 1008})
         else:
             refusal = PlainTextResponse(objection, status_code=403)
-            await refusal(scope, receive, self._dressed(send))
+            await refusal(scope, receive, self._with_headers(send))
 
     def _objection(self, scope: Scope) -> str | None:
         headers = Headers(scope=scope)
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self._address.is_ours(host):
-            return "This is not the server of that name."
-        asks = scope["type"] == "http" and scope["method"] in SAFE_METHODS
-        # Every browser names the page that opens a socket or sends something; what does not is
-        # asked to.
+            return "This server does not serve that host name."
+        safe = scope["type"] == "http" and scope["method"] in SAFE_METHODS
+        # Every browser sends Origin when a page opens a websocket or sends data.
         if origin is None:
             program = scope["path"].startswith(FOR_PROGRAMS)
-            if asks or program:
+            if safe or program:
                 return None
-            return "Say where this comes from: a header Origin is missing."
+            return "The header Origin is missing."
         if not self._address.is_our_page(origin, host):
-            return "Another site's page may not ask this."
+            return "Pages of other sites may not send this request."
         return None
 
-    def _dressed(self, send: Send) -> Send:
-        async def dressed(message: Message) -> None:
+    def _with_headers(self, send: Send) -> Send:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 for name, value in EVERYWHERE.items():
@@ -93,4 +93,4 @@ class SecurityMiddleware:
                     headers.setdefault("Strict-Transport-Security", TLS_ONLY)
             await send(message)
 
-        return dressed
+        return send_with_headers

@@ -1,4 +1,4 @@
-"""The files of the page: read once, packed once, and named by their content."""
+"""Static files of the page: read and compressed once, with an ETag of their content."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TYPES = {
 
 @dataclass(frozen=True)
 class File:
-    """One of them, ready to be sent."""
+    """A static file, ready to be sent. ``packed``: content compressed by gzip. ``tag``: ETag."""
 
     content: bytes
     packed: bytes
@@ -31,11 +31,12 @@ class File:
 
     @classmethod
     def of(cls, content: bytes, media_type: str) -> File:
+        """Return the file with ``content``."""
         tag = f'"{hashlib.sha256(content).hexdigest()[:20]}"'
         return cls(content, gzip.compress(content, mtime=0), media_type, tag)
 
     def answer(self, request: Request, policy: str | None = None) -> Response:
-        """To a request for it; a browser that has it already is told so."""
+        """Return the response to ``request``: 304 if the browser already has the content."""
         headers = {"ETag": self.tag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
         if policy is not None:
             headers["Content-Security-Policy"] = policy
@@ -48,7 +49,7 @@ class File:
 
 
 def load(folder: Path = STATIC) -> dict[str, File]:
-    """Every file of the page, by its path in ``folder``."""
+    """Return every file of the page by its path in ``folder``."""
     return {
         path.relative_to(folder).as_posix(): File.of(path.read_bytes(), TYPES[path.suffix])
         for path in sorted(folder.rglob("*"))
