@@ -113,7 +113,7 @@ def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> 
         program_runner.script(viewer, SCRIPT, more=False, speed=1.0)
     table.plan(owner)
     program_runner.steer(owner, ProgramOrder.RUN)
-    for window, said in ((viewer, "watch"), (other, "is Window 1's")):
+    for window, said in ((viewer, "watch"), (other, "belongs to Window 1")):
         with pytest.raises(LeaseError, match=said):
             program_runner.check_may_touch(window.actor)
         with pytest.raises(LeaseError, match=said):

@@ -168,11 +168,11 @@ def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
     text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
     with pytest.raises(InputError, match="cannot be emptied into basin") as told:
         layout(stage, text)[1].all()
-    assert "another pitch" not in str(told.value)
+    assert "other pitch" not in str(told.value)
 
 
 @pytest.mark.usefixtures("untimed")
 def test_those_that_were_tried_are_told(stage: Stage) -> None:
-    with pytest.raises(InputError, match=r"another pitch .* tried 30, .* and \d+ deg") as told:
+    with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as told:
         layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].all()
     assert "with a pitch of 30.0 deg" in str(told.value)

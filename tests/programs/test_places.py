@@ -48,7 +48,7 @@ def test_every_place_does_or_is_refused(stage: Stage, number: int) -> None:
 
 
 REASONS = (
-    "cannot be taken where it stands",
+    "cannot be grasped at its place",
     "cannot be emptied into",
     "would stand in",
     "no room",

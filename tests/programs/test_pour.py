@@ -64,9 +64,9 @@ def test_the_script_that_comes_along_is_the_demo() -> None:
 @pytest.mark.parametrize(
     ("cup", "basin", "said"),
     [
-        ((740.0, 0.0), None, "cup cannot be taken where it stands"),
+        ((740.0, 0.0), None, "cup cannot be grasped at its place"),
         ((900.0, 0.0), None, "nothing carries it there"),
-        ((120.0, 0.0), None, "cup cannot be taken where it stands"),
+        ((120.0, 0.0), None, "cup cannot be grasped at its place"),
         (None, (740.0, 600.0), "cannot be emptied into basin"),
         ((220.0, 360.0), None, "cup would stand in basin"),
     ],

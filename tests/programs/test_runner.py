@@ -167,7 +167,7 @@ def test_patience_begins_where_the_way_is_blocked(stage: Stage, cleared: bool) -
     while run.phase is Phase.RUNNING:
         run, state = stage.tick(program, run, state)
     assert run.phase is (Phase.DONE if cleared else Phase.FAILED)
-    assert ("and wall would meet" in run.why) is not cleared
+    assert ("and wall would collide" in run.why) is not cleared
 
 
 def test_steps_are_taken_one_at_a_time(stage: Stage, program: Program) -> None:
@@ -209,7 +209,7 @@ def test_an_arm_that_stands_elsewhere_does_not_begin(stage: Stage, program: Prog
     state = stage.session.begin(stage.session.ready + 0.01, 0.0, 0.0)
     run, states = stage.play(program, state)
     assert run.phase is Phase.FAILED
-    assert "stand" in run.why
+    assert "start" in run.why
     assert (states[-1].q == state.q).all()
 
 
@@ -230,7 +230,7 @@ def test_speed_is_a_share_of_the_scripts_own(stage: Stage) -> None:
         ("  - move: {x: 900, y: 0, z: 0}", 2, "cannot be at"),
         ("  - line: {by: {x: 500}}", 2, "reach"),
         ("  - home\n  - line: {by: {z: -285}}", 3, "table"),
-        ("  - gripper: 90", 2, "fingers go from"),
+        ("  - gripper: 90", 2, "range of the fingers"),
         ("  - tool: hammer", 2, "no tool"),
         ("  - home\n  - line: {by: {y: 0}}", 3, "line moves nothing"),
         ("  - arc: {centre: [400, 0, 200], axis: x, angle: 0}", 2, "arc moves nothing"),

@@ -48,7 +48,7 @@ def test_a_name_that_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
 def test_without_a_folder_nothing_is_saved(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--programs"):
         Scripts().save("Mine", "steps: [home]")
-    with pytest.raises(InputError, match="any more"):
+    with pytest.raises(InputError, match="no longer exists"):
         Scripts().text("Mine")
     with pytest.raises(ConfigurationError, match="--programs"):
         Scripts(tmp_path / "none")
