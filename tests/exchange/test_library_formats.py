@@ -134,7 +134,7 @@ def test_concave_polygons_units_and_colours(
 
 def test_components_units_and_transforms_of_3mf() -> None:
     shape = read_shape(threemf(), Format.THREEMF, "l.3mf")
-    assert "the unit is mm, as the file tells" in shape.text
+    assert "the unit is mm, as in the file" in shape.text
     # Turned by 90 degrees about z.
     assert (sides(shape), is_closed(shape)) == ([40.0, 60.0, 25.0], True)
     assert volume(shape) == pytest.approx(35e-6, rel=1e-6)
@@ -180,34 +180,34 @@ ENTITY = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/pa
 @pytest.mark.parametrize(
     ("data", "format", "said"),
     [
-        (b"", Format.DAE, "broken, or no COLLADA"),
-        (b"<a/>", Format.DAE, "no COLLADA"),
+        (b"", Format.DAE, "corrupt or not COLLADA"),
+        (b"<a/>", Format.DAE, "not COLLADA"),
         (dae()[:-300], Format.DAE, "line 1"),
-        (ENTITY + dae().partition(b"\n")[2], Format.DAE, "declares entities"),
-        (dae(counts="6 6 4 4 4 4 4 5"), Format.DAE, "corners they say|no triangles"),
-        (dae(corners="99 " * 36), Format.DAE, "vertex 99|no triangles|broken"),
-        (dae(meter=0), Format.DAE, "its unit has 0 m"),
+        (ENTITY + dae().partition(b"\n")[2], Format.DAE, "declares XML entities"),
+        (dae(counts="6 6 4 4 4 4 4 5"), Format.DAE, "corners they declare|no triangles"),
+        (dae(corners="99 " * 36), Format.DAE, "vertex 99|no triangles|corrupt"),
+        (dae(meter=0), Format.DAE, "its unit is 0 m"),
         (dae(nodes=""), Format.DAE, "has no triangles"),
-        (b"PK", Format.THREEMF, "no .zip"),
-        (threemf("league"), Format.THREEMF, "'league' is no unit of 3MF"),
-        (threemf(more=' transform="nan 0 0 0 1 0 0 0 1 0 0 0"'), Format.THREEMF, "finite|broken"),
+        (b"PK", Format.THREEMF, "cannot be read as a .zip"),
+        (threemf("league"), Format.THREEMF, "'league' is not a unit of 3MF"),
+        (threemf(more=' transform="nan 0 0 0 1 0 0 0 1 0 0 0"'), Format.THREEMF, "finite|corrupt"),
         (
             threemf(files={"big": bytes(MAX_FILE_BYTES)}),
             Format.THREEMF,
             "more than 20 MB when unpacked",
         ),
         (threemf(files={f"f{i}": b"" for i in range(300)}), Format.THREEMF, "more than 256 files"),
-        (b"", Format.OFF, "no OFF"),
-        (b"OFF BINARY\n", Format.OFF, "no OFF"),
+        (b"", Format.OFF, "not OFF"),
+        (b"OFF BINARY\n", Format.OFF, "not OFF"),
         (b"OFF\n3 1", Format.OFF, "ends too early"),
-        (b"OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2", Format.OFF, "line 4: numbers are wanted"),
+        (b"OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2", Format.OFF, "line 4: expected numbers"),
         (
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1",
             Format.OFF,
             "line 6: this face does not have 3 corners",
         ),
         (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3", Format.OFF, "vertex 3, counted from 0"),
-        (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2", Format.OFF, "no finite numbers"),
+        (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2", Format.OFF, "not finite numbers"),
     ],
 )
 def test_broken_file_is_refused_in_words(data: bytes, format: Format, said: str) -> None:
@@ -230,7 +230,7 @@ def test_no_other_file_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     opened: list[str] = []
     monkeypatch.setattr("builtins.open", lambda path, *_a, **_k: opened.append(str(path)))
     shape = read_shape(named, Format.DAE, "l")
-    with pytest.raises(InputError, match=r"no triangles\. It has 1 parts that are broken"):
+    with pytest.raises(InputError, match=r"no triangles\. It has 1 corrupt parts"):
         read_shape(elsewhere, Format.DAE, "l")
     monkeypatch.undo()
     assert "pictures on the surface" in shape.text

@@ -172,9 +172,9 @@ def test_no_path_leads_out_of_a_scene(path: str, tmp_path: Path) -> None:
     inside = tmp_path / "inside"
     inside.mkdir()
     (inside / "scene.yaml").write_text(MESH.format(file=path))
-    with pytest.raises(InputError, match=r"line 3.*no relative path|in the folder"):
+    with pytest.raises(InputError, match=r"line 3.*not a relative path|in the folder"):
         read_scene_folder(inside / "scene.yaml", None)
-    with pytest.raises(InputError, match="no relative path"):
+    with pytest.raises(InputError, match="not a relative path"):
         read_scene_zip(zipped(scene_yaml=MESH.format(file=path)), None)
 
 
@@ -199,25 +199,25 @@ THINGS = "scene: 1\nobjects:\n"
     ("text", "said"),
     [
         ("", "line 1, column 1: The scene is empty"),
-        ("scene: 2\n", "line 1.*version 1"),
+        ("scene: 2\n", "line 1.*version must be 1"),
         ("objects: []\n", "needs 'scene'"),
         (THINGS + "- {name: it}\n", "line 3.*needs 'shape'"),
         (
             THINGS + "- name: it\n  shape: box\n  size: [1, 2]\n  pose: [0, 0, 0]\n",
-            "line 5, column 9.*of 3(.|\n)*line 6, column 9: A pose is six numbers",
+            "line 5, column 9.*of 3(.|\n)*line 6, column 9: A pose must be six numbers",
         ),
-        (THINGS + ball(size=".nan"), "line 3.*A number"),
-        (THINGS + ball(view_options=", colour: red"), "line 3.*A colour is as"),
+        (THINGS + ball(size=".nan"), "line 3.*Expected a number"),
+        (THINGS + ball(view_options=", colour: red"), "line 3.*A colour must be like"),
         (THINGS + ball(view_options=", coluor: 1"), "line 3.*did you mean 'colour'"),
         (THINGS + ball(size="3000"), "line 3, column 3.*from 0.001 to 2 m"),
         (THINGS + ball() + ball(), "line 4.*two objects called 'it'"),
-        (THINGS + ball(view_options=", attach: hand"), "line 3.*has no hand"),
+        (THINGS + ball(view_options=", attach: hand"), "line 3.*no model of a hand"),
         (THINGS + ball() + "# " + "-" * 70_000, "at most 64 KB"),
         ("scene: 1\nobjects: &a []\n", "Anchors"),
         ("scene: 1\nwater: -1\n", "line 2.*not between"),
         (MESH.format(file="gone.stl"), "line 3.*gone.stl"),
         (MESH.format(file="it.exe"), "line 3.*it.exe"),
-        (MESH.format(file="scene.yaml"), "line 3.*scene.yaml is of no format"),
+        (MESH.format(file="scene.yaml"), "line 3.*scene.yaml has an unknown format"),
         (MESH.format(file="it.stl, sha256: abc"), "line 5.*64 digits"),
     ],
 )
@@ -232,7 +232,7 @@ def test_another_file_than_it_was_saved_with_is_noticed(mesh: Mesh) -> None:
     with zipfile.ZipFile(out, "w") as archive:
         archive.writestr("scene.yaml", text)
         archive.writestr("ring.stl", ring() + b"\0")
-    with pytest.raises(InputError, match=r"line 3(.|\n)*another file|cannot|broken"):
+    with pytest.raises(InputError, match=r"line 3(.|\n)*not the file|cannot|corrupt"):
         read_scene_zip(out.getvalue(), None)
 
 
@@ -298,7 +298,7 @@ def test_a_mesh_stands_on_its_underside_and_its_key_tells_how_it_was_read(mesh: 
         lambda: read_mesh(ring(), "ring.stl", up=Up.Y),
     ]
     assert all(other().key != mesh.key for other in others)
-    with pytest.raises(InputError, match="A unit is one of mm, cm, in, m"):
+    with pytest.raises(InputError, match="The unit must be one of mm, cm, in, m"):
         read_mesh(ring(), "ring.stl", "ft")
 
 

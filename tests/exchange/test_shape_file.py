@@ -110,7 +110,7 @@ def test_another_reader_finds_the_same_triangles(file: str) -> None:
 
 @pytest.mark.parametrize(
     ("file", "said"),
-    [("gmsh.wrl", "VRML 1.0, which is not read"), ("assimp.gltf", "'assimp.bin'")],
+    [("gmsh.wrl", "VRML 1.0, which is not supported"), ("assimp.gltf", "'assimp.bin'")],
 )
 def test_ignored_content_of_foreign_files_is_reported(file: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
@@ -206,11 +206,11 @@ def tetrahedron(size: float) -> bytes:
 @pytest.mark.parametrize(
     ("size", "told", "unit", "said"),
     [
-        (1.5, None, 1.0, "taken as m, since 1.5 mm would be small"),
-        (2.5, None, 1e-3, "taken as mm, since 2.5 m would be too large"),
-        (1500.0, None, 1e-3, "taken as mm"),
-        (3.0, 0.0254, 0.0254, "the unit is in, as told"),
-        (3.0, 0.1, 0.1, "the unit is 0.1 m, as told"),
+        (1.5, None, 1.0, "assumed to be m, since 1.5 mm would be small"),
+        (2.5, None, 1e-3, "assumed to be mm, since 2.5 m would be too large"),
+        (1500.0, None, 1e-3, "assumed to be mm"),
+        (3.0, 0.0254, 0.0254, "the unit is in, as given"),
+        (3.0, 0.1, 0.1, "the unit is 0.1 m, as given"),
     ],
 )
 def test_unit_is_given_or_guessed_and_reported(
@@ -251,7 +251,7 @@ def test_the_axis_that_is_up_can_be_told() -> None:
     assert (sides(upright), sides(flat)) == (UPRIGHT, FLAT)
     x, y, z = flat.vertices.T
     np.testing.assert_array_equal(upright.vertices, np.column_stack((x, -z, y)))
-    assert "as told" in flat.text
+    assert "as given" in flat.text
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_gltf_of_2_m_is_read_and_a_longer_one_is_told_from_the_bound() -> None:
     assert SceneObject("long", Shape.MESH, (), np.eye(4), solid=mesh.solid).size[0] > 2.0
     with pytest.raises(InputError) as refused:
         read_shape(cube(2.0002), Format.GLB, "long.glb")
-    found = re.search(r"would be ([0-9.]+) mm long, .* from 1 to 2000 mm", str(refused.value))
+    found = re.search(r"would be ([0-9.]+) mm long, .* the range is 1 to 2000 mm", str(refused.value))
     assert found
     assert float(found[1]) > 2000.0
 
@@ -320,7 +320,7 @@ def test_a_guarded_reading_is_the_same() -> None:
 
 
 def test_a_guarded_reading_ends_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"hull\.ply does not begin with 'ply'"):
+    with pytest.raises(InputError, match=r"hull\.ply is not a PLY file"):
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
     with pytest.raises(InputError, match=r"has 20\.0 MB"):
         read_shape_guarded(bytes(20_000_001), Format.PLY, "hull.ply")
@@ -329,5 +329,5 @@ def test_a_guarded_reading_ends_in_words(monkeypatch: pytest.MonkeyPatch) -> Non
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
     monkeypatch.setattr(shape_file, "SECONDS", 5.0)
     monkeypatch.setattr("sys.executable", "false")
-    with pytest.raises(InputError, match="wants more than 5 s or 1024 MiB"):
+    with pytest.raises(InputError, match="needs more than 5 s or 1024 MiB"):
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
