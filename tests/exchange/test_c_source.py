@@ -153,7 +153,7 @@ def test_keys_and_mouse_move_joints_and_camera(tmp_path: Path, viewer: Path, kat
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--pose", "1,x"), "numbers with commas"),
+        (("--pose", "1,x"), "comma-separated numbers"),
         (("--pose", "9"), "beyond the limits"),
         (("--pose", "nan"), "beyond the limits"),
         (("--pose", "0,0,0,0,0,0,0"), "more numbers than"),
