@@ -8,7 +8,7 @@ MEASURES: Final = {
     "max_position_error_mm": "distance of the planned tool positions from the desired path",
     "rms_position_error_mm": "the same, root mean square",
     "max_orientation_error_deg": "deviation of the tool from the desired pitch and roll",
-    "executed_position_error_mm": "distance of the setpoint at each tick from the desired path",
+    "executed_position_error_mm": "distance of the arm at each tick from the desired path",
     "between_ticks_error_mm": "the same half-way between ticks, joints interpolated linearly",
     "path_length_mm": "length of the tool's paths",
     "smallest_singular_value": "of the Jacobian, translations divided by the characteristic length",
