@@ -113,14 +113,14 @@ GOOD = {
         ({"points": POINTS * np.nan}, "'points'"),
         ({"points": np.array(0.0)}, "'points'"),
         ({"points": np.array([["a", "b", "c"]])}, "'points'"),
-        ({"points": np.array([None, {}], dtype=object)}, "broken"),
+        ({"points": np.array([None, {}], dtype=object)}, "corrupt"),
         ({"fraction": FRACTION[:, None]}, "'fraction'"),
         ({"fraction": FRACTION - 0.25}, "above 0"),
         ({"fraction": FRACTION + 0.1}, "up to 1"),
-        ({"voxel": np.array(0.0)}, "an edge of 0"),
-        ({"voxel": np.array(np.nan)}, "an edge of nan"),
+        ({"voxel": np.array(0.0)}, "is 0.0 m"),
+        ({"voxel": np.array(np.nan)}, "is nan m"),
         ({"voxel": np.array("wide")}, "'voxel'"),
-        ({"voxel": FRACTION}, "broken"),
+        ({"voxel": FRACTION}, "corrupt"),
         ({"robot": np.array(3)}, "'robot'"),
         ({"tool": np.array(1.5)}, "'tool'"),
     ],
@@ -154,7 +154,7 @@ def test_invalid_npz_is_refused(npz: Path, tmp_path: Path) -> None:
     np.save(array, POINTS)
     for content in (b"", b"nonsense", whole[: len(whole) // 2], array.getvalue()):
         other.write_bytes(content)
-        with pytest.raises(InputError, match=r"other\.npz is no reachability map(?!.*pickle)"):
+        with pytest.raises(InputError, match=r"other\.npz is corrupt or not a reachability map(?!.*pickle)"):
             load_map(other)
     damaged = bytearray(whole)
     damaged[whole.index(b"points.npy") + 50] ^= 0xFF

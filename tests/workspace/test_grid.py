@@ -53,13 +53,13 @@ def test_chunks_are_all_voxels_once_in_order(grid: VoxelGrid) -> None:
 
 @pytest.mark.parametrize("size", [0.0, -0.01, 1e-4, 1.0, math.nan, math.inf])
 def test_a_voxel_that_makes_no_grid_is_refused(size: float) -> None:
-    with pytest.raises(InputError, match="makes no map; choose one from 1 to 250 mm"):
+    with pytest.raises(InputError, match="it must be from 1 to 250 mm"):
         VoxelGrid.around(CENTER, REACH, size, table=0.0)
 
 
 @pytest.mark.parametrize("table", [0.55, 2.0, math.nan, math.inf, -math.inf])
 def test_a_table_that_leaves_nothing_is_refused(table: float) -> None:
-    with pytest.raises(InputError, match="comes up to 550 mm"):
+    with pytest.raises(InputError, match="reaches up to 550 mm"):
         VoxelGrid.around(CENTER, REACH, 0.04, table)
 
 

@@ -59,7 +59,7 @@ def test_the_cloud_is_the_tool_at_random_joint_angles(survey: Survey, arm: Mount
 def test_numbers_that_cannot_be_are_refused_before_the_work(
     survey: Survey, samples: int, seed: int
 ) -> None:
-    with pytest.raises(InputError, match=r"is -?\d+; give 0 to \d+"):
+    with pytest.raises(InputError, match=r"is -?\d+; it must be from 0 to \d+"):
         Survey(survey.reachability, 0.1, samples, seed)
 
 
