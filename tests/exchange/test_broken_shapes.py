@@ -1,4 +1,4 @@
-"""Files that are broken, hostile or of another kind: each is refused in words, or read well."""
+"""Tests of files that are corrupt, hostile or of another kind: refused with a message, or read."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ resource = pytest.importorskip("resource")
 FOREIGN = Path(__file__).parent / "foreign"
 
 MUTATIONS = 1000 if "KATANA450_LONG" in os.environ else 60
-"""Of each seed."""
+"""Number of mutations of each seed."""
 
 PLY = """ply
 format ascii 1.0
@@ -80,7 +80,7 @@ FACET = "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 {} 0 e
 
 
 def gltf(**changes: Any) -> bytes:
-    """One triangle, with parts of the document replaced; None takes one away."""
+    """Return one triangle as glTF, with parts of the document replaced; None removes a part."""
     numbers = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
     document: dict[str, Any] = {
         "asset": {"version": "2.0"},
@@ -101,7 +101,7 @@ def glb(told: bytes, numbers: bytes) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def test_the_files_that_are_broken_below_are_read_when_they_are_not() -> None:
+def test_the_unchanged_files_are_read() -> None:
     text = f"solid\n{FACET.format(1)}\nendsolid\n".encode()
     cases = [(Format.PLY, ply()), (Format.STL, stl()), (Format.STL, text), (Format.GLB, gltf())]
     for format, data in cases:
@@ -130,7 +130,7 @@ def test_the_files_that_are_broken_below_are_read_when_they_are_not() -> None:
         ),
     ],
 )
-def test_no_stl(data: bytes, said: str) -> None:
+def test_invalid_stl_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.STL, "a.stl")
 
@@ -154,7 +154,7 @@ def test_no_stl(data: bytes, said: str) -> None:
         ("v 0 0 0\n" + "f" + " 1" * 200_003, "more than 200000 triangles"),
     ],
 )
-def test_no_obj(text: str, said: str) -> None:
+def test_invalid_obj_is_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(text.encode(), Format.OBJ, "a.obj")
 
@@ -202,13 +202,13 @@ def test_statements_of_obj() -> None:
         (ply().replace(b"ascii", b"binary_little_endian"), "ends too early"),
     ],
 )
-def test_no_ply(data: bytes, said: str) -> None:
+def test_invalid_ply_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.PLY, "a.ply")
 
 
 def test_rows_of_ply_may_differ() -> None:
-    """Polygons of several sizes, text and binary, lists besides, and colours as numbers 0..1."""
+    """Polygons of several sizes, text and binary, other lists, and colours as numbers 0..1."""
     header = ply(faces=2, vertices=4).decode().partition("0 0 0")[0]
     header = header.replace("z\n", "z\nproperty float red\nproperty float green\n")
     header = header.replace("element face", "property float blue\nelement face")
@@ -279,7 +279,7 @@ ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
         ),
     ],
 )
-def test_no_gltf(data: bytes, said: str) -> None:
+def test_invalid_gltf_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.GLB, "a.glb")
 
@@ -322,7 +322,7 @@ def test_modes_colours_and_places_of_gltf(mode: int, faces: int) -> None:
     }
     shape = read_shape(glb(json.dumps(told).encode(), data), Format.GLB, "a.glb")
     assert len(shape.faces) == faces
-    # Mirrored, turned by 90 degrees about its z, moved, then made upright: x, -z, y.
+    # Mirrored, rotated by 90 degrees about its z, moved, then made upright: x, -z, y.
     assert np.ptp(shape.vertices, axis=0).tolist() == pytest.approx([1.0, 0.0, 1.0])
     assert shape.vertices[:, 1] == pytest.approx(-0.5)
     a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
@@ -345,7 +345,7 @@ SEEDS = {
 
 
 def mutated(data: bytes, chance: random.Random) -> bytes:
-    """With some bytes, pieces or numbers changed, or its end cut off."""
+    """Return ``data`` with some bytes, pieces or numbers changed, or with its end cut off."""
     found = bytearray(data)
     for _ in range(chance.randint(1, 4)):
         at = chance.randrange(len(found))
@@ -371,7 +371,7 @@ def mutated(data: bytes, chance: random.Random) -> bytes:
 
 
 def looked_at(data: bytes, format: Format) -> ShapeFile | None:
-    """What is read; None where it is refused in a sentence. Anything else fails."""
+    """Return the reading; None if it is refused with a message. Other exceptions fail."""
     try:
         shape = read_shape(data, format, "fuzz.bin", 1e-3)
     except InputError as error:
@@ -404,7 +404,7 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
 
 @settings(max_examples=MUTATIONS, deadline=None)
 @given(st.sampled_from(Format), st.binary(max_size=200), st.integers(0, 150))
-def test_any_bytes_behind_any_beginning_are_read_or_refused(
+def test_random_bytes_after_any_header_are_read_or_refused(
     format: Format, data: bytes, kept: int
 ) -> None:
     beginnings = {Format.WRL: "castle.wrl", Format.STL: "vtk.stl", Format.OBJ: "vtk.obj"}
@@ -433,7 +433,7 @@ def laughs() -> bytes:
     ],
     ids=["bomb", "deep", "laughs", "faces", "wide"],
 )
-def test_hostile_files_end_in_words_in_time(make: Callable[[], bytes], format: Format) -> None:
+def test_hostile_files_are_refused_in_time(make: Callable[[], bytes], format: Format) -> None:
     data = make()
     start = time.perf_counter()
     with pytest.raises(InputError):
@@ -442,7 +442,7 @@ def test_hostile_files_end_in_words_in_time(make: Callable[[], bytes], format: F
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems count no address space")
-def test_a_reading_that_wants_more_memory_than_it_may_ends() -> None:
+def test_a_reading_beyond_the_memory_limit_ends() -> None:
     assert bind.__module__ == "katana450.extensions.importers.reading"
     words = "from katana450.extensions.importers.reading import bind; bind(); bytearray({} << 20)"
     for mebibytes, ends in ((2048, 1), (64, 0)):

@@ -1,4 +1,4 @@
-"""COLLADA, 3MF and OFF: read as other programs mean them, or refused in words."""
+"""Tests of COLLADA, 3MF and OFF: read as by other programs, or refused with a message."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_concave_polygons_units_and_colours(
     assert (shape.unit, sides(shape), is_closed(shape)) == (1e-3, [60.0, 40.0, 25.0], True)
     assert volume(shape) == pytest.approx(35e-6, rel=1e-6)
     a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
-    # A fan over a concave polygon covers more than the polygon.
+    # A fan of a concave polygon would cover more than the polygon.
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0
     assert area == pytest.approx(1e-6 * (2 * 1400 + 25 * 200), rel=1e-5)
     if colour is None:
@@ -135,7 +135,7 @@ def test_concave_polygons_units_and_colours(
 def test_components_units_and_transforms_of_3mf() -> None:
     shape = read_shape(threemf(), Format.THREEMF, "l.3mf")
     assert "the unit is mm, as in the file" in shape.text
-    # Turned by 90 degrees about z.
+    # Rotated by 90 degrees about z.
     assert (sides(shape), is_closed(shape)) == ([40.0, 60.0, 25.0], True)
     assert volume(shape) == pytest.approx(35e-6, rel=1e-6)
     assert read_shape(threemf("centimeter"), Format.THREEMF, "l").unit == 1e-2
@@ -153,7 +153,7 @@ def test_transforms_and_axes_of_dae() -> None:
     assert sides(read_shape(dae(up="X_UP"), Format.DAE, "l")) == [40.0, 25.0, 60.0]
 
 
-def test_units_that_are_none_of_ours_become_metres() -> None:
+def test_other_units_become_metres() -> None:
     shape = read_shape(dae(meter=0.002), Format.DAE, "l")
     assert (shape.unit, sides(shape)) == (1.0, [120.0, 80.0, 50.0])
     mesh = read_mesh(dae(meter=0.002), "l.dae")
@@ -210,7 +210,7 @@ ENTITY = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/pa
         (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2", Format.OFF, "not finite numbers"),
     ],
 )
-def test_broken_file_is_refused_in_words(data: bytes, format: Format, said: str) -> None:
+def test_corrupt_file_is_refused_with_a_message(data: bytes, format: Format, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, format, f"a.{format.value}")
 
@@ -225,7 +225,7 @@ def test_no_other_file_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     )
     named = dae().replace(b"<library_effects>", image.encode())
     elsewhere = dae(nodes=f'<node><instance_geometry url="{other.as_uri()}#g"/></node>')
-    # What is imported on first use is imported now.
+    # Triggers imports on first use before files are watched.
     read_shape(dae(), Format.DAE, "l")
     opened: list[str] = []
     monkeypatch.setattr("builtins.open", lambda path, *_a, **_k: opened.append(str(path)))
@@ -238,7 +238,7 @@ def test_no_other_file_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def laughing_archive() -> bytes:
-    """Objects of ten components each, of objects of ten components each."""
+    """Return an archive of objects of ten components each, nested many times."""
     objects = "".join(
         f'<object id="{i}"><components>{f"<component objectid={chr(34)}{i - 1}{chr(34)}/>" * 10}'
         "</components></object>"
@@ -252,7 +252,7 @@ def laughing_archive() -> bytes:
 
 
 def bomb() -> bytes:
-    """An archive that declares less than it unpacks to."""
+    """Return an archive that declares a smaller size than it unpacks to."""
     data = bytearray(threemf(files={"big": bytes(50_000_000)}))
     for at in (data.index(b"big") - 46 + 24, data.rindex(b"big") - 46 + 24):
         data[at : at + 4] = (100).to_bytes(4, "little")
@@ -260,7 +260,7 @@ def bomb() -> bytes:
 
 
 def entities(file: str = "") -> bytes:
-    """An archive whose model calls entities by tens of tens, or the text of another file."""
+    """Return an archive whose model nests entities by tens, or includes another file."""
     rows = [f'<!ENTITY e0 SYSTEM "{file}">' if file else '<!ENTITY e0 "0123456789">']
     rows += [f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 12)]
     with zipfile.ZipFile(io.BytesIO(threemf())) as archive:
@@ -275,7 +275,7 @@ def entities(file: str = "") -> bytes:
     [laughing_archive, bomb, entities, lambda: entities("file:///etc/passwd")],
     ids=["laughs", "bomb", "entities", "other file"],
 )
-def test_hostile_archive_ends_in_words_in_time(make: Callable[[], bytes]) -> None:
+def test_hostile_archive_is_refused_in_time(make: Callable[[], bytes]) -> None:
     data = make()
     start = time.perf_counter()
     with pytest.raises(InputError):

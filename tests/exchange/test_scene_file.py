@@ -1,4 +1,4 @@
-"""Scenes as files: what is saved is what is loaded, and what is wrong is told where it is."""
+"""Tests of scene files: read back unchanged, with errors reported at their lines."""
 
 from __future__ import annotations
 
@@ -90,8 +90,8 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 @given(scenes())
 @settings(max_examples=60, deadline=None)
-def test_what_is_written_is_read(scene: Scene) -> None:
-    """To a nanometre, and the text of that to the letter."""
+def test_a_written_scene_is_read_back(scene: Scene) -> None:
+    """Values are equal to a nanometre; their text is equal exactly."""
     file = MeshFile("meshes/it.stl", "mm", None, "0" * 64)
     text = written(scene, {SOLID.key: file}, T_PALM_TOOL)
     back = parsed(text).scene({file: SOLID}, T_PALM_TOOL)
@@ -126,7 +126,7 @@ def scene_of(mesh: Mesh) -> StoredScene:
 
 
 @pytest.mark.parametrize("kind", ["zip", "folder"])
-def test_a_scene_comes_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: Path) -> None:
+def test_a_scene_is_read_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: Path) -> None:
     stored = scene_of(mesh)
     data = scene_zip(stored, T_PALM_TOOL)
     if kind == "zip":
@@ -226,7 +226,7 @@ def test_error_is_reported_with_its_line(text: str, said: str) -> None:
         read_scene_zip(zipped(scene_yaml=text), None)
 
 
-def test_another_file_than_it_was_saved_with_is_noticed(mesh: Mesh) -> None:
+def test_a_mesh_file_that_has_changed_is_refused(mesh: Mesh) -> None:
     text = MESH.format(file=f"ring.stl, sha256: '{mesh.sha256}'")
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
@@ -236,7 +236,7 @@ def test_another_file_than_it_was_saved_with_is_noticed(mesh: Mesh) -> None:
         read_scene_zip(out.getvalue(), None)
 
 
-def test_a_broken_or_swollen_zip_is_refused(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_corrupt_or_too_large_zip_is_refused(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = scene_zip(scene_of(mesh), T_PALM_TOOL)
     random = np.random.default_rng(0)
     for cut in random.integers(0, len(whole), 40).tolist():
@@ -302,7 +302,7 @@ def test_a_mesh_stands_on_its_underside_and_its_key_tells_how_it_was_read(mesh: 
         read_mesh(ring(), "ring.stl", "ft")
 
 
-def test_the_scene_of_the_documents_is_understood() -> None:
+def test_the_scene_of_the_documents_is_valid() -> None:
     page = Path(__file__).resolve().parents[2] / "docs" / "scenes.md"
     text = page.read_text(encoding="utf-8").partition("```yaml\n")[2].partition("```")[0]
     draft = parsed(re.sub(r".*sha256.*\n", "", text))

@@ -1,4 +1,4 @@
-"""A motion is the same from CSV and JSON; a file that is none is refused, and says where."""
+"""Tests of motion files: the same from CSV and JSON; invalid files are refused with the place."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def csv_of(table: dict[str, list[float]]) -> str:
     return "\n".join([",".join(table), *(", ".join(map(repr, row)) for row in rows), ""])
 
 
-def test_csv_and_json_say_the_same(tmp_path: Path, katana: Robot) -> None:
+def test_csv_and_json_give_the_same_motion(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "a.csv").write_text(csv_of(TABLE))
     (tmp_path / "a.json").write_text(json.dumps(TABLE))
     one, two = (load_motion(tmp_path / name, katana) for name in ("a.csv", "a.json"))
@@ -38,7 +38,7 @@ def test_csv_and_json_say_the_same(tmp_path: Path, katana: Robot) -> None:
         np.testing.assert_array_equal(motion.values["axis_2"], np.zeros(3))
 
 
-def test_joints_go_by_their_own_names_too(tmp_path: Path, gantry: Robot) -> None:
+def test_joints_can_have_their_own_names(tmp_path: Path, gantry: Robot) -> None:
     (tmp_path / "a.csv").write_text("t,turn,theta1\n0,0,0\n1,9,0.4\n")
     motion = load_motion(tmp_path / "a.csv", gantry)
     np.testing.assert_array_equal(motion.values["turn"], [0.0, 9.0])

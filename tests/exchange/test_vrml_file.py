@@ -1,4 +1,4 @@
-"""Foreign VRML97: each geometry node, each grouping node, and what is left out or refused."""
+"""Tests of foreign VRML97: geometry nodes, grouping nodes, omitted and refused nodes."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ def test_a_sphere_is_round() -> None:
 
 
 def test_a_bent_extrusion_is_a_mitred_tube() -> None:
-    """A corner of a square: four mitres, so a frame of the square's area times its middle line."""
+    """A square frame with four mitres has the square's area times its middle line as volume."""
     shape = shown(
         "Extrusion { crossSection [ -.1 -.1, -.1 .1, .1 .1, .1 -.1, -.1 -.1 ] beginCap FALSE "
         "endCap FALSE spine [ 0 0 0, 2 0 0, 2 2 0, 0 2 0, 0 0 0 ] }"
     )
     assert is_closed(shape)
-    # The standard's planes halve the corners but do not widen the section there.
+    # The standard's planes bisect the corners but do not widen the section there.
     assert abs(volume(shape) * 1e3) == pytest.approx(0.04 * 8.0 * np.sqrt(0.5), rel=1e-6)
 
 
@@ -133,8 +133,8 @@ def test_concave_faces_are_covered_once() -> None:
     assert twice.sum() / 2.0 * 100.0 == pytest.approx(1.0)
 
 
-def test_transforms_do_as_the_standard_has_it() -> None:
-    """P' = T C R SR S -SR -C P, worked out one after the other."""
+def test_transforms_follow_the_standard() -> None:
+    """Compute P' = T C R SR S -SR -C P factor by factor."""
     shape = world(
         "Transform { translation 1 2 3 center .5 0 .25 rotation 0 0 2 .7 scale 1 2 -1.5 "
         "scaleOrientation 1 0 0 .4 children Transform { rotation 0 1 0 1 children Shape { geometry "
@@ -216,7 +216,7 @@ def test_compressed_files_and_byte_order_marks_are_read() -> None:
 
 
 def chain(links: int, fan: int, shape: str = "Shape { geometry Box { } }") -> str:
-    """Each node uses the one before `fan` times."""
+    """Return nodes of which each uses the one before ``fan`` times."""
     rows = [f"DEF n0 Group {{ children {shape} }}"]
     rows += [f"DEF n{i} Group {{ children [ {f'USE n{i - 1} ' * fan}] }}" for i in range(1, links)]
     return f"Switch {{ choice [ {' '.join(rows[:-1])} ] }} {rows[-1]}"
@@ -260,7 +260,7 @@ def test_nodes_that_use_others_can_be_deep() -> None:
         ("Shape { geometry Box { size nan 1 1 } }", "expected a number"),
     ],
 )
-def test_what_cannot_be_shown_is_refused(text: str, said: str) -> None:
+def test_invalid_worlds_are_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         world(text)
 

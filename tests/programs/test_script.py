@@ -1,4 +1,4 @@
-"""What a script may say, and how a person is told what is wrong with one."""
+"""Tests of the script parser and of its error messages."""
 
 from __future__ import annotations
 
@@ -135,18 +135,18 @@ TREES = st.recursive(
 
 
 def wrong_with(text: str) -> tuple[Problem, ...]:
-    """What is, or nothing; whatever else is raised fails the test."""
+    """Return the problems of a text, none if it is valid; any other exception fails the test."""
     try:
         script = parse(text)
     except ScriptError as error:
         return error.problems
-    # A script that can be read has something to do.
+    # A valid script has at least one step.
     return () if script.steps else (Problem(0, 0, "no steps"),)
 
 
 @settings(max_examples=60, deadline=None)
 @given(TREES)
-def test_no_tree_of_values_is_more_than_an_error(tree: object) -> None:
+def test_any_tree_of_values_is_read_or_refused(tree: object) -> None:
     text = json.dumps({"steps": tree})
     problems = wrong_with(text)
     assert all(problem.line >= 1 and problem.column >= 1 for problem in problems)
@@ -159,7 +159,7 @@ def test_no_tree_of_values_is_more_than_an_error(tree: object) -> None:
 @example("\ud800")
 @example("%YAML 3.0\n---\nsteps: [home]")
 @example("steps: [home]\n---\nsteps: [home]")
-def test_no_text_is_more_than_an_error(text: str) -> None:
+def test_any_text_is_read_or_refused(text: str) -> None:
     assert all(problem.line >= 1 for problem in wrong_with(text))
 
 

@@ -91,8 +91,8 @@ def path_figure(paths: Sequence[PathTrace]) -> bytes:
         top = worst / 10.0**power
         panel.set_ylim(0.0, 1.25 * top or 1.0)
         panel.axhline(top, color=INK, linewidth=0.7, linestyle=(0, (4, 3)))
-        label = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
-        panel.annotate(label, (99.0, 1.03 * top), ha="right", va="bottom")
+        caption = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
+        panel.annotate(caption, (99.0, 1.03 * top), ha="right", va="bottom")
         return _png(plt, figure)
 
 
