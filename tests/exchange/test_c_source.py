@@ -154,8 +154,8 @@ def test_keys_and_mouse_move_joints_and_camera(tmp_path: Path, viewer: Path, kat
     ("words", "said"),
     [
         (("--pose", "1,x"), "comma-separated numbers"),
-        (("--pose", "9"), "beyond the limits"),
-        (("--pose", "nan"), "beyond the limits"),
+        (("--pose", "9"), "outside the limits"),
+        (("--pose", "nan"), "outside the limits"),
         (("--pose", "0,0,0,0,0,0,0"), "more numbers than"),
         (("--size", "0x10"), "WIDTHxHEIGHT"),
         (("--follow", "70000"), "a port"),

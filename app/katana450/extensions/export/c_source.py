@@ -88,10 +88,10 @@ def _part(link: Link, name: str) -> dict[str, str]:
             f"extern {arrays[0]};",
             f"extern {arrays[1]};",
             "",
-            "/* Of each triangle: 3 vertices, 3 normals, 3 texture points (there are none). */",
+            "/* Per triangle: 3 vertices, 3 normals, 3 texture points (unused). */",
             f"extern {arrays[2]};",
             "",
-            "/* Draws it with its materials in the frame that is set. */",
+            "/* Draws the link with its materials in the current frame. */",
             f"void {name}_draw(void);",
             "",
             "#ifdef __cplusplus",
@@ -177,7 +177,7 @@ void NAME_draw(void)
 
 def _header(robot: Robot) -> str:
     return f"""\
-/* {_comment(robot.name)}: its joints, and a function that draws all of it. */
+/* {_comment(robot.name)}: its joints, and a function that draws the whole robot. */
 #ifndef ROBOT_H
 #define ROBOT_H
 
@@ -194,23 +194,23 @@ extern "C" {{
 #define ROBOT_NAME {_text(robot.name)}
 #define ROBOT_JOINTS {len(robot.driven)}
 
-/* slides: values are in m, else in rad. */
+/* slides: nonzero if values are in m, else they are in rad. */
 typedef struct {{
     const char *name;
     int slides;
     double lower, upper;
 }} robot_joint;
 
-/* The driven joints, and one more entry that stands for none. */
+/* The driven joints, and one empty entry at the end. */
 extern const robot_joint robot_joints[ROBOT_JOINTS + 1];
 
-/* Where the joints begin. */
+/* Start values of the joints. */
 extern const double robot_start[ROBOT_JOINTS + 1];
 
-/* A camera that sees all of it: metres in the frame of the base, z up; rad from top to bottom. */
+/* A camera that sees the whole robot: m in the base frame, z up; vertical field of view in rad. */
 extern const double robot_eye[3], robot_target[3], robot_field_of_view;
 
-/* Draws every link where the joint values put it. */
+/* Draws every link at the given joint values. */
 void robot_draw(const double q[]);
 
 #ifdef __cplusplus

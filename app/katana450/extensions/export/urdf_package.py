@@ -244,7 +244,7 @@ def _weigh_frames(root: ET.Element) -> None:
 
 
 def _configure_mujoco(root: ET.Element) -> None:
-    """Set the attributes of `MUJOCO`; what else the file tells MuJoCo stays."""
+    """Set the attributes of `MUJOCO`; other attributes for MuJoCo stay."""
     extension = root.find("mujoco")
     if extension is None:
         extension = ET.Element("mujoco")
