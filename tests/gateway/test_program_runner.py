@@ -118,7 +118,7 @@ def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> 
             program_runner.check_may_touch(window.actor)
         with pytest.raises(LeaseError, match=said):
             program_runner.steer(window, ProgramOrder.END)
-    with pytest.raises(LeaseError, match="end it first"):
+    with pytest.raises(LeaseError, match="End it first"):
         table.plan(other)
     program_runner.check_may_touch(admin.actor)
     program_runner.steer(admin, ProgramOrder.END)
