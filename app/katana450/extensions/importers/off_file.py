@@ -22,7 +22,7 @@ HEADERS = ("OFF", "COFF", "NOFF", "CNOFF")
 Rows = list[tuple[int, str]]
 """Lines of a file with their numbers."""
 
-LONGEST_ROW = 400
+MAX_ARRAY_ROW = 400
 """Maximum number of characters of a line for conversion of all rows as one array."""
 
 
@@ -93,7 +93,7 @@ def _faces(rows: Rows, name: str) -> tuple[IntArray, IntArray]:
 
 def _array(rows: Rows, kind: type[Any]) -> npt.NDArray[Any] | None:
     """Return the numbers of all rows; None if rows differ in length or hold other text."""
-    if not rows or max(len(row) for _, row in rows) > LONGEST_ROW:
+    if not rows or max(len(row) for _, row in rows) > MAX_ARRAY_ROW:
         return None
     try:
         return np.array([row.split() for _, row in rows]).astype(kind)

@@ -9,7 +9,6 @@ import re
 
 import numpy as np
 
-from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError
 from katana450.extensions.importers.surface import (
     MeshReading,
@@ -91,8 +90,5 @@ def _broken(data: bytes, at: int, name: str, what: str) -> InputError:
 
 def _reading(corners: FloatArray, name: str, left_out: tuple[str, ...] = ()) -> MeshReading:
     places = np.arange(3 * len(corners))
-    no_colours: Colours | None = None
-    surface = of_polygons(
-        corners.reshape(-1, 3), places, np.full(len(corners), 3), name, no_colours
-    )
+    surface = of_polygons(corners.reshape(-1, 3), places, np.full(len(corners), 3), name)
     return MeshReading(surface, left_out)
