@@ -21,16 +21,16 @@ from katana450.server.api import answers
 NAME = "Terminal"
 """Name of this client, which others see as the owner of the program."""
 
-PART = 150
+PART_CHARACTERS = 150
 """Maximum number of characters of a script per request."""
 
-HZ = 10.0
+STATE_RATE = 10.0
 """[Hz] Rate of the states that are requested."""
 
-STARTED = 60.0
+START_TIMEOUT = 60.0
 """[s] Timeout for the start of a server."""
 
-ENDED = ("done", "stopped", "failed", "refused", "cancelled")
+END_STATUSES = ("done", "stopped", "failed", "refused", "cancelled")
 """Statuses of a program that has ended."""
 
 
@@ -51,7 +51,7 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
 
 def _send(arm: Client, text: str, speed: float) -> None:
     """Send the script and wait until it is planned. Raises KatanaError with its errors."""
-    parts = [text[at : at + PART] for at in range(0, len(text), PART)] or [""]
+    parts = [text[at : at + PART_CHARACTERS] for at in range(0, len(text), PART_CHARACTERS)] or [""]
     for part in parts[:-1]:
         arm.ask(Program(text=part, more=True))
     arm.ask(Program(text=parts[-1], speed=speed))
@@ -59,7 +59,7 @@ def _send(arm: Client, text: str, speed: float) -> None:
         if now.steps and sys.stderr.isatty():
             line = f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}"
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
-        time.sleep(1.0 / HZ)
+        time.sleep(1.0 / STATE_RATE)
     if now is None or now.status != "ready":
         raise KatanaError(now.why if now is not None else "The server has forgotten the script.")
     print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
@@ -69,7 +69,7 @@ def _follow(arm: Client) -> int:
     """Print the progress of the program until it ends. Raises KatanaError if it fails."""
     shown = ""
     terminal = sys.stderr.isatty()
-    for state in arm.states(HZ):
+    for state in arm.states(STATE_RATE):
         now = state.program
         if now is None:
             raise LostError("The server has forgotten the program.")
@@ -81,7 +81,7 @@ def _follow(arm: Client) -> int:
         elif f"{now.step} {now.task}" != shown:
             shown = f"{now.step} {now.task}"
             print(line, flush=True)
-        if now.status in ENDED:
+        if now.status in END_STATUSES:
             if terminal:
                 print(file=sys.stderr)
             if now.status == "done":
@@ -127,7 +127,7 @@ def _may_start_at(url: str) -> bool:
 
 def _wait_for(server: subprocess.Popen[str]) -> None:
     assert server.stdout is not None
-    due = time.monotonic() + STARTED
+    due = time.monotonic() + START_TIMEOUT
     for line in server.stdout:
         if "is ready" in line:
             return

@@ -44,7 +44,7 @@ STYLE = {
 }
 """matplotlib settings of all figures."""
 
-SPREADINGS = 30
+LABEL_ITERATIONS = 30
 """Number of iterations that separate overlapping labels."""
 
 PARTS = 200
@@ -172,7 +172,7 @@ def _name_lines(panel: Any, t: FloatArray, values: FloatArray, names: Sequence[s
     apart = 0.055 * max(float(values.max() - values.min()), 1.0)
     at = values[-1].copy()
     order = np.argsort(at, kind="stable").tolist()
-    for _ in range(SPREADINGS):
+    for _ in range(LABEL_ITERATIONS):
         for low, high in pairwise(order):
             short = 0.5 * max(apart - float(at[high] - at[low]), 0.0)
             at[low], at[high] = at[low] - short, at[high] + short

@@ -86,7 +86,6 @@ def _summary(survey: Survey, found: ReachabilityMap, tool: str) -> str:
         f"The tool {tool} reaches {len(found.points)} voxels of {1e3 * survey.voxel:g} mm, "
         f"{litres:.1f} litres above the table at {1e3 * reachability.table:g} mm:\n"
         f"{extent} mm in the base frame.\n"
-        f"Of {reachability.orientations} orientations {found.fraction.mean():.1%} on average, up "
-        f"to "
-        f"{found.fraction.max():.1%} at {where} mm."
+        f"Of {reachability.orientations} orientations {found.fraction.mean():.1%} on average, "
+        f"up to {found.fraction.max():.1%} at {where} mm."
     )
