@@ -237,8 +237,8 @@ def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, 
 
     def put(trait: AppearanceTrait) -> Callable[[_Orders, FieldValue | None], None]:
         def changed(orders: _Orders, value: FieldValue | None) -> None:
-            commands = tuple(value) if isinstance(value, list) else value
-            orders.others.append(cmd.SetAppearance(name, trait, commands))
+            trait_value = tuple(value) if isinstance(value, list) else value
+            orders.others.append(cmd.SetAppearance(name, trait, trait_value))
 
         return changed
 

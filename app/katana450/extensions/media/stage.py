@@ -38,7 +38,7 @@ class RenderStage:
         self._links = {link.name: link.shapes for link in robot.links}
         self._table = _in_file(props.table.mesh)
         self._known = {"cup": _in_file(props.cup.mesh), "basin": _in_file(props.basin.mesh)}
-        self._stretches = [_Stretch(stretch) for stretch in arm.stretches]
+        self._stretches = [_BendableStretch(stretch) for stretch in arm.stretches]
 
     def items(self, state: State) -> list[Item]:
         """Return all opaque items."""
@@ -59,10 +59,10 @@ class RenderStage:
         return [
             Item(
                 CONDUIT,
-                hung.bent(angles[hung.stretch.hinge.joint]),
-                frames[hung.stretch.start.link],
+                bendable.bent(angles[bendable.stretch.hinge.joint]),
+                frames[bendable.stretch.start.link],
             )
-            for hung in self._stretches
+            for bendable in self._stretches
         ]
 
     def surrounding_items(self, state: State) -> list[Item]:
@@ -92,7 +92,7 @@ class RenderStage:
         return self._robot.frames(self._angles(state))
 
 
-class _Stretch:
+class _BendableStretch:
     """The rings of a stretch of conduit, as on the page."""
 
     def __init__(self, stretch: ConduitStretch) -> None:
