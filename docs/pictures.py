@@ -97,7 +97,7 @@ def gallery(page: ViserPage) -> None:
 
 
 STAGES = (
-    ("grasp cup: before it", 0.0),
+    ("grasp cup: approach", 0.0),
     ("grasp cup: close", 0.0),
     ("over basin", 0.5),
     ("pour", 0.62),

@@ -151,7 +151,7 @@ def test_the_map_of_another_arm_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "map.npz"
     options = ("--voxel", "150", "--pitches", "4", "--rolls", "4", "--out", str(path))
     assert main(["workspace", "--urdf", str(ARMS / "pincherx_150.urdf"), *options]) == 0
-    with pytest.raises(ServerError, match=r"pincherx_150'; this one is 'katana450'"):
+    with pytest.raises(ServerError, match=r"pincherx_150'; this arm is 'katana450'"):
         AppServer((*APP, "--workspace", str(path))).start()
 
 

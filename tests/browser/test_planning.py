@@ -73,7 +73,7 @@ def test_a_cancelled_preview_leaves_the_planner_free(page: ViserPage, artefacts:
     page.click_button("Preview")
     until(page, r"Planning Pour \d+%")
     assert orders(page) == ["Cancel"]
-    assert "does not run by itself" in page.page.inner_text("#why")
+    assert "does not start by itself" in page.page.inner_text("#why")
     page.keep(artefacts / "planning.png")
     press(page, "Cancel")
     until(page, "On target", 2.0)

@@ -119,7 +119,7 @@ def test_workers_of_another_version_are_refused(
     monkeypatch.setattr(cluster, "version", lambda: "0.0.0")
     assert main(["workspace", *MAP, "--scheduler", address]) == 1
     printed = capsys.readouterr()
-    assert re.search(r"worker tcp\S+ has katana450 \S+ and this machine 0\.0\.0", printed.err)
+    assert re.search(r"worker tcp\S+ has katana450 \S+, but this machine 0\.0\.0", printed.err)
     assert printed.out == ""
 
 

@@ -84,7 +84,7 @@ def test_figures_and_page_are_written(out: Path) -> None:
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 4
-    assert "Every bound is held." in page
+    assert "Every bound is met." in page
     assert "viewport" in page
     assert "http" not in page.replace("http-equiv", "")
 

@@ -45,8 +45,8 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("c", "--trajectory", "m.csv"), "A file of c holds no motion"),
-        (("urdf", "--pose", "0,0"), "A file of urdf stands in no pose"),
+        (("c", "--trajectory", "m.csv"), "c has no motion"),
+        (("urdf", "--pose", "0,0"), "urdf has no pose"),
         (("glb", "--pose", "0,0,9"), "axis_3 cannot be at 9 rad"),
         (("glb", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
         (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),

@@ -104,7 +104,7 @@ def test_late_start_failure_reports_only_its_reason(tmp_path: Path) -> None:
     done = serve("--port", str(free_port()), "--workspace", str(tmp_path / "map.npz"))
     assert done.returncode == 1
     (message,) = done.stderr.strip().splitlines()
-    assert "map.npz is no reachability map" in message
+    assert "map.npz is corrupt or not a reachability map" in message
     assert "viser" not in done.stdout
 
 

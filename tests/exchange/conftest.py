@@ -1,4 +1,4 @@
-"""Mechanisms to be exported: the Katana450, and a tree that is nothing like it."""
+"""Fixtures: mechanisms for export, the Katana450 and a very different tree."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ POSES = (
     (0.4, -1.187, 1.484, 0.14, 0.5, 0.2),
     (-1.1, -0.6, -0.9, 0.8, 1.2, -0.3),
 )
-"""Of the Katana, the gripper last."""
+"""Poses of the Katana, the gripper last."""
 
 GANTRY_POSE = (0.3, 2.0, -0.6)
 

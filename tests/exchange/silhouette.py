@@ -1,4 +1,4 @@
-"""Our own picture of a URDF, by yourdfpy, trimesh and Pillow alone, to hold others' against."""
+"""Reference pictures of a URDF, by yourdfpy, trimesh and Pillow alone."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from PIL import Image, ImageDraw
 from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, InitialCamera
 
 SIZE = 800
-"""Pixels of a picture's edge."""
+"""Edge of a picture [px]."""
 
 FINE = 4
-"""Pixels of ours in one of theirs, so that a rim counts where half of it is covered."""
+"""Pixels of a reference picture per pixel, so that a rim counts if half of it is covered."""
 
 Mask = npt.NDArray[np.bool_]
 
 
 def placed(path: Path, joints: Mapping[str, float]) -> list[tuple[str, trimesh.Trimesh]]:
-    """Link and mesh in the root's frame of every visual, with all joints at their values."""
+    """Return link and mesh of every visual in the root's frame, at the values of all joints."""
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     urdf.update_cfg({name: joints[name] for name in urdf.actuated_joint_names})
     found = []
@@ -49,7 +49,7 @@ def placed(path: Path, joints: Mapping[str, float]) -> list[tuple[str, trimesh.T
 
 
 def silhouette(meshes: list[tuple[str, trimesh.Trimesh]], view: InitialCamera) -> Mask:
-    """(SIZE, SIZE), true where a camera sees any of the meshes."""
+    """Return (SIZE, SIZE), True where a camera sees any of the meshes."""
     back = view.eye - view.target
     back = back / np.linalg.norm(back)
     right = np.cross((0.0, 0.0, 1.0), back)
@@ -69,13 +69,13 @@ def silhouette(meshes: list[tuple[str, trimesh.Trimesh]], view: InitialCamera) -
 
 
 def seen(picture: Path) -> Mask:
-    """Where a picture file shows anything but the background, which its first corner has."""
+    """Return where a picture file differs from its background, the colour of its first corner."""
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
     assert pixels.shape[:2] == (SIZE, SIZE)
     return np.asarray(np.abs(pixels - pixels[0, 0]).max(axis=2) > 2)
 
 
 def overlap(a: Mask, b: Mask) -> float:
-    """Fraction of what either covers that both cover."""
+    """Return the ratio of intersection to union of two pictures."""
     assert a.sum() > 2000
     return float((a & b).sum() / (a | b).sum())

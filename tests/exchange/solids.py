@@ -1,4 +1,4 @@
-"""Surfaces measured in another way than they are read."""
+"""Measures of surfaces, independent of the readers."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ Numbers = npt.NDArray[np.float64]
 
 
 def volume(shape: ShapeFile) -> float:
-    """[m^3] That it holds, by the divergence theorem; positive if its faces look outward."""
+    """Return the volume [m^3] by the divergence theorem; positive if the faces look outward."""
     a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
 def sides(shape: ShapeFile) -> list[float]:
-    """[mm] Along x, y and z."""
+    """Return the extent along x, y and z [mm]."""
     return [float(side) for side in np.round(np.ptp(shape.vertices, axis=0) * 1e3, 3)]
 
 
 def is_closed(shape: ShapeFile) -> bool:
-    """Whether each edge is of one face in each direction."""
+    """Return whether each edge belongs to one face in each direction."""
     edges = Counter((int(face[i]), int(face[i - 2])) for face in shape.faces for i in range(3))
     return all(edges[b, a] == count for (a, b), count in edges.items())
 
 
 def triangles(vertices: Numbers, faces: npt.NDArray[np.int64], digits: int) -> Counter[object]:
-    """Each by its corners, rounded, the least corner first."""
+    """Return each triangle by its rounded corners, the smallest corner first."""
     found: Counter[object] = Counter()
-    # Adding zero makes 0 of -0.
+    # Adding zero turns -0 into 0.
     for corners in (np.round(vertices[faces], digits) + 0.0).tolist():
         least = corners.index(min(corners))
         found[str(corners[least:] + corners[:least])] += 1

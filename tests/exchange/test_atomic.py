@@ -1,4 +1,4 @@
-"""Files come whole or not at all."""
+"""Tests of atomic files: written completely or not at all."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def test_files_are_written_over_old_ones(tmp_path: Path) -> None:
     assert sorted(tmp_path.iterdir()) == [one, two]
 
 
-def test_an_interrupt_leaves_everything_as_it_was(tmp_path: Path) -> None:
-    """The first file was complete already; without the second it is not put in place either."""
+def test_an_interrupt_changes_no_file(tmp_path: Path) -> None:
+    """The first file is complete; without the second it is not put in place either."""
     one, two = tmp_path / "one", tmp_path / "two"
     one.write_bytes(b"old")
     with pytest.raises(KeyboardInterrupt):
@@ -38,14 +38,14 @@ def test_an_interrupt_leaves_everything_as_it_was(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [one]
 
 
-def test_a_new_file_may_be_read_like_any_other(tmp_path: Path) -> None:
+def test_a_new_file_has_the_usual_permissions(tmp_path: Path) -> None:
     plain, ours = tmp_path / "plain", tmp_path / "ours"
     plain.write_bytes(b"")
     write_files({ours: good})
     assert ours.stat().st_mode == plain.stat().st_mode
 
 
-def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+def test_an_unwritable_file_is_an_error(tmp_path: Path) -> None:
     for path in (tmp_path / "nowhere" / "file", tmp_path):
         with pytest.raises(InputError, match=path.name):
             check_writable(path)

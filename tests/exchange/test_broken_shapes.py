@@ -1,4 +1,4 @@
-"""Files that are broken, hostile or of another kind: each is refused in words, or read well."""
+"""Tests of files that are corrupt, hostile or of another kind: refused with a message, or read."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ resource = pytest.importorskip("resource")
 FOREIGN = Path(__file__).parent / "foreign"
 
 MUTATIONS = 1000 if "KATANA450_LONG" in os.environ else 60
-"""Of each seed."""
+"""Number of mutations of each seed."""
 
 PLY = """ply
 format ascii 1.0
@@ -80,7 +80,7 @@ FACET = "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 {} 0 e
 
 
 def gltf(**changes: Any) -> bytes:
-    """One triangle, with parts of the document replaced; None takes one away."""
+    """Return one triangle as glTF, with parts of the document replaced; None removes a part."""
     numbers = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
     document: dict[str, Any] = {
         "asset": {"version": "2.0"},
@@ -101,7 +101,7 @@ def glb(told: bytes, numbers: bytes) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def test_the_files_that_are_broken_below_are_read_when_they_are_not() -> None:
+def test_the_unchanged_files_are_read() -> None:
     text = f"solid\n{FACET.format(1)}\nendsolid\n".encode()
     cases = [(Format.PLY, ply()), (Format.STL, stl()), (Format.STL, text), (Format.GLB, gltf())]
     for format, data in cases:
@@ -111,26 +111,26 @@ def test_the_files_that_are_broken_below_are_read_when_they_are_not() -> None:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", "no STL file"),
-        (stl()[:-1], "says 1 triangles, which take 134 bytes, but has 133"),
-        (stl(2**31), "says 2147483648 triangles"),
-        (stl(corners=(0, 0, 0, 1, 0, 0, 0, math.nan, 0)), "no finite numbers"),
-        (stl(corners=(0, 0, 0, 1, 0, 0, 0, math.inf, 0)), "no finite numbers"),
+        (b"", "not an STL file"),
+        (stl()[:-1], "declares 1 triangles, which take 134 bytes, but has 133"),
+        (stl(2**31), "declares 2147483648 triangles"),
+        (stl(corners=(0, 0, 0, 1, 0, 0, 0, math.nan, 0)), "not finite numbers"),
+        (stl(corners=(0, 0, 0, 1, 0, 0, 0, math.inf, 0)), "not finite numbers"),
         (stl(corners=(0,) * 9), "has no triangles"),
         (b"solid a\nendsolid a\n", "has no triangles"),
         (f"solid\n{FACET.format(1)}\n".encode(), "line 3: the file ends before 'endsolid'"),
-        (f"solid\n\n{FACET.format(1)[:-9]}\nendsolid".encode(), "broken at line 3"),
-        (f"solid\n{FACET.format('x')}\nendsolid".encode(), "no numbers"),
-        (f"solid\n{FACET.format('nan')}\nendsolid".encode(), "no finite numbers"),
-        (f"solid\n{FACET.format('1e999')}\nendsolid".encode(), "no finite numbers"),
-        (f"solid\nsolid\n{FACET.format(1)}\nendsolid".encode(), "broken at line 2"),
+        (f"solid\n\n{FACET.format(1)[:-9]}\nendsolid".encode(), "corrupt at line 3"),
+        (f"solid\n{FACET.format('x')}\nendsolid".encode(), "not numbers"),
+        (f"solid\n{FACET.format('nan')}\nendsolid".encode(), "not finite numbers"),
+        (f"solid\n{FACET.format('1e999')}\nendsolid".encode(), "not finite numbers"),
+        (f"solid\nsolid\n{FACET.format(1)}\nendsolid".encode(), "corrupt at line 2"),
         (
             bytes(80) + struct.pack("<I", MOST_TRIANGLES + 1) + bytes(50 * (MOST_TRIANGLES + 1)),
             "more than 200000 triangles",
         ),
     ],
 )
-def test_no_stl(data: bytes, said: str) -> None:
+def test_invalid_stl_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.STL, "a.stl")
 
@@ -140,21 +140,21 @@ def test_no_stl(data: bytes, said: str) -> None:
     [
         ("", "has no triangles"),
         ("v 0 0 0\np 1\n", "has no triangles. It has points"),
-        ("v 1 2", "line 1: a vertex has three finite coordinates"),
+        ("v 1 2", "line 1: a vertex must have three finite coordinates"),
         ("v 1 2 nan", "three finite"),
         ("v 1 2 1e999", "three finite"),
-        ("v a b c", "made of numbers"),
+        ("v a b c", "must be numbers"),
         ("v 0 0 0\nf 1 2 3", "vertex 1, counted from 0, but only 1 vertices"),
         ("v 0 0 0\nf 0 0 0", "line 2: there is no vertex 0"),
         ("v 0 0 0\nf -2 -1 -1", "there is no vertex -2"),
         ("v 0 0 0\nf 1 1 99999999999999999999999", "there is no vertex 9999"),
         ("v 0 0 0 1 0 0\nf 1 2 3", "vertex 1, counted from 0"),
-        ("f 1/2/3 x/1/1", "'x/1/1' is no corner"),
-        ("hello", "line 1: 'hello' is no statement"),
+        ("f 1/2/3 x/1/1", "'x/1/1' is not a corner"),
+        ("hello", "line 1: 'hello' is not an OBJ statement"),
         ("v 0 0 0\n" + "f" + " 1" * 200_003, "more than 200000 triangles"),
     ],
 )
-def test_no_obj(text: str, said: str) -> None:
+def test_invalid_obj_is_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(text.encode(), Format.OBJ, "a.obj")
 
@@ -176,14 +176,14 @@ def test_statements_of_obj() -> None:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", "does not begin with 'ply'"),
+        (b"", "must begin with 'ply'"),
         (b"ply\n", "header does not end"),
-        (ply(vertices="x"), "'element vertex x' in its header is not understood"),
-        (ply(vertices=-3), "not understood"),
+        (ply(vertices="x"), "'element vertex x' in its header is invalid"),
+        (ply(vertices=-3), "invalid"),
         (ply().replace(b"float x", b"quad x"), "'property quad x'"),
-        (ply().replace(b"list uchar", b"list float"), "not understood"),
-        (ply().replace(b"ascii 1.0", b"ascii 2.0"), "not understood"),
-        (ply().replace(b"format ascii 1.0\n", b""), "tells no format"),
+        (ply().replace(b"list uchar", b"list float"), "invalid"),
+        (ply().replace(b"ascii 1.0", b"ascii 2.0"), "invalid"),
+        (ply().replace(b"format ascii 1.0\n", b""), "has no format"),
         (ply().replace(b"float z", b"float w"), "no vertices with x, y and z"),
         (ply(faces=0), "has no triangles"),
         (ply(faces=2**31), "ends too early|no length"),
@@ -197,18 +197,18 @@ def test_statements_of_obj() -> None:
         (ply("nan 0 1 2\n"), "no length"),
         (ply("3 0 1 nan\n"), "vertex"),
         (ply("3 0 1 1e999\n"), "vertex"),
-        (ply("3 0 1 x\n"), "broken"),
-        (ply().replace(b"0 1 0\n", b"0 inf 0\n"), "no finite numbers"),
+        (ply("3 0 1 x\n"), "corrupt"),
+        (ply().replace(b"0 1 0\n", b"0 inf 0\n"), "not finite numbers"),
         (ply().replace(b"ascii", b"binary_little_endian"), "ends too early"),
     ],
 )
-def test_no_ply(data: bytes, said: str) -> None:
+def test_invalid_ply_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.PLY, "a.ply")
 
 
 def test_rows_of_ply_may_differ() -> None:
-    """Polygons of several sizes, text and binary, lists besides, and colours as numbers 0..1."""
+    """Polygons of several sizes, text and binary, other lists, and colours as numbers 0..1."""
     header = ply(faces=2, vertices=4).decode().partition("0 0 0")[0]
     header = header.replace("z\n", "z\nproperty float red\nproperty float green\n")
     header = header.replace("element face", "property float blue\nelement face")
@@ -239,35 +239,35 @@ ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", "no glTF 2.0, or is broken"),
-        (b"glTF", "no GLB 2.0"),
-        (gltf()[:-4], "length is not what it says"),
-        (b"{", "broken"),
-        (deep(100_000), "broken"),
+        (b"", "corrupt or not glTF 2.0"),
+        (b"glTF", "not GLB 2.0"),
+        (gltf()[:-4], "length differs from its header"),
+        (b"{", "corrupt"),
+        (deep(100_000), "corrupt"),
         (gltf(asset=None), "Expected `object`, got `null` - at `\\$.asset`"),
         (gltf(asset={"version": "1.0"}), "glTF 1.0"),
         (gltf(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression"),
         (gltf(buffers=[{"byteLength": 36, "uri": "/etc/passwd"}]), "'/etc/passwd'"),
         (gltf(buffers=[{"byteLength": 36, "uri": "http://a/b"}]), "which is not opened"),
-        (gltf(buffers=[{"byteLength": 36, "uri": "data:;base64,@"}]), "no base64"),
-        (gltf(buffers=[{"byteLength": 37}]), "shorter than it says"),
-        (gltf(bufferViews=[{"buffer": 1, "byteLength": 36}]), "a part that it has not"),
+        (gltf(buffers=[{"byteLength": 36, "uri": "data:;base64,@"}]), "not base64"),
+        (gltf(buffers=[{"byteLength": 37}]), "shorter than declared"),
+        (gltf(bufferViews=[{"buffer": 1, "byteLength": 36}]), "a part that is missing"),
         (gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteOffset": 4}]), "beyond"),
         (gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": 4}]), "beyond"),
         (gltf(bufferViews=[{"buffer": -1, "byteLength": 36}]), "Expected `int` >= 0"),
         (gltf(accessors=[ACCESSOR | {"count": 2**31}]), "beyond its buffer"),
-        (gltf(accessors=[ACCESSOR | {"count": 2**80}]), "broken"),
+        (gltf(accessors=[ACCESSOR | {"count": 2**80}]), "corrupt"),
         (gltf(accessors=[ACCESSOR | {"type": "VEC2"}]), "wrong type"),
         (gltf(accessors=[ACCESSOR | {"componentType": 9}]), "wrong type"),
         (gltf(accessors=[ACCESSOR | {"bufferView": None}]), "sparse or packed"),
         (gltf(accessors=[ACCESSOR | {"sparse": {"count": 1}}]), "sparse or packed"),
-        (gltf(nodes=[{"mesh": 1}]), "a part that it has not"),
-        (gltf(nodes=[{"mesh": 0, "children": [0]}]), "hangs in two places"),
-        (gltf(nodes=[{"mesh": 0, "rotation": [0, 0, 0, 0]}]), "no finite place"),
-        (gltf(nodes=[{"mesh": 0, "matrix": [1e308] * 16}]), "no finite"),
+        (gltf(nodes=[{"mesh": 1}]), "a part that is missing"),
+        (gltf(nodes=[{"mesh": 0, "children": [0]}]), "is used twice"),
+        (gltf(nodes=[{"mesh": 0, "rotation": [0, 0, 0, 0]}]), "a pose that is not finite"),
+        (gltf(nodes=[{"mesh": 0, "matrix": [1e308] * 16}]), "not finite"),
         (gltf(nodes=[{"mesh": 0, "scale": [1, 1]}]), "length 3"),
         (gltf(scenes=[{"nodes": []}]), "has no triangles"),
-        (gltf(scene=7), "a part that it has not"),
+        (gltf(scene=7), "a part that is missing"),
         (gltf(meshes=[{"primitives": [{"attributes": {}}]}]), "has no triangles"),
         (
             gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 1}]}]),
@@ -279,7 +279,7 @@ ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
         ),
     ],
 )
-def test_no_gltf(data: bytes, said: str) -> None:
+def test_invalid_gltf_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.GLB, "a.glb")
 
@@ -322,7 +322,7 @@ def test_modes_colours_and_places_of_gltf(mode: int, faces: int) -> None:
     }
     shape = read_shape(glb(json.dumps(told).encode(), data), Format.GLB, "a.glb")
     assert len(shape.faces) == faces
-    # Mirrored, turned by 90 degrees about its z, moved, then made upright: x, -z, y.
+    # Mirrored, rotated by 90 degrees about its z, moved, then made upright: x, -z, y.
     assert np.ptp(shape.vertices, axis=0).tolist() == pytest.approx([1.0, 0.0, 1.0])
     assert shape.vertices[:, 1] == pytest.approx(-0.5)
     a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
@@ -345,7 +345,7 @@ SEEDS = {
 
 
 def mutated(data: bytes, chance: random.Random) -> bytes:
-    """With some bytes, pieces or numbers changed, or its end cut off."""
+    """Return ``data`` with some bytes, pieces or numbers changed, or with its end cut off."""
     found = bytearray(data)
     for _ in range(chance.randint(1, 4)):
         at = chance.randrange(len(found))
@@ -371,7 +371,7 @@ def mutated(data: bytes, chance: random.Random) -> bytes:
 
 
 def looked_at(data: bytes, format: Format) -> ShapeFile | None:
-    """What is read; None where it is refused in a sentence. Anything else fails."""
+    """Return the reading; None if it is refused with a message. Other exceptions fail."""
     try:
         shape = read_shape(data, format, "fuzz.bin", 1e-3)
     except InputError as error:
@@ -404,7 +404,7 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
 
 @settings(max_examples=MUTATIONS, deadline=None)
 @given(st.sampled_from(Format), st.binary(max_size=200), st.integers(0, 150))
-def test_any_bytes_behind_any_beginning_are_read_or_refused(
+def test_random_bytes_after_any_header_are_read_or_refused(
     format: Format, data: bytes, kept: int
 ) -> None:
     beginnings = {Format.WRL: "castle.wrl", Format.STL: "vtk.stl", Format.OBJ: "vtk.obj"}
@@ -433,7 +433,7 @@ def laughs() -> bytes:
     ],
     ids=["bomb", "deep", "laughs", "faces", "wide"],
 )
-def test_hostile_files_end_in_words_in_time(make: Callable[[], bytes], format: Format) -> None:
+def test_hostile_files_are_refused_in_time(make: Callable[[], bytes], format: Format) -> None:
     data = make()
     start = time.perf_counter()
     with pytest.raises(InputError):
@@ -442,7 +442,7 @@ def test_hostile_files_end_in_words_in_time(make: Callable[[], bytes], format: F
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems count no address space")
-def test_a_reading_that_wants_more_memory_than_it_may_ends() -> None:
+def test_a_reading_beyond_the_memory_limit_ends() -> None:
     assert bind.__module__ == "katana450.extensions.importers.reading"
     words = "from katana450.extensions.importers.reading import bind; bind(); bytearray({} << 20)"
     for mebibytes, ends in ((2048, 1), (64, 0)):

@@ -1,4 +1,4 @@
-"""The C export: it compiles without a warning, draws what we do, fast, and follows a server."""
+"""Tests of the C export: compiles without warnings, draws correctly and fast, follows a server."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ resource = pytest.importorskip("resource")
 pytestmark = pytest.mark.long
 
 BUILD = 20.0
-"""[s] Of processor that a build may take."""
+"""[s] Maximum processor time of a build."""
 
 FRAME = 1.0 / 30.0
-"""[s] Of processor that a picture may take."""
+"""[s] Maximum processor time of a picture."""
 
 
 def written(folder: Path, robot: Robot, pose: tuple[float, ...]) -> Path:
@@ -39,14 +39,14 @@ def written(folder: Path, robot: Robot, pose: tuple[float, ...]) -> Path:
 
 
 def processor() -> float:
-    """[s] All ended children have used."""
+    """Return the processor time [s] of all children that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return float(used.ru_utime + used.ru_stime)
 
 
 @pytest.fixture(scope="module")
 def viewer(tmp_path_factory: pytest.TempPathFactory, katana: Robot) -> Path:
-    """The Katana's, built by gcc."""
+    """Return the Katana's viewer, built by gcc."""
     folder = written(tmp_path_factory.mktemp("c"), katana, POSES[1])
     before = processor()
     run("make", "viewer", "CC=gcc", "CFLAGS=-O2 -Werror", folder=folder, seconds=120.0)
@@ -66,7 +66,7 @@ def joined(pose: tuple[float, ...]) -> str:
 
 @needs(*VIEWER)
 @pytest.mark.parametrize("pose", POSES)
-def test_it_draws_what_we_do(
+def test_the_viewer_draws_the_reference_picture(
     tmp_path: Path, viewer: Path, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     ours = silhouette(placed(URDF_PATH, katana.values(pose)), camera(katana))
@@ -81,13 +81,13 @@ def test_clang_and_cmake_build_any_mechanism(tmp_path: Path, gantry: Robot) -> N
     run("cmake", "-S", folder, "-B", tmp_path / "build", *words)
     run("cmake", "--build", tmp_path / "build")
     ours = silhouette(placed(GANTRY, gantry.values(GANTRY_POSE)), camera(gantry))
-    # Where it begins is in the files.
+    # The start values are in the files.
     theirs = seen(shot(tmp_path / "build" / "viewer", tmp_path / "a.ppm"))
     assert overlap(theirs, ours) >= 0.98
 
 
 @needs("clang", "/usr/include/GL/freeglut.h")
-def test_clang_has_nothing_to_say_of_the_arm(tmp_path: Path, katana: Robot) -> None:
+def test_clang_has_no_warnings_for_the_arm(tmp_path: Path, katana: Robot) -> None:
     sources = sorted(written(tmp_path / "c", katana, ()).glob("*.c"))
     assert len(sources) == 12
     words = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only")
@@ -96,7 +96,7 @@ def test_clang_has_nothing_to_say_of_the_arm(tmp_path: Path, katana: Robot) -> N
 
 @needs(*VIEWER)
 def test_a_picture_is_quick(viewer: Path) -> None:
-    """In time of the processor, for others may use this machine too."""
+    """Processor time is measured, because the machine may be shared."""
     used = []
     for frames in (20, 70):
         before = processor()
@@ -153,9 +153,9 @@ def test_keys_and_mouse_move_joints_and_camera(tmp_path: Path, viewer: Path, kat
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--pose", "1,x"), "numbers with commas"),
-        (("--pose", "9"), "beyond the limits"),
-        (("--pose", "nan"), "beyond the limits"),
+        (("--pose", "1,x"), "comma-separated numbers"),
+        (("--pose", "9"), "outside the limits"),
+        (("--pose", "nan"), "outside the limits"),
         (("--pose", "0,0,0,0,0,0,0"), "more numbers than"),
         (("--size", "0x10"), "WIDTHxHEIGHT"),
         (("--follow", "70000"), "a port"),
@@ -163,15 +163,13 @@ def test_keys_and_mouse_move_joints_and_camera(tmp_path: Path, viewer: Path, kat
         (("--pose",), "--pose"),
     ],
 )
-def test_words_it_does_not_know_are_refused(
-    viewer: Path, words: tuple[str, ...], said: str
-) -> None:
+def test_unknown_options_are_refused(viewer: Path, words: tuple[str, ...], said: str) -> None:
     with pytest.raises(AssertionError, match=f"ended with 2:.*(?s:.*){said}"):
         run(*SCREEN, viewer, *words)
 
 
 def test_the_arrays_are_the_papers(katana: Robot) -> None:
-    """Three arrays a link that say the same as its shapes."""
+    """The three arrays of each link have the same data as its shapes."""
     files = c_files(katana, katana.values(()))
     total = 0
     for link in katana.links:

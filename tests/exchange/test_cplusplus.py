@@ -1,6 +1,6 @@
-"""The C export is used from C++: its headers, linked with objects of either compiler.
+"""Tests of the C export in C++: its headers, linked with objects of either compiler.
 
-OpenGL is stood in for, so that no library of it is needed.
+OpenGL is replaced by stubs, so that none of its libraries is needed.
 """
 
 from __future__ import annotations

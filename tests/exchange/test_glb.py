@@ -1,4 +1,4 @@
-"""The GLB: other programs find names, places, colours and the motion in it."""
+"""Tests of the GLB export: other programs find its names, places, colours and motion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ UPRIGHT = so3.rotation_x(-np.pi / 2.0)
 
 
 @pytest.mark.parametrize("which", ["katana", "gantry"])
-def test_trimesh_finds_every_link_where_the_urdf_has_it(
+def test_trimesh_finds_every_link_at_its_place_in_the_urdf(
     which: str, katana: Robot, gantry: Robot
 ) -> None:
     path, robot, pose = (
@@ -53,8 +53,8 @@ def test_trimesh_finds_every_link_where_the_urdf_has_it(
     assert found == {shape.material.name for shape in shapes}
 
 
-def test_colours_and_normals_come_through(katana: Robot) -> None:
-    """Against the mesh files that the URDF names."""
+def test_colours_and_normals_are_preserved(katana: Robot) -> None:
+    """Compare with the mesh files that the URDF names."""
     ((_, content),) = glb_files(katana, katana.values(())).items()
     ours = trimesh.load_scene(io.BytesIO(content), file_type="glb")
     theirs = trimesh.load_scene(URDF_PATH.parent / "meshes" / "wrist_link.glb")

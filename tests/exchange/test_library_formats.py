@@ -1,4 +1,4 @@
-"""COLLADA, 3MF and OFF: read as other programs mean them, or refused in words."""
+"""Tests of COLLADA, 3MF and OFF: read as by other programs, or refused with a message."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_concave_polygons_units_and_colours(
     assert (shape.unit, sides(shape), is_closed(shape)) == (1e-3, [60.0, 40.0, 25.0], True)
     assert volume(shape) == pytest.approx(35e-6, rel=1e-6)
     a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
-    # A fan over a concave polygon covers more than the polygon.
+    # A fan of a concave polygon would cover more than the polygon.
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0
     assert area == pytest.approx(1e-6 * (2 * 1400 + 25 * 200), rel=1e-5)
     if colour is None:
@@ -134,8 +134,8 @@ def test_concave_polygons_units_and_colours(
 
 def test_components_units_and_transforms_of_3mf() -> None:
     shape = read_shape(threemf(), Format.THREEMF, "l.3mf")
-    assert "the unit is mm, as the file tells" in shape.text
-    # Turned by 90 degrees about z.
+    assert "the unit is mm, as in the file" in shape.text
+    # Rotated by 90 degrees about z.
     assert (sides(shape), is_closed(shape)) == ([40.0, 60.0, 25.0], True)
     assert volume(shape) == pytest.approx(35e-6, rel=1e-6)
     assert read_shape(threemf("centimeter"), Format.THREEMF, "l").unit == 1e-2
@@ -153,7 +153,7 @@ def test_transforms_and_axes_of_dae() -> None:
     assert sides(read_shape(dae(up="X_UP"), Format.DAE, "l")) == [40.0, 25.0, 60.0]
 
 
-def test_units_that_are_none_of_ours_become_metres() -> None:
+def test_other_units_become_metres() -> None:
     shape = read_shape(dae(meter=0.002), Format.DAE, "l")
     assert (shape.unit, sides(shape)) == (1.0, [120.0, 80.0, 50.0])
     mesh = read_mesh(dae(meter=0.002), "l.dae")
@@ -180,37 +180,37 @@ ENTITY = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/pa
 @pytest.mark.parametrize(
     ("data", "format", "said"),
     [
-        (b"", Format.DAE, "broken, or no COLLADA"),
-        (b"<a/>", Format.DAE, "no COLLADA"),
+        (b"", Format.DAE, "corrupt or not COLLADA"),
+        (b"<a/>", Format.DAE, "not COLLADA"),
         (dae()[:-300], Format.DAE, "line 1"),
-        (ENTITY + dae().partition(b"\n")[2], Format.DAE, "declares entities"),
-        (dae(counts="6 6 4 4 4 4 4 5"), Format.DAE, "corners they say|no triangles"),
-        (dae(corners="99 " * 36), Format.DAE, "vertex 99|no triangles|broken"),
-        (dae(meter=0), Format.DAE, "its unit has 0 m"),
+        (ENTITY + dae().partition(b"\n")[2], Format.DAE, "declares XML entities"),
+        (dae(counts="6 6 4 4 4 4 4 5"), Format.DAE, "corners they declare|no triangles"),
+        (dae(corners="99 " * 36), Format.DAE, "vertex 99|no triangles|corrupt"),
+        (dae(meter=0), Format.DAE, "its unit is 0 m"),
         (dae(nodes=""), Format.DAE, "has no triangles"),
-        (b"PK", Format.THREEMF, "no .zip"),
-        (threemf("league"), Format.THREEMF, "'league' is no unit of 3MF"),
-        (threemf(more=' transform="nan 0 0 0 1 0 0 0 1 0 0 0"'), Format.THREEMF, "finite|broken"),
+        (b"PK", Format.THREEMF, "cannot be read as a .zip"),
+        (threemf("league"), Format.THREEMF, "'league' is not a unit of 3MF"),
+        (threemf(more=' transform="nan 0 0 0 1 0 0 0 1 0 0 0"'), Format.THREEMF, "finite|corrupt"),
         (
             threemf(files={"big": bytes(MAX_FILE_BYTES)}),
             Format.THREEMF,
             "more than 20 MB when unpacked",
         ),
         (threemf(files={f"f{i}": b"" for i in range(300)}), Format.THREEMF, "more than 256 files"),
-        (b"", Format.OFF, "no OFF"),
-        (b"OFF BINARY\n", Format.OFF, "no OFF"),
+        (b"", Format.OFF, "not OFF"),
+        (b"OFF BINARY\n", Format.OFF, "not OFF"),
         (b"OFF\n3 1", Format.OFF, "ends too early"),
-        (b"OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2", Format.OFF, "line 4: numbers are wanted"),
+        (b"OFF\n3 1 0\n0 0 0\n1 0 x\n0 1 0\n3 0 1 2", Format.OFF, "line 4: expected numbers"),
         (
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1",
             Format.OFF,
             "line 6: this face does not have 3 corners",
         ),
         (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3", Format.OFF, "vertex 3, counted from 0"),
-        (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2", Format.OFF, "no finite numbers"),
+        (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2", Format.OFF, "not finite numbers"),
     ],
 )
-def test_broken_file_is_refused_in_words(data: bytes, format: Format, said: str) -> None:
+def test_corrupt_file_is_refused_with_a_message(data: bytes, format: Format, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, format, f"a.{format.value}")
 
@@ -225,12 +225,12 @@ def test_no_other_file_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     )
     named = dae().replace(b"<library_effects>", image.encode())
     elsewhere = dae(nodes=f'<node><instance_geometry url="{other.as_uri()}#g"/></node>')
-    # What is imported on first use is imported now.
+    # Triggers imports on first use before files are watched.
     read_shape(dae(), Format.DAE, "l")
     opened: list[str] = []
     monkeypatch.setattr("builtins.open", lambda path, *_a, **_k: opened.append(str(path)))
     shape = read_shape(named, Format.DAE, "l")
-    with pytest.raises(InputError, match=r"no triangles\. It has 1 parts that are broken"):
+    with pytest.raises(InputError, match=r"no triangles\. It has 1 corrupt parts"):
         read_shape(elsewhere, Format.DAE, "l")
     monkeypatch.undo()
     assert "pictures on the surface" in shape.text
@@ -238,7 +238,7 @@ def test_no_other_file_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def laughing_archive() -> bytes:
-    """Objects of ten components each, of objects of ten components each."""
+    """Return an archive of objects of ten components each, nested many times."""
     objects = "".join(
         f'<object id="{i}"><components>{f"<component objectid={chr(34)}{i - 1}{chr(34)}/>" * 10}'
         "</components></object>"
@@ -252,7 +252,7 @@ def laughing_archive() -> bytes:
 
 
 def bomb() -> bytes:
-    """An archive that declares less than it unpacks to."""
+    """Return an archive that declares a smaller size than it unpacks to."""
     data = bytearray(threemf(files={"big": bytes(50_000_000)}))
     for at in (data.index(b"big") - 46 + 24, data.rindex(b"big") - 46 + 24):
         data[at : at + 4] = (100).to_bytes(4, "little")
@@ -260,7 +260,7 @@ def bomb() -> bytes:
 
 
 def entities(file: str = "") -> bytes:
-    """An archive whose model calls entities by tens of tens, or the text of another file."""
+    """Return an archive whose model nests entities by tens, or includes another file."""
     rows = [f'<!ENTITY e0 SYSTEM "{file}">' if file else '<!ENTITY e0 "0123456789">']
     rows += [f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 12)]
     with zipfile.ZipFile(io.BytesIO(threemf())) as archive:
@@ -275,7 +275,7 @@ def entities(file: str = "") -> bytes:
     [laughing_archive, bomb, entities, lambda: entities("file:///etc/passwd")],
     ids=["laughs", "bomb", "entities", "other file"],
 )
-def test_hostile_archive_ends_in_words_in_time(make: Callable[[], bytes]) -> None:
+def test_hostile_archive_is_refused_in_time(make: Callable[[], bytes]) -> None:
     data = make()
     start = time.perf_counter()
     with pytest.raises(InputError):

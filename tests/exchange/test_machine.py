@@ -1,4 +1,4 @@
-"""Mechanisms made ready to be driven: limits that followers keep too, and what cannot be driven."""
+"""Tests of drivable mechanisms: limits that followers impose, and reasons against driving."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from tests.exchange.trees import tree
 ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
 
-def test_what_follows_binds_what_it_follows() -> None:
+def test_followers_limit_their_leader() -> None:
     robot = load(GANTRY)
     joints = robot.joint_group
     assert joints.names == ("rail", "turn", "grip")
     assert joints.slides == (True, False, False)
-    # Of "grip too" = 0.1 - grip in (-2, 2) and "out" = -0.04 + ... nothing is nearer than its own.
+    # "grip too" = 0.1 - grip in (-2, 2) and "out" = -0.04 + ... are not narrower than its own.
     np.testing.assert_allclose(joints.lower, (-0.4, -math.pi, -1.0))
     np.testing.assert_allclose(joints.upper, (0.4, math.pi, 0.5))
     assert joints.speed[1] == 1.0
@@ -54,7 +54,7 @@ def test_no_posture_inside_the_limits_takes_any_joint_beyond_its_own(
             assert joint.lower - 1e-12 <= value <= joint.upper + 1e-12
 
 
-def test_a_way_is_that_of_the_link_that_goes_farthest() -> None:
+def test_a_path_length_is_that_of_the_link_that_moves_farthest() -> None:
     robot = load(GANTRY)
     q = np.zeros(3)
     assert robot.distance(q, q) == 0.0
@@ -82,7 +82,7 @@ def test_undrivable_robot_is_reported(tmp_path: Path, text: str, said: str) -> N
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_can_be_driven_can_be_exported(tmp_path: Path, seed: int) -> None:
+def test_drivable_mechanisms_can_be_exported(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "tree.urdf"
     path.write_text(tree(seed))
     robot = load(path)
@@ -100,7 +100,7 @@ def test_what_can_be_driven_can_be_exported(tmp_path: Path, seed: int) -> None:
     assert set(robot.joint_group.names) <= set(world.named())
 
 
-def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_path: Path) -> None:
+def test_an_arm_with_a_skewed_axis_has_only_joints_and_a_reason(tmp_path: Path) -> None:
     whole = (ARMS / "pincherx_150.urdf").read_text()
     elbow = whole.index('<joint name="elbow"')
     before, after = whole[:elbow], whole[elbow:]
@@ -117,6 +117,6 @@ def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_pat
     with pytest.raises(InputError, match="12 deg off"):
         found.session.check(cmd.SetPose(np.eye(4)))
     assert find_robot(Settings(), ARMS / "pincherx_150.urdf", None).robot.arm is not None
-    # Whoever names a tool wants to send it somewhere.
+    # A named tool requires an arm.
     with pytest.raises(RobotDescriptionError, match="12 deg off"):
         find_robot(Settings(), path, found.robot.links[-1].name)

@@ -1,4 +1,4 @@
-"""The tree of a robot is what its URDF says, as yourdfpy reads it."""
+"""Tests of the robot's tree: the same as in the URDF, as yourdfpy reads it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
 
 @pytest.mark.parametrize("path", [URDF_PATH, *sorted(ARMS.glob("*.urdf"))])
-def test_links_are_where_yourdfpy_has_them(path: Path) -> None:
+def test_links_are_placed_as_in_yourdfpy(path: Path) -> None:
     robot = load(path)
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     assert robot.notes == ()
@@ -57,13 +57,13 @@ def test_every_shape_is_there_with_its_material(katana: Robot) -> None:
     assert sum(len(shape.faces) for shape in shapes) == 48_942
     colours = {shape.material.name: shape.material.colour for shape in shapes}
     assert len(colours) == 12
-    # sRGB beb4a1, to what an eighth bit of light loses.
+    # sRGB beb4a1, within the rounding of light to eight bits.
     assert colours["champagne aluminium"] == pytest.approx((0.745, 0.706, 0.631), abs=2e-3)
     for shape in shapes:
         np.testing.assert_allclose(np.linalg.norm(shape.normals, axis=1), 1.0, atol=1e-6)
 
 
-def test_what_brings_no_normals_keeps_its_edges(gantry: Robot) -> None:
+def test_a_mesh_without_normals_keeps_its_edges(gantry: Robot) -> None:
     shapes = {link.name: link.shapes for link in gantry.links}
     (box,), (ball,) = shapes["cart"], shapes["thumb"]
     for shape, most in ((box, 1e-6), (ball, math.radians(10.0))):
@@ -117,7 +117,7 @@ def test_an_arm_without_shapes_is_drawn_as_rods() -> None:
     robot = load(ARMS / "pincherx_150.urdf")
     links = {link.name: link for link in robot.links}
     assert not links["fingertips"].shapes
-    # The elbow stands 50 mm before the shoulder and 150 mm above it.
+    # The elbow is 50 mm in front of the shoulder and 150 mm above it.
     (rod,) = links["upper_arm"].shapes
     assert rod.vertices[:, 2].max() == pytest.approx(0.15, abs=0.009)
     assert rod.vertices[:, 0].max() == pytest.approx(0.05, abs=0.009)
@@ -142,9 +142,7 @@ def test_the_camera_sees_it_in_every_pose_of_the_pictures(katana: Robot) -> None
         ((4.0,), "axis_1 cannot be at 4 rad"),
     ],
 )
-def test_a_pose_it_cannot_have_is_refused(
-    katana: Robot, pose: tuple[float, ...], said: str
-) -> None:
+def test_an_impossible_pose_is_refused(katana: Robot, pose: tuple[float, ...], said: str) -> None:
     with pytest.raises(InputError, match=said):
         katana.values(pose)
 
@@ -160,7 +158,7 @@ def test_a_pose_it_cannot_have_is_refused(
         ("</robot>", '<link name="alone"/></robot>', "one link without a parent, not 2"),
     ],
 )
-def test_what_cannot_be_exported_is_refused(
+def test_an_invalid_description_is_refused(
     tmp_path: Path, before: str, after: str, said: str
 ) -> None:
     text = GANTRY.read_text()

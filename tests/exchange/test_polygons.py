@@ -1,4 +1,4 @@
-"""Polygons become triangles that cover them once."""
+"""Tests of the triangulation: triangles cover their polygon once."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from katana450.maths.geometry.arrays import FloatArray
 
 
 def areas(points: FloatArray, normal: FloatArray) -> FloatArray:
-    """(m,) of the triangles of one polygon (k, 3), positive if they turn as it does."""
+    """Return the areas (m,) of the triangles of one polygon (k, 3), positive in its orientation."""
     triangles, polygon = cut(points, np.arange(len(points)), np.array([len(points)]))
     assert triangles.shape == (len(points) - 2, 3)
     assert not polygon.any()
@@ -32,7 +32,7 @@ def shoelace(flat: FloatArray) -> float:
     st.tuples(*[st.floats(-3.0, 3.0)] * 3),
     st.booleans(),
 )
-def test_a_star_is_covered_once_however_it_stands(
+def test_a_star_in_any_orientation_is_covered_once(
     radii: list[float], w: tuple[float, float, float], turned: bool
 ) -> None:
     angles = np.arange(len(radii)) * (2.0 * np.pi / len(radii))
@@ -69,7 +69,7 @@ def test_a_comb_is_covered_once() -> None:
     assert found.sum() == pytest.approx(shoelace(flat))
 
 
-def test_what_crosses_itself_still_gives_as_many() -> None:
+def test_a_polygon_that_crosses_itself_gives_as_many_triangles() -> None:
     bow = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 0], [0, 1, 0], [0.5, 3, 0]], dtype=float)
     assert len(areas(bow, np.array((0.0, 0.0, 1.0)))) == 3
     dot = np.zeros((6, 3))

@@ -1,4 +1,4 @@
-"""What is written is read again, by this program and by others; anything else is refused."""
+"""Tests of map files: read again exactly, also by other programs; invalid files are refused."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def npz(survey: Survey, tmp_path: Path) -> Path:
     return path
 
 
-def test_a_map_comes_back_to_the_bit(npz: Path) -> None:
+def test_a_map_is_read_back_exactly(npz: Path) -> None:
     stored = load_map(npz)
     assert np.array_equal(stored.points, POINTS)
     assert np.array_equal(stored.fraction, FRACTION)
@@ -50,7 +50,7 @@ def test_a_map_comes_back_to_the_bit(npz: Path) -> None:
     assert (stored.voxel, stored.robot, stored.tool) == (0.02, "katana450", "tcp")
 
 
-def test_the_file_holds_what_its_keys_promise(npz: Path) -> None:
+def test_the_file_has_the_documented_keys(npz: Path) -> None:
     with np.load(npz, allow_pickle=False) as arrays:
         assert np.array_equal(arrays["cloud"], FOUND.cloud)
         rest = {key: arrays[key].item() for key in arrays if arrays[key].ndim == 0}
@@ -113,19 +113,19 @@ GOOD = {
         ({"points": POINTS * np.nan}, "'points'"),
         ({"points": np.array(0.0)}, "'points'"),
         ({"points": np.array([["a", "b", "c"]])}, "'points'"),
-        ({"points": np.array([None, {}], dtype=object)}, "broken"),
+        ({"points": np.array([None, {}], dtype=object)}, "corrupt"),
         ({"fraction": FRACTION[:, None]}, "'fraction'"),
         ({"fraction": FRACTION - 0.25}, "above 0"),
         ({"fraction": FRACTION + 0.1}, "up to 1"),
-        ({"voxel": np.array(0.0)}, "an edge of 0"),
-        ({"voxel": np.array(np.nan)}, "an edge of nan"),
+        ({"voxel": np.array(0.0)}, "is 0.0 m"),
+        ({"voxel": np.array(np.nan)}, "is nan m"),
         ({"voxel": np.array("wide")}, "'voxel'"),
-        ({"voxel": FRACTION}, "broken"),
+        ({"voxel": FRACTION}, "corrupt"),
         ({"robot": np.array(3)}, "'robot'"),
         ({"tool": np.array(1.5)}, "'tool'"),
     ],
 )
-def test_a_file_that_breaks_the_promise_is_refused(
+def test_a_file_with_invalid_values_is_refused(
     tmp_path: Path, change: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]], said: str
 ) -> None:
     path = tmp_path / "map.npz"
@@ -154,7 +154,9 @@ def test_invalid_npz_is_refused(npz: Path, tmp_path: Path) -> None:
     np.save(array, POINTS)
     for content in (b"", b"nonsense", whole[: len(whole) // 2], array.getvalue()):
         other.write_bytes(content)
-        with pytest.raises(InputError, match=r"other\.npz is no reachability map(?!.*pickle)"):
+        with pytest.raises(
+            InputError, match=r"other\.npz is corrupt or not a reachability map(?!.*pickle)"
+        ):
             load_map(other)
     damaged = bytearray(whole)
     damaged[whole.index(b"points.npy") + 50] ^= 0xFF

@@ -1,6 +1,6 @@
-"""A mesh inside the size limits is read in the time that is promised, however it is made.
+"""Tests of the reading time: any mesh within the size limits is read in time.
 
-Processor time is what counts here, for the clock on the wall is that of everybody on the machine.
+Processor time is measured, because the machine may be shared.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from katana450.maths.geometry.arrays import FloatArray
 resource = pytest.importorskip("resource")
 
 OURS = 1.0
-"""[s] That may be left to the process that people talk to."""
+"""[s] Maximum processor time in the process of the server."""
 
 
 def stl(triangles: FloatArray) -> bytes:
-    """A binary STL file of triangles (n, 3, 3)."""
+    """Return a binary STL file of triangles (n, 3, 3)."""
     facet = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
     rows = np.zeros(len(triangles), dtype=facet)
     rows["corners"] = triangles
@@ -29,20 +29,20 @@ def stl(triangles: FloatArray) -> bytes:
 
 
 def soup(count: int) -> FloatArray:
-    """Small triangles (count, 3, 3) [mm] anywhere in a cube, none of which share a corner."""
+    """Return small triangles (count, 3, 3) [mm] in a cube, without common corners."""
     rng = np.random.default_rng(1)
     return rng.uniform(-100.0, 100.0, (count, 1, 3)) + rng.normal(size=(count, 3, 3))
 
 
 def ball(count: int) -> FloatArray:
-    """The same with every corner on one sphere, and so a corner of the convex hull."""
+    """Return the same with every corner on one sphere, so that all are on the convex hull."""
     rng = np.random.default_rng(1)
     corners = rng.normal(size=(count, 1, 3)) + 0.01 * rng.normal(size=(count, 3, 3))
     return np.asarray(100.0 * corners / np.linalg.norm(corners, axis=2, keepdims=True))
 
 
 def star(count: int) -> bytes:
-    """An OBJ file of one polygon, every second corner of which is concave."""
+    """Return an OBJ file of one polygon, every second corner of which is concave."""
     angle = np.arange(count) * (2.0 * np.pi / count)
     radius = np.where(np.arange(count) % 2, 100.0, 60.0)
     rows = [
@@ -52,7 +52,7 @@ def star(count: int) -> bytes:
 
 
 def spent() -> tuple[float, float]:
-    """[s] By this process, and by those it started and that have ended."""
+    """Return the processor time [s] of this process, and of its children that have ended."""
     own, others = (
         resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
@@ -72,7 +72,7 @@ def spent() -> tuple[float, float]:
 def test_mesh_is_read_in_the_time_promised(
     monkeypatch: pytest.MonkeyPatch, name: str, data: bytes, count: int
 ) -> None:
-    # The process that reads bounds its own processor time.
+    # The reading process limits its own processor time.
     monkeypatch.setattr(shape_file, "SECONDS", 100.0)
     own, others = spent()
     mesh = read_mesh(data, name)

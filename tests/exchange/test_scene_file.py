@@ -1,4 +1,4 @@
-"""Scenes as files: what is saved is what is loaded, and what is wrong is told where it is."""
+"""Tests of scene files: read back unchanged, with errors reported at their lines."""
 
 from __future__ import annotations
 
@@ -90,8 +90,8 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 @given(scenes())
 @settings(max_examples=60, deadline=None)
-def test_what_is_written_is_read(scene: Scene) -> None:
-    """To a nanometre, and the text of that to the letter."""
+def test_a_written_scene_is_read_back(scene: Scene) -> None:
+    """Values are equal to a nanometre; their text is equal exactly."""
     file = MeshFile("meshes/it.stl", "mm", None, "0" * 64)
     text = written(scene, {SOLID.key: file}, T_PALM_TOOL)
     back = parsed(text).scene({file: SOLID}, T_PALM_TOOL)
@@ -126,7 +126,7 @@ def scene_of(mesh: Mesh) -> StoredScene:
 
 
 @pytest.mark.parametrize("kind", ["zip", "folder"])
-def test_a_scene_comes_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: Path) -> None:
+def test_a_scene_is_read_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: Path) -> None:
     stored = scene_of(mesh)
     data = scene_zip(stored, T_PALM_TOOL)
     if kind == "zip":
@@ -172,9 +172,9 @@ def test_no_path_leads_out_of_a_scene(path: str, tmp_path: Path) -> None:
     inside = tmp_path / "inside"
     inside.mkdir()
     (inside / "scene.yaml").write_text(MESH.format(file=path))
-    with pytest.raises(InputError, match=r"line 3.*no relative path|in the folder"):
+    with pytest.raises(InputError, match=r"line 3.*not a relative path|in the folder"):
         read_scene_folder(inside / "scene.yaml", None)
-    with pytest.raises(InputError, match="no relative path"):
+    with pytest.raises(InputError, match="not a relative path"):
         read_scene_zip(zipped(scene_yaml=MESH.format(file=path)), None)
 
 
@@ -199,25 +199,25 @@ THINGS = "scene: 1\nobjects:\n"
     ("text", "said"),
     [
         ("", "line 1, column 1: The scene is empty"),
-        ("scene: 2\n", "line 1.*version 1"),
+        ("scene: 2\n", "line 1.*version must be 1"),
         ("objects: []\n", "needs 'scene'"),
         (THINGS + "- {name: it}\n", "line 3.*needs 'shape'"),
         (
             THINGS + "- name: it\n  shape: box\n  size: [1, 2]\n  pose: [0, 0, 0]\n",
-            "line 5, column 9.*of 3(.|\n)*line 6, column 9: A pose is six numbers",
+            "line 5, column 9.*of 3(.|\n)*line 6, column 9: A pose must be six numbers",
         ),
-        (THINGS + ball(size=".nan"), "line 3.*A number"),
-        (THINGS + ball(view_options=", colour: red"), "line 3.*A colour is as"),
+        (THINGS + ball(size=".nan"), "line 3.*Expected a number"),
+        (THINGS + ball(view_options=", colour: red"), "line 3.*A colour must be like"),
         (THINGS + ball(view_options=", coluor: 1"), "line 3.*did you mean 'colour'"),
         (THINGS + ball(size="3000"), "line 3, column 3.*from 0.001 to 2 m"),
         (THINGS + ball() + ball(), "line 4.*two objects called 'it'"),
-        (THINGS + ball(view_options=", attach: hand"), "line 3.*has no hand"),
+        (THINGS + ball(view_options=", attach: hand"), "line 3.*no model of a hand"),
         (THINGS + ball() + "# " + "-" * 70_000, "at most 64 KB"),
         ("scene: 1\nobjects: &a []\n", "Anchors"),
         ("scene: 1\nwater: -1\n", "line 2.*not between"),
         (MESH.format(file="gone.stl"), "line 3.*gone.stl"),
         (MESH.format(file="it.exe"), "line 3.*it.exe"),
-        (MESH.format(file="scene.yaml"), "line 3.*scene.yaml is of no format"),
+        (MESH.format(file="scene.yaml"), "line 3.*scene.yaml has an unknown format"),
         (MESH.format(file="it.stl, sha256: abc"), "line 5.*64 digits"),
     ],
 )
@@ -226,17 +226,17 @@ def test_error_is_reported_with_its_line(text: str, said: str) -> None:
         read_scene_zip(zipped(scene_yaml=text), None)
 
 
-def test_another_file_than_it_was_saved_with_is_noticed(mesh: Mesh) -> None:
+def test_a_mesh_file_that_has_changed_is_refused(mesh: Mesh) -> None:
     text = MESH.format(file=f"ring.stl, sha256: '{mesh.sha256}'")
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         archive.writestr("scene.yaml", text)
         archive.writestr("ring.stl", ring() + b"\0")
-    with pytest.raises(InputError, match=r"line 3(.|\n)*another file|cannot|broken"):
+    with pytest.raises(InputError, match=r"line 3(.|\n)*not the file|cannot|corrupt"):
         read_scene_zip(out.getvalue(), None)
 
 
-def test_a_broken_or_swollen_zip_is_refused(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_corrupt_or_too_large_zip_is_refused(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = scene_zip(scene_of(mesh), T_PALM_TOOL)
     random = np.random.default_rng(0)
     for cut in random.integers(0, len(whole), 40).tolist():
@@ -298,11 +298,11 @@ def test_a_mesh_stands_on_its_underside_and_its_key_tells_how_it_was_read(mesh: 
         lambda: read_mesh(ring(), "ring.stl", up=Up.Y),
     ]
     assert all(other().key != mesh.key for other in others)
-    with pytest.raises(InputError, match="A unit is one of mm, cm, in, m"):
+    with pytest.raises(InputError, match="The unit must be one of mm, cm, in, m"):
         read_mesh(ring(), "ring.stl", "ft")
 
 
-def test_the_scene_of_the_documents_is_understood() -> None:
+def test_the_scene_of_the_documents_is_valid() -> None:
     page = Path(__file__).resolve().parents[2] / "docs" / "scenes.md"
     text = page.read_text(encoding="utf-8").partition("```yaml\n")[2].partition("```")[0]
     draft = parsed(re.sub(r".*sha256.*\n", "", text))

@@ -1,4 +1,4 @@
-"""Shapes in: what three and more foreign programs wrote, what we write, and what is no shape."""
+"""Tests of shape files: from other programs, from our exports, and invalid ones."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_the_bracket_of_other_programs_is_the_bracket(
     file: str, standing: list[float], colour: tuple[int, ...] | None
 ) -> None:
     format = Format.of(file)
-    # Numbers that are millimetres, though glTF would have metres.
+    # The numbers are millimetres, although glTF demands metres.
     unit = 1e-3 if format in (Format.GLB, Format.GLTF) else None
     shape = read_shape((FOREIGN / file).read_bytes(), format, file, unit)
     assert (shape.unit, sides(shape), is_closed(shape)) == (1e-3, standing, True)
@@ -81,7 +81,7 @@ def test_the_bracket_of_other_programs_is_the_bracket(
 
 
 def test_a_whole_world_is_flattened() -> None:
-    """Extrusion, Cylinder, USE, Switch and text, as another program wrote them."""
+    """Extrusion, Cylinder, USE, Switch and text, as written by another program."""
     shapes = [
         read_shape((FOREIGN / file).read_bytes(), Format.WRL, file)
         for file in ("castle.wrl", "bracket.wrl")
@@ -110,7 +110,7 @@ def test_another_reader_finds_the_same_triangles(file: str) -> None:
 
 @pytest.mark.parametrize(
     ("file", "said"),
-    [("gmsh.wrl", "VRML 1.0, which is not read"), ("assimp.gltf", "'assimp.bin'")],
+    [("gmsh.wrl", "VRML 1.0, which is not supported"), ("assimp.gltf", "'assimp.bin'")],
 )
 def test_ignored_content_of_foreign_files_is_reported(file: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
@@ -118,7 +118,7 @@ def test_ignored_content_of_foreign_files_is_reported(file: str, said: str) -> N
 
 
 def written(mesh: trimesh.Trimesh, kind: str) -> bytes:
-    """By trimesh, which is none of ours."""
+    """Return the file as trimesh writes it, independently of our code."""
     if kind == "gltf":
         files = export_gltf(trimesh.Scene(mesh), embed_buffers=True)  # type: ignore[no-untyped-call]
         return bytes(files["model.gltf"])
@@ -130,7 +130,7 @@ def written(mesh: trimesh.Trimesh, kind: str) -> bytes:
 @pytest.mark.parametrize(
     "kind", ["stl", "stl_ascii", "obj", "ply binary", "ply ascii", "glb", "gltf"]
 )
-def test_every_format_says_the_same(kind: str) -> None:
+def test_every_format_gives_the_same_shape(kind: str) -> None:
     turn = se3.from_rotation_translation(so3.exp((0.2, 0.4, 0.6)), (5.0, 0.0, 0.0))
     mesh = trimesh.creation.annulus(10.0, 30.0, 25.0, transform=turn)
     mesh.visual.face_colors = [0, 255, 0, 128]
@@ -150,7 +150,7 @@ def test_every_format_says_the_same(kind: str) -> None:
 
 
 def placed(mechanism: Robot, values: dict[str, float]) -> tuple[Numbers, int]:
-    """(n, 9) corners of every triangle in the root, and how many."""
+    """Return the corners (n, 9) of every triangle in the root's frame, and their number."""
     frames = mechanism.frames(values)
     rows = [
         (shape.vertices @ frames[link.name][:3, :3].T + frames[link.name][:3, 3])[shape.faces]
@@ -162,7 +162,7 @@ def placed(mechanism: Robot, values: dict[str, float]) -> tuple[Numbers, int]:
 
 
 @pytest.mark.parametrize("which", ["arm", "gantry"])
-def test_what_we_write_is_read_back(which: str, katana: Robot, gantry: Robot) -> None:
+def test_our_exports_are_read_back(which: str, katana: Robot, gantry: Robot) -> None:
     mechanism, pose = (katana, POSES[1]) if which == "arm" else (gantry, GANTRY_POSE)
     values = mechanism.values(pose)
     expected, count = placed(mechanism, values)
@@ -171,7 +171,7 @@ def test_what_we_write_is_read_back(which: str, katana: Robot, gantry: Robot) ->
     for format, data, near in ((Format.WRL, wrl, 1e-5), (Format.GLB, glb, 1e-6)):
         shape = read_shape(data, format, "whole", 1.0)
         rows = shape.vertices[shape.faces].reshape(-1, 9)
-        # Rounding lets slivers vanish, but nothing else.
+        # Only slivers disappear by rounding.
         assert 0.99 * count < len(rows) <= count
         assert cKDTree(expected).query(rows, p=np.inf)[0].max() <= near
         missing = expected[cKDTree(rows).query(expected, p=np.inf)[0] > near].reshape(-1, 3, 3)
@@ -191,7 +191,7 @@ def test_the_files_of_the_arm_are_read(file: str) -> None:
     theirs = triangles(other.vertices, other.faces, 6)
     ours = triangles(shape.vertices, shape.faces, 6)
     assert not ours - theirs
-    # Those that have two corners in one place.
+    # Triangles with two corners at one place.
     assert sum((theirs - ours).values()) <= 0.01 * len(other.faces)
     assert volume(shape) == pytest.approx(other.volume, rel=1e-5)
 
@@ -206,11 +206,11 @@ def tetrahedron(size: float) -> bytes:
 @pytest.mark.parametrize(
     ("size", "told", "unit", "said"),
     [
-        (1.5, None, 1.0, "taken as m, since 1.5 mm would be small"),
-        (2.5, None, 1e-3, "taken as mm, since 2.5 m would be too large"),
-        (1500.0, None, 1e-3, "taken as mm"),
-        (3.0, 0.0254, 0.0254, "the unit is in, as told"),
-        (3.0, 0.1, 0.1, "the unit is 0.1 m, as told"),
+        (1.5, None, 1.0, "assumed to be m, since 1.5 mm would be small"),
+        (2.5, None, 1e-3, "assumed to be mm, since 2.5 m would be too large"),
+        (1500.0, None, 1e-3, "assumed to be mm"),
+        (3.0, 0.0254, 0.0254, "the unit is in, as given"),
+        (3.0, 0.1, 0.1, "the unit is 0.1 m, as given"),
     ],
 )
 def test_unit_is_given_or_guessed_and_reported(
@@ -235,7 +235,7 @@ def test_unit_is_given_or_guessed_and_reported(
         (1.0, float("inf"), "above 0"),
     ],
 )
-def test_a_size_that_cannot_be_is_refused(size: float, told: float | None, said: str) -> None:
+def test_an_invalid_size_is_refused(size: float, told: float | None, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(tetrahedron(size), Format.OBJ, "a.obj", told)
 
@@ -245,13 +245,13 @@ def test_gltf_is_in_metres_even_where_that_is_too_large() -> None:
         read_shape((FOREIGN / "assimp.glb").read_bytes(), Format.GLB, "a.glb")
 
 
-def test_the_axis_that_is_up_can_be_told() -> None:
+def test_the_axis_that_is_up_can_be_given() -> None:
     data = (FOREIGN / "vtk.wrl").read_bytes()
     upright, flat = (read_shape(data, Format.WRL, "vtk.wrl", up=up) for up in (Up.Y, Up.Z))
     assert (sides(upright), sides(flat)) == (UPRIGHT, FLAT)
     x, y, z = flat.vertices.T
     np.testing.assert_array_equal(upright.vertices, np.column_stack((x, -z, y)))
-    assert "as told" in flat.text
+    assert "as given" in flat.text
 
 
 @pytest.mark.parametrize(
@@ -272,7 +272,7 @@ def test_names_of_files_become_names_of_objects(name: str, shown: str, scene_obj
 
 @settings(max_examples=50, deadline=None)
 @given(st.text(max_size=99))
-def test_any_name_makes_a_object(name: str) -> None:
+def test_any_file_name_gives_an_object_name(name: str) -> None:
     SceneObject(object_name(name), Shape.SPHERE, (0.1,), np.eye(4))
     assert len(label(label(name))) <= LONGEST_NAME
 
@@ -282,7 +282,7 @@ def test_bounds_are_those_of_objects() -> None:
     assert scene_objects.MAX_NAME_LENGTH == LONGEST_NAME
 
 
-def test_gltf_of_2_m_is_read_and_a_longer_one_is_told_from_the_bound() -> None:
+def test_gltf_of_2_m_is_read_and_a_longer_one_refused() -> None:
     """In single precision a side of 2 m is longer than 2 m by rounding."""
     side = float(np.nextafter(np.float32(2.0), np.float32(3.0)))
 
@@ -293,12 +293,14 @@ def test_gltf_of_2_m_is_read_and_a_longer_one_is_told_from_the_bound() -> None:
     assert SceneObject("long", Shape.MESH, (), np.eye(4), solid=mesh.solid).size[0] > 2.0
     with pytest.raises(InputError) as refused:
         read_shape(cube(2.0002), Format.GLB, "long.glb")
-    found = re.search(r"would be ([0-9.]+) mm long, .* from 1 to 2000 mm", str(refused.value))
+    found = re.search(
+        r"would be ([0-9.]+) mm long, .* the range is 1 to 2000 mm", str(refused.value)
+    )
     assert found
     assert float(found[1]) > 2000.0
 
 
-def test_formats_go_by_the_end_of_a_name() -> None:
+def test_formats_follow_from_the_suffix() -> None:
     assert [Format.of(f"a.{each.value.upper()}") for each in Format] == list(Format)
     assert Format.of("a.b.wrz") is Format.WRL
     for name in ("wrl", "a.step", "a", ""):
@@ -319,8 +321,8 @@ def test_a_guarded_reading_is_the_same() -> None:
         np.testing.assert_array_equal(body.corners, convex_body(here.vertices).corners)
 
 
-def test_a_guarded_reading_ends_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"hull\.ply does not begin with 'ply'"):
+def test_a_guarded_reading_fails_with_a_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=r"hull\.ply is not a PLY file"):
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
     with pytest.raises(InputError, match=r"has 20\.0 MB"):
         read_shape_guarded(bytes(20_000_001), Format.PLY, "hull.ply")
@@ -329,5 +331,5 @@ def test_a_guarded_reading_ends_in_words(monkeypatch: pytest.MonkeyPatch) -> Non
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
     monkeypatch.setattr(shape_file, "SECONDS", 5.0)
     monkeypatch.setattr("sys.executable", "false")
-    with pytest.raises(InputError, match="wants more than 5 s or 1024 MiB"):
+    with pytest.raises(InputError, match="needs more than 5 s or 1024 MiB"):
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")

@@ -1,4 +1,4 @@
-"""A motion is the same from CSV and JSON; a file that is none is refused, and says where."""
+"""Tests of motion files: the same from CSV and JSON; invalid files are refused with the place."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def csv_of(table: dict[str, list[float]]) -> str:
     return "\n".join([",".join(table), *(", ".join(map(repr, row)) for row in rows), ""])
 
 
-def test_csv_and_json_say_the_same(tmp_path: Path, katana: Robot) -> None:
+def test_csv_and_json_give_the_same_motion(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "a.csv").write_text(csv_of(TABLE))
     (tmp_path / "a.json").write_text(json.dumps(TABLE))
     one, two = (load_motion(tmp_path / name, katana) for name in ("a.csv", "a.json"))
@@ -38,7 +38,7 @@ def test_csv_and_json_say_the_same(tmp_path: Path, katana: Robot) -> None:
         np.testing.assert_array_equal(motion.values["axis_2"], np.zeros(3))
 
 
-def test_joints_go_by_their_own_names_too(tmp_path: Path, gantry: Robot) -> None:
+def test_joints_can_have_their_own_names(tmp_path: Path, gantry: Robot) -> None:
     (tmp_path / "a.csv").write_text("t,turn,theta1\n0,0,0\n1,9,0.4\n")
     motion = load_motion(tmp_path / "a.csv", gantry)
     np.testing.assert_array_equal(motion.values["turn"], [0.0, 9.0])
@@ -62,16 +62,16 @@ def test_keys_lie_on_the_motion_and_near_each_other(tmp_path: Path, gantry: Robo
         ("a.csv", "", "is empty"),
         ("a.csv", "x,theta1\n0,0\n1,0\n", "no column t"),
         ("a.csv", "t,theta1\n0,0\n", "has 1 rows"),
-        ("a.csv", "t,theta1\n0,0\n0,0\n", "must rise.*in row 2"),
-        ("a.csv", "t,theta1\n0,0\n1,0,0\n", "Row 2 .*3 values and not 2"),
+        ("a.csv", "t,theta1\n0,0\n0,0\n", "must increase.*in row 2"),
+        ("a.csv", "t,theta1\n0,0\n1,0,0\n", "Row 2 .*3 values, not 2"),
         ("a.csv", "t,theta1\n0,0\n1,one\n", "Row 2 .*one"),
         ("a.csv", "t,theta1\n0,0\n1,nan\n", "theta1.*nan"),
         ("a.csv", "t,theta1\n0,0\n1,4\n", "axis_1 cannot be at 4 rad"),
-        ("a.csv", "t,theta7\n0,0\n1,0\n", "'theta7', which is no driven joint"),
-        ("a.csv", "t,finger_left_joint\n0,0\n1,0\n", "no driven joint"),
+        ("a.csv", "t,theta7\n0,0\n1,0\n", "'theta7', which is not a driven joint"),
+        ("a.csv", "t,finger_left_joint\n0,0\n1,0\n", "not a driven joint"),
         ("a.csv", "t,theta1,theta1\n0,0,0\n1,0,0\n", "a column twice"),
         ("a.csv", "t,theta1,axis_1\n0,0,0\n1,0,0\n", "the joint axis_1 twice"),
-        ("a.json", "{", "no JSON"),
+        ("a.json", "{", "not JSON"),
         ("a.json", "[1]", "an object of lists"),
         ("a.json", '{"t": [0, 1], "theta1": [0]}', r"shape \(1,\)"),
         ("a.json", '{"t": [0, 1], "theta1": [0, "x"]}', "theta1"),

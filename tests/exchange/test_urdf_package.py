@@ -1,6 +1,6 @@
-"""The ROS package as it is exported: whole, the same each time, and loaded by other programs.
+"""Tests of the exported ROS package: complete, reproducible, and loaded by other programs.
 
-No program is given anything but the unpacked files, without a change.
+Other programs get the unpacked files unchanged.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from tests.exchange.conftest import GANTRY, POSES
 from tests.exchange.tools import needs_pybullet, pybullet, run
 
 LARGEST_ZIP = 800_000
-"""Bytes of the package of the Katana."""
+"""[bytes] Maximum size of the Katana's package."""
 
 MASS, BOX_MASS = 9.271, 4.471
-"""[kg] Of the whole, and of the link that stands on the table."""
+"""[kg] Mass of the robot, and of the link that stands on the table."""
 
 SHAPES = 53
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The package, as the command writes it and unzip unpacks it."""
+    """Return the package as the command writes it and unzip unpacks it."""
     where = tmp_path_factory.mktemp("ros")
     assert main(["export", "urdf", "--out", str(where)]) == 0
     archive = where / "katana450_description.zip"
@@ -65,7 +65,7 @@ def test_yourdfpy_finds_the_same_robot_in_it(urdf: Path) -> None:
     pose = np.full(len(here.actuated_joint_names), 0.1)
     for robot in (there, here):
         robot.update_cfg(pose)
-    # Coordinates of OBJ are rounded to 0.01 mm.
+    # Coordinates in OBJ are rounded to 0.01 mm.
     np.testing.assert_allclose(there.scene.bounds, here.scene.bounds, atol=0.51e-5)
     for link in here.link_map:
         np.testing.assert_allclose(there.get_transform(link), here.get_transform(link))
@@ -84,7 +84,7 @@ def test_mujoco_loads_the_same_robot(model: mujoco.MjModel) -> None:
 
 
 def test_mujoco_finds_no_contact_between_neighbours(model: mujoco.MjModel) -> None:
-    """At zero there is none at all; at any angle of axis 1 none between column and shoulder."""
+    """There is no contact at zero, and none of column and shoulder at any angle of axis 1."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.ncon == 0
@@ -96,7 +96,7 @@ def test_mujoco_finds_no_contact_between_neighbours(model: mujoco.MjModel) -> No
 
 
 def test_mujoco_lets_the_arm_fall_on_its_hinges(model: mujoco.MjModel) -> None:
-    """A simulation of the file runs: nothing explodes, and axis 1 is not held by friction."""
+    """The simulation stays finite, and friction does not hold axis 1."""
     data = mujoco.MjData(model)
     data.joint("axis_1").qvel[0] = 1.0
     while data.time < 0.1:
@@ -135,7 +135,7 @@ def test_pybullet_loads_the_same_robot(
 ) -> None:
     pose = (0.4, -1.187, 1.484, 0.14, 0.5, 0.2, 0.2)
     monkeypatch.setenv("PYTHONPATH", os.fspath(pybullet() or ""))
-    # Another folder, so that no name is found because of where the test stands.
+    # Another folder, so that no name is found by the present folder.
     printed = run(sys.executable, "-c", LOAD, urdf, json.dumps(pose), folder=tmp_path)
     found = json.loads(printed.splitlines()[-1])
     frames = katana.frames(katana.values(POSES[1]))
@@ -164,7 +164,7 @@ def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(
 
 
 def test_visuals_have_the_surfaces_and_colours_of_the_arm(urdf: Path, katana: Robot) -> None:
-    """As trimesh reads OBJ and MTL, and as the URDF says."""
+    """Compare with OBJ and MTL as trimesh reads them, and with the URDF."""
     root = ET.parse(urdf).getroot()
     written = {
         element.get("name"): [float(part) for part in color.get("rgba", "").split()]
@@ -216,7 +216,7 @@ def test_the_manifest_states_the_licence_and_no_invented_person(folder: Path) ->
         ),
     ],
 )
-def test_a_package_of_another_robot_states_what_its_exporter_says(
+def test_a_package_of_another_robot_states_the_given_licence_and_maintainer(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     words: tuple[str, ...],
@@ -286,7 +286,7 @@ def test_meshes_of_another_robot_keep_their_places_names_and_colours(tmp_path: P
     assert [visual.get("name") for visual in visuals] == ["look", "look_1", None, None]
     assert [visual.find("origin") is not None for visual in visuals] == [True, True, False, False]
     painted = [m.get("name") for visual in visuals for m in visual.findall("material")]
-    # The material that the URDF names overrules the mesh's, as in other programs.
+    # The material of the URDF overrides that of the mesh, as in other programs.
     assert (sorted(painted[:2], key=str), painted[2:]) == (["blue", "red_2"], ["red", "red"])
     assert [mesh.get("scale") for mesh in base.iterfind("visual/geometry/mesh")] == [
         "2 2 2", "2 2 2", None, None,
@@ -327,7 +327,7 @@ def test_a_robot_without_meshes_has_a_package_too() -> None:
 
 @pytest.mark.parametrize("kind", ["glb", "urdf"])
 @pytest.mark.parametrize("suffix", [".glb", ".dae", ".xyz"])
-def test_an_unreadable_mesh_is_named_in_words_of_ours(
+def test_an_unreadable_mesh_is_reported_by_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], suffix: str, kind: str
 ) -> None:
     mesh = tmp_path / f"arm{suffix}"
@@ -349,8 +349,8 @@ NO_MESH = MESH.format("no.stl")
     ("text", "said"),
     [
         ("", "is not a robot description"),
-        ("<robot/>", "names no robot"),
-        ('<other name="x"/>', "names no robot"),
+        ("<robot/>", "not a named robot"),
+        ('<other name="x"/>', "not a named robot"),
         (f'<robot name="x"><link name="a">{NO_MESH}</link></robot>', "no mesh at .*no.stl"),
     ],
 )

@@ -1,4 +1,4 @@
-"""VRML97: read back the same, placed by its Transforms, accepted and drawn by another program."""
+"""Tests of the VRML97 export: read back exactly, placed and drawn correctly by other programs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from tests.exchange.tools import SCREEN, needs, run
 pytestmark = pytest.mark.long
 
 MOST = 2_500_000
-"""Bytes of the arm's world."""
+"""[bytes] Maximum size of the arm's world."""
 
 Matrix = npt.NDArray[np.float64]
 
@@ -52,7 +52,7 @@ names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,6}", fullmatch=True).filter(
 
 
 def values(kind: Type, nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Value]:
-    """Any value a field of that type can have."""
+    """Return any value of a field type."""
     match kind:
         case Type.BOOL:
             return st.booleans()
@@ -109,7 +109,7 @@ def test_the_arm_and_its_motion_are_read_back(tmp_path: Path, katana: Robot) -> 
 
 
 def placed_points(world: World) -> Iterator[tuple[str, Matrix]]:
-    """Name of the nearest named node above, and points (n, 3), of every face set, as they stand."""
+    """Return the nearest named ancestor and the placed points (n, 3) of every face set."""
 
     def visit(node: Node, T: Matrix, name: str) -> Iterator[tuple[str, Matrix]]:
         name = node.name if node.name is not None and node.kind in ("Transform", "Group") else name
@@ -138,7 +138,7 @@ def field(node: Node, name: str, default: tuple[float, ...]) -> Matrix:
 
 
 @pytest.mark.parametrize("which", ["katana", "gantry"])
-def test_the_transforms_put_every_point_where_the_urdf_does(
+def test_the_transforms_place_every_point_as_in_the_urdf(
     which: str, katana: Robot, gantry: Robot
 ) -> None:
     path, robot, pose = (
@@ -153,7 +153,7 @@ def test_the_transforms_put_every_point_where_the_urdf_does(
         assert cKDTree(others).query(some)[0].max() < 10.0**-DIGITS
 
 
-def test_parts_stand_where_they_are_at_zero(katana: Robot) -> None:
+def test_parts_are_placed_as_with_all_joints_at_zero(katana: Robot) -> None:
     whole = dict(placed_points(world_of(katana, katana.values(()))))
     for link in katana.links:
         if link.shapes:
@@ -175,28 +175,28 @@ MOVER = "DEF a PositionInterpolator { } DEF b Transform { }"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "does not begin"),
-        ("#VRML V1.0 ascii\n", "does not begin"),
-        ("#VRML V2.0 utf8x\n", "does not begin"),
+        ("", "must begin"),
+        ("#VRML V1.0 ascii\n", "must begin"),
+        ("#VRML V2.0 utf8x\n", "must begin"),
         (f"{HEADER}\nGroup {{", "ends too early"),
-        (f"{HEADER}\n\nSphere {{ }}", "line 3: 'Sphere' is no node"),
+        (f"{HEADER}\n\nSphere {{ }}", "line 3: the node 'Sphere' is not supported"),
         (f"{HEADER}\nGroup {{ color 1 0 0 }}", "no field 'color'"),
-        (f"{HEADER}\nTransform {{ center 1 0 }}", "a number is wanted"),
-        (f"{HEADER}\nTransform {{ center 1 0 nan }}", "a number is wanted"),
+        (f"{HEADER}\nTransform {{ center 1 0 }}", "expected a number"),
+        (f"{HEADER}\nTransform {{ center 1 0 nan }}", "expected a number"),
         (f"{HEADER}\nTransform {{ center 1 0 1e999 }}", "too large"),
-        (f"{HEADER}\nTransform {{ center 0 0 0 center 0 0 0 }}", "stands twice"),
-        (f"{HEADER}\nCoordinate {{ point [ 1 2 3 4 ] }}", "no rows of 3"),
+        (f"{HEADER}\nTransform {{ center 0 0 0 center 0 0 0 }}", "given twice"),
+        (f"{HEADER}\nCoordinate {{ point [ 1 2 3 4 ] }}", "not form rows of 3"),
         (f"{HEADER}\nIndexedFaceSet {{ coordIndex [ 1.5 ] }}", "a whole number"),
         (f"{HEADER}\nIndexedFaceSet {{ solid YES }}", "TRUE or FALSE"),
         (f"{HEADER}\nGroup {{ children [ USE a ] }}", "before it is defined"),
         (f"{HEADER}\nDEF a Group {{ children USE a }}", "before it is defined"),
         (f"{HEADER}\nDEF a Group {{ }} DEF a Group {{ }}", "defined twice"),
-        (f"{HEADER}\nDEF TO Group {{ }}", "'TO' is no name"),
-        (f"{HEADER}\nDEF a Group {{ }} USE a", "no USE"),
+        (f"{HEADER}\nDEF TO Group {{ }}", "'TO' is not a name"),
+        (f"{HEADER}\nDEF a Group {{ }} USE a", "USE is not allowed"),
         (f"{HEADER}\nDEF a TimeSensor {{ }} ROUTE a.fraction_changed TO b.set_fraction", "into"),
         (f"{HEADER}\nROUTE a.fraction_changed TO b.set_fraction", "out of"),
-        (f"{HEADER}\n{MOVER}\nROUTE a.value_changed TO b.set_rotation", "line 3.*two types"),
-        (f'{HEADER}\nWorldInfo {{ title "open }}', "does not end"),
+        (f"{HEADER}\n{MOVER}\nROUTE a.value_changed TO b.set_rotation", "line 3.*different types"),
+        (f'{HEADER}\nWorldInfo {{ title "open }}', "unterminated"),
         (f"{HEADER}\n" + "Group { children " * 300, "deep"),
     ],
 )
@@ -205,7 +205,7 @@ def test_invalid_vrml_is_refused(text: str, said: str) -> None:
         read_world(text)
 
 
-def test_comments_commas_and_bare_values_are_understood() -> None:
+def test_comments_commas_and_bare_values_are_read() -> None:
     text = f"{HEADER} by hand\n# one\nTransform{{center 1,2,3#two\nchildren Group{{}}}}"
     shown = (("center", (1.0, 2.0, 3.0)), ("children", (Node("Group"),)))
     assert read_world(text) == World((Node("Transform", shown),))
@@ -238,7 +238,7 @@ def test_another_program_accepts_parts(
 
 
 def picture(folder: Path, content: bytes, name: str = "scene.wrl", time: float = 0.0) -> Path:
-    """What view3dscene draws of a file, so many seconds after it was opened."""
+    """Return the picture that view3dscene draws of a file some seconds after it was opened."""
     scene, image = folder / name, folder / "picture.png"
     scene.write_bytes(content)
     alone = ("--geometry", f"{SIZE}x{SIZE}", "--hide-extras", "--hide-menu")
@@ -248,7 +248,7 @@ def picture(folder: Path, content: bytes, name: str = "scene.wrl", time: float =
 
 @needs("view3dscene", "xvfb-run", "xauth")
 @pytest.mark.parametrize("pose", POSES)
-def test_another_program_draws_what_we_do(
+def test_another_program_draws_the_reference_picture(
     tmp_path: Path, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     values = katana.values(pose)

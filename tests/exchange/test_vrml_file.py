@@ -1,4 +1,4 @@
-"""Foreign VRML97: each geometry node, each grouping node, and what is left out or refused."""
+"""Tests of foreign VRML97: geometry nodes, grouping nodes, omitted and refused nodes."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ def test_a_sphere_is_round() -> None:
 
 
 def test_a_bent_extrusion_is_a_mitred_tube() -> None:
-    """A corner of a square: four mitres, so a frame of the square's area times its middle line."""
+    """A square frame with four mitres has the square's area times its middle line as volume."""
     shape = shown(
         "Extrusion { crossSection [ -.1 -.1, -.1 .1, .1 .1, .1 -.1, -.1 -.1 ] beginCap FALSE "
         "endCap FALSE spine [ 0 0 0, 2 0 0, 2 2 0, 0 2 0, 0 0 0 ] }"
     )
     assert is_closed(shape)
-    # The standard's planes halve the corners but do not widen the section there.
+    # The standard's planes bisect the corners but do not widen the section there.
     assert abs(volume(shape) * 1e3) == pytest.approx(0.04 * 8.0 * np.sqrt(0.5), rel=1e-6)
 
 
@@ -133,8 +133,8 @@ def test_concave_faces_are_covered_once() -> None:
     assert twice.sum() / 2.0 * 100.0 == pytest.approx(1.0)
 
 
-def test_transforms_do_as_the_standard_has_it() -> None:
-    """P' = T C R SR S -SR -C P, worked out one after the other."""
+def test_transforms_follow_the_standard() -> None:
+    """Compute P' = T C R SR S -SR -C P factor by factor."""
     shape = world(
         "Transform { translation 1 2 3 center .5 0 .25 rotation 0 0 2 .7 scale 1 2 -1.5 "
         "scaleOrientation 1 0 0 .4 children Transform { rotation 0 1 0 1 children Shape { geometry "
@@ -216,7 +216,7 @@ def test_compressed_files_and_byte_order_marks_are_read() -> None:
 
 
 def chain(links: int, fan: int, shape: str = "Shape { geometry Box { } }") -> str:
-    """Each node uses the one before `fan` times."""
+    """Return nodes of which each uses the one before ``fan`` times."""
     rows = [f"DEF n0 Group {{ children {shape} }}"]
     rows += [f"DEF n{i} Group {{ children [ {f'USE n{i - 1} ' * fan}] }}" for i in range(1, links)]
     return f"Switch {{ choice [ {' '.join(rows[:-1])} ] }} {rows[-1]}"
@@ -234,33 +234,33 @@ def test_nodes_that_use_others_can_be_deep() -> None:
         (chain(40, 2), "more than 20000 nodes"),
         (chain(40, 2, "Group { }"), "more than 20000 nodes"),
         (chain(14, 2, "Shape { geometry Sphere { } }"), "more than 200000 triangles"),
-        ("Group { children " * 300, "line 2: nodes lie more than 200 deep"),
-        ("PROTO Bolt [ ] { Box { } }", "line 2: PROTO Bolt: prototypes are not read"),
+        ("Group { children " * 300, "line 2: nodes are nested more than 200 deep"),
+        ("PROTO Bolt [ ] { Box { } }", "line 2: PROTO Bolt: prototypes are not supported"),
         ('Group { EXTERNPROTO Bolt [ ] "b.wrl" }', "EXTERNPROTO Bolt"),
         ("\nGroup { colour 1 }", "line 3: Group has no field 'colour'"),
         ("DEF a Group { children USE a }", "before it is defined"),
         ("Wobbler { a [ } ]", "'}' closes nothing"),
         ("Wobbler { a { ", "ends too early"),
-        ("Wobbler", "'{' is wanted"),
-        ("Shape { geometry Box { size 1 0 1 } }", "Box of no size"),
-        ("Shape { geometry Sphere { radius -1 } }", "Sphere of no size"),
-        ("Shape { geometry Extrusion { spine [ 0 0 0 ] } }", "too short"),
+        ("Wobbler", "expected '{'"),
+        ("Shape { geometry Box { size 1 0 1 } }", "Box whose size is not positive"),
+        ("Shape { geometry Sphere { radius -1 } }", "Sphere whose size is not positive"),
+        ("Shape { geometry Extrusion { spine [ 0 0 0 ] } }", "too few points"),
         ("Shape { geometry ElevationGrid { xDimension 2 height [ 1 ] } }", "heights"),
         (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 4 ]'} }}", "vertex 4"),
         (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 99999999999 ]'} }}", "whole number"),
         (
             f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 2 ] color Color { }'} }}",
-            "colours do not go",
+            "colours do not match",
         ),
-        ("Shape { geometry Box { } geometry Box { } }", "stands twice"),
+        ("Shape { geometry Box { } geometry Box { } }", "given twice"),
         (
             f"Transform {{ scale 1e9 1 1 children Transform {{ scale 1e300 1 1 children {BOX} }}}}",
-            "no finite numbers",
+            "not finite numbers",
         ),
-        ("Shape { geometry Box { size nan 1 1 } }", "a number is wanted"),
+        ("Shape { geometry Box { size nan 1 1 } }", "expected a number"),
     ],
 )
-def test_what_cannot_be_shown_is_refused(text: str, said: str) -> None:
+def test_invalid_worlds_are_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         world(text)
 
@@ -268,11 +268,11 @@ def test_what_cannot_be_shown_is_refused(text: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", "does not begin"),
+        (b"", "must begin"),
         (b"#VRML V1.0 ascii\nCube { }", "VRML 1.0"),
-        (b"#X3D V3.2 utf8\n", "does not begin"),
+        (b"#X3D V3.2 utf8\n", "must begin"),
         (gzip.compress(bytes(10))[:-6], "ends too early"),
-        (b"\x1f\x8b" + bytes(40), "broken"),
+        (b"\x1f\x8b" + bytes(40), "corrupt"),
         (gzip.compress(b"#VRML V2.0 utf8\n" + bytes(30_000_000)), "more than 20 MB when unpacked"),
     ],
 )

@@ -1,4 +1,4 @@
-"""VRML worlds for VTK: no number without a digit before its point, and a pose without a player."""
+"""Tests of VRML worlds for VTK: digits before decimal points, and a static pose."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_static_pose_is_the_first_sample_of_the_motion(
 
 
 def nodes(glb: bytes) -> list[object]:
-    """The nodes of a binary glTF file."""
+    """Return the nodes of a binary glTF file."""
     length = int.from_bytes(glb[12:16], "little")
     found: list[object] = json.loads(glb[20 : 20 + length])["nodes"]
     return found
@@ -90,7 +90,7 @@ def nodes(glb: bytes) -> list[object]:
 
 @pytest.mark.long
 @pytest.mark.skipif(vtk_folder() is None, reason=f"not here; pip brings {VTK}")
-def test_vtk_reads_the_arm_as_large_as_it_is(tmp_path: Path, katana: Robot) -> None:
+def test_vtk_reads_the_arm_in_its_size(tmp_path: Path, katana: Robot) -> None:
     files = vrml_files(katana, katana.values(()))
     (tmp_path / "arm.wrl").write_bytes(next(files[name] for name in files if "/" not in name))
     (tmp_path / "bounds.py").write_text(BOUNDS)
@@ -105,7 +105,7 @@ def test_vtk_reads_the_arm_as_large_as_it_is(tmp_path: Path, katana: Robot) -> N
             for shape in link.shapes
         ]
     )
-    # VRML's y is up, the root's z is.
+    # VRML has y up, the root has z up.
     points = points[:, (0, 2, 1)] * (1.0, 1.0, -1.0)
     np.testing.assert_allclose(low, points.min(axis=0), atol=1e-5)
     np.testing.assert_allclose(high, points.max(axis=0), atol=1e-5)

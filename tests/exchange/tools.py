@@ -1,6 +1,6 @@
-"""Find the programs that read our exports, and install them where that can be done without asking.
+"""Find the programs that read our exports, and install them if that needs no confirmation.
 
-``python tests/exchange/tools.py`` does so; tests of a program that is not there are skipped.
+``python tests/exchange/tools.py`` installs them. Tests of a missing program are skipped.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PACKAGES = {
     "tovrmlx3d": "view3dscene",
     "view3dscene": "view3dscene",
 }
-"""Programs and files, and Debian's packages that bring them."""
+"""Programs and files, and the Debian packages that provide them."""
 
 X_ITE = "x_ite@15.0.1"
 """A browser of VRML and X3D worlds in JavaScript, from npm."""
@@ -44,35 +44,35 @@ PYBULLET = "pybullet==3.2.7"
 PYBULLET_FOLDER = Path(__file__).parents[2] / ".cache" / PYBULLET
 
 VTK = "vtk==9.7.2"
-"""Reads VRML worlds, from PyPI; kept apart from what the project depends on."""
+"""A library that reads VRML worlds, from PyPI; not among the project's dependencies."""
 
 VTK_FOLDER = Path(__file__).parents[2] / ".cache" / VTK
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
 
 VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
-"""What building and running the C viewer takes."""
+"""Programs and files that are needed to build and run the C viewer."""
 
 
 def missing(names: Sequence[str]) -> list[str]:
-    """Debian's packages of those that are not there."""
+    """Return the Debian packages of the missing programs."""
     absent = [n for n in names if not (Path(n).exists() if n[0] == "/" else shutil.which(n))]
     return list(dict.fromkeys(PACKAGES[name] for name in absent))
 
 
 def x_ite() -> Path | None:
-    """Its script, if it is there."""
+    """Return the path of its script, if present."""
     script = X_ITE_FOLDER / "package" / "dist" / "x_ite.min.js"
     return script if script.is_file() else None
 
 
 def vtk_folder() -> Path | None:
-    """Its folder of modules, if it is there."""
+    """Return the folder of its modules, if present."""
     return VTK_FOLDER if (VTK_FOLDER / "vtkmodules").is_dir() else None
 
 
 def needs(*names: str) -> pytest.MarkDecorator:
-    """Skip a test, and say why, where one of the programs is not there."""
+    """Return a mark that skips a test with the reason if one of the programs is missing."""
     packages = " ".join(missing(names))
     return pytest.mark.skipif(
         bool(packages), reason=f"not here; on Debian and Ubuntu: apt-get install {packages}"
@@ -80,7 +80,7 @@ def needs(*names: str) -> pytest.MarkDecorator:
 
 
 def pybullet() -> Path | None:
-    """Return the folder to import it from, if it is there."""
+    """Return the folder to import it from, if present."""
     return PYBULLET_FOLDER if any(PYBULLET_FOLDER.glob("pybullet*.so")) else None
 
 
@@ -90,8 +90,8 @@ needs_pybullet = pytest.mark.skipif(
 
 
 def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -> str:
-    """Run a program that must succeed within so many seconds; what it printed."""
-    # A group of its own, so that what xvfb-run started ends with it.
+    """Run a program that must succeed within a time [s]; return its output."""
+    # A process group, so that children of xvfb-run end with it.
     process = subprocess.Popen(
         [str(word) for word in words],
         cwd=folder,
@@ -112,7 +112,7 @@ def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -
 
 
 def fetch_x_ite() -> None:
-    """Bring and unpack it; nothing of it is run."""
+    """Download and unpack it; nothing of it is executed."""
     X_ITE_FOLDER.mkdir(parents=True, exist_ok=True)
     pack = ["npm", "pack", X_ITE, "--silent"]
     print("Running:", *pack, flush=True)
@@ -139,7 +139,7 @@ def fetch(package: str, folder: Path) -> str:
 
 
 def main() -> None:
-    """Say what the tests use; install it first if root can."""
+    """Print the programs that the tests use; install missing ones first if root can."""
     packages = missing(list(PACKAGES))
     if packages and shutil.which("apt-get") and os.geteuid() == 0:
         environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}

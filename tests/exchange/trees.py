@@ -1,4 +1,4 @@
-"""URDF files of mechanisms nobody has built: trees with sliding, endless and following joints."""
+"""URDF files of artificial mechanisms: trees with prismatic, continuous and mimic joints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def tree(seed: int, links: int = 8) -> str:
-    """A chain of links with branches; its joints are called j1, j2, ... and hang on link0."""
+    """Return a chain of links with branches; its joints are j1, j2, ..., and it starts at link0."""
     random = np.random.default_rng(seed)
     kinds = ["prismatic", "revolute", "continuous", "revolute"]
     parts = ['<robot name="tree">', '<link name="link0"/>']
@@ -16,7 +16,7 @@ def tree(seed: int, links: int = 8) -> str:
         return float(random.uniform(low, high))
 
     for number in range(1, links):
-        # Two on link0, so that there is a branch for certain.
+        # Two joints on link0, so that there is always a branch.
         parent = 0 if number <= 2 else int(random.integers(0, number))
         kind = kinds[(number - 1) % len(kinds)]
         follows = number > 4 and number % 2 == 1

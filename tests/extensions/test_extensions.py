@@ -164,7 +164,7 @@ def test_map_is_refused_for_a_mechanism_that_is_not_an_arm(tmp_path: Path) -> No
     options = ("--urdf", gantry, "--workspace", str(tmp_path / "map.npz"))
     output = katana450("serve", "--port", str(free_port()), *options)
     assert output.startswith("1 ")
-    assert "map.npz maps where a tool can be. " in output
+    assert "map.npz is a map of the points that a tool reaches. " in output
 
 
 def test_another_distribution_extends_the_server(

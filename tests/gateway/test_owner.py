@@ -174,7 +174,7 @@ def test_moved_arm_needs_a_new_plan(arm: Client) -> None:
     arm.ask(Steer(order=ProgramOrder.RUN))
     program = arm.query(answers.State).program
     assert program is not None
-    assert (program.status, program.why) == ("planning", "Planned anew: the arm has moved.")
+    assert (program.status, program.why) == ("planning", "Planned again: the arm has moved.")
     wait(arm, lambda state: status(state) == "done")
 
 

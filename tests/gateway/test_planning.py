@@ -120,12 +120,12 @@ def test_other_commands_during_planning_keep_the_program_from_running(
     window = table.join(PAGES[0])
     ask(table, window)
     table.programs.redirected()
-    assert "does not run by itself" in bar(table, window)["why"]
+    assert "does not start by itself" in bar(table, window)["why"]
     finish(table, window, slow)
     progress = table.programs.progress()
     assert progress is not None
     assert progress.status == "ready"
-    assert progress.why.startswith("Not run: ")
+    assert progress.why.startswith("Not run: the arm was given another command")
     assert not table.programs.running
 
 
@@ -156,7 +156,7 @@ def test_run_request_during_planning_takes_effect_afterwards(table: Staged, slow
     assert bar(table, window)["orders"] == ["end"]
     assert bar(table, other)["orders"] == []
     for order in ProgramOrder:
-        with pytest.raises(LeaseError, match="is Window 1's"):
+        with pytest.raises(LeaseError, match="belongs to Window 1"):
             table.programs.steer(other, order)
     table.programs.steer(window, ProgramOrder.RUN)
     finish(table, window, slow)
@@ -247,7 +247,7 @@ def test_bar_shows_the_progress_of_planning(table: Staged, slow: Slow) -> None:
         assert time.monotonic() < due
         time.sleep(0.005)
     assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20%")
-    assert shown["why"] == "Step 1 of 2: timing paths, 20%. It does not run by itself."
+    assert shown["why"] == "Step 1 of 2: timing paths, 20%. It does not start by itself."
     table.arm.moves = True
     shown = bar(table, window)
     assert (shown["mood"], shown["headline"]) == ("moving", "Moving")

@@ -82,7 +82,7 @@ def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path)
             os.kill(owner.pid, signal.SIGCONT)
             owner.kill()
     assert took < OWNER_SILENCE + BRAKING
-    why = "Terminal fell silent: a program ends with its owner's heartbeats."
+    why = "Terminal sends no heartbeats. A program ends without its owner."
     assert state["program"]["why"] == why
     # The arm rests on its path. It is not stopped, and the lease is free.
     assert (state["stopped"], state["holder"]) == (None, None)
@@ -108,5 +108,5 @@ def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> N
 
     took, state = asyncio.run(act())
     assert OWNER_SILENCE <= took < OWNER_SILENCE + BRAKING
-    assert "Owner fell silent" in state["program"]["why"]
+    assert "Owner sends no heartbeats" in state["program"]["why"]
     clear_stop(server)

@@ -113,12 +113,12 @@ def test_others_may_steer_a_program_only_if_they_may_take_the_lease(table: Stage
         program_runner.script(viewer, SCRIPT, more=False, speed=1.0)
     table.plan(owner)
     program_runner.steer(owner, ProgramOrder.RUN)
-    for window, reason in ((viewer, "watch"), (other, "is Window 1's")):
+    for window, reason in ((viewer, "watch"), (other, "belongs to Window 1")):
         with pytest.raises(LeaseError, match=reason):
             program_runner.check_may_touch(window.actor)
         with pytest.raises(LeaseError, match=reason):
             program_runner.steer(window, ProgramOrder.END)
-    with pytest.raises(LeaseError, match="end it first"):
+    with pytest.raises(LeaseError, match="End it first"):
         table.plan(other)
     program_runner.check_may_touch(admin.actor)
     program_runner.steer(admin, ProgramOrder.END)

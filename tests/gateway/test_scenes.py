@@ -183,7 +183,7 @@ def test_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
     for wrong, reason in (
         (text.replace("name: ring", "name: gate"), "two objects called 'gate'"),
         (text.replace("water: 80", "water: 5000"), "cannot hold 5000 ml"),
-        (text.replace("meshes/ring.stl", "../ring.stl"), "no relative path"),
+        (text.replace("meshes/ring.stl", "../ring.stl"), "not a relative path"),
         (text[: len(text) // 2], "line"),
     ):
         out = io.BytesIO()

@@ -1,4 +1,4 @@
-"""The arm on its table, ready for pictures."""
+"""Fixtures: the arm on its table, with the shapes for pictures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from katana450.settings import Settings
 
 
 class Workshop(NamedTuple):
-    """An arm, its rules, and its shapes."""
+    """An arm with its session and shapes."""
 
     robot: Robot
     session: Session
@@ -26,12 +26,12 @@ class Workshop(NamedTuple):
 
     @property
     def ready(self) -> State:
-        """At home, the cup empty."""
+        """Return the state in the ready posture with an empty cup."""
         return self.session.begin(self.session.ready, 0.0, 0.0)
 
     @property
     def filled(self) -> State:
-        """The same with 200 ml in the cup."""
+        """Return the same state with 200 ml of water in the cup."""
         return self.session.step(self.ready, [cmd.Fill(2e-4)], 0.01)
 
 

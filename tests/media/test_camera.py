@@ -1,4 +1,4 @@
-"""Rays through pixels lead to what a projection puts there."""
+"""Tests of camera rays against a projection matrix."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ spot = st.floats(-2.0, 2.0)
     st.floats(0.0, 399.0),
     st.floats(0.2, 2.0),
 )
-def test_a_ray_meets_what_is_projected_to_its_pixel(
+def test_a_ray_passes_through_the_point_projected_to_its_pixel(
     eye: tuple[float, float, float], x: float, y: float, fov: float
 ) -> None:
     camera = Camera(eye, (eye[0] - 1.0, eye[1] + 0.5, eye[2] - 0.3), fov, (640, 400))
     (way,) = camera.directions(np.array([x], dtype=np.float32), np.array([y], dtype=np.float32))
     assert np.linalg.norm(way) == pytest.approx(1.0, abs=1e-6)
-    # As a matrix of projection does it, from the vectors of the camera.
+    # Projection matrix from the vectors of the camera.
     ahead = np.array((-1.0, 0.5, -0.3)) / math.sqrt(1.34)
     right = np.cross(ahead, (0.0, 0.0, 1.0)) / math.hypot(*ahead[:2])
     down = np.cross(ahead, right)

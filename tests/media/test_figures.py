@@ -1,4 +1,4 @@
-"""What a report's figures show of many numbers."""
+"""Tests of the data in the figures of a report."""
 
 from __future__ import annotations
 

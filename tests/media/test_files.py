@@ -1,4 +1,4 @@
-"""Films, read back by ffmpeg; and none where something went wrong."""
+"""Tests of films, decoded by ffmpeg, and of failures while they are written."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COUNT, WIDTH, HEIGHT = 12, 96, 64
 
 
 def frames(count: int = COUNT) -> Iterator[Pixels]:
-    """A bright bar that goes across."""
+    """Yield pictures of a bright bar that moves across."""
     for number in range(count):
         picture = np.full((HEIGHT, WIDTH, 3), 30, dtype=np.uint8)
         picture[:, 8 * number : 8 * number + 8] = (230, 60, 60)
@@ -29,7 +29,7 @@ def frames(count: int = COUNT) -> Iterator[Pixels]:
 
 
 def decoded(path: Path) -> tuple[Pixels, str]:
-    """Pictures (n, height, width, 3) of a film, and what ffmpeg says of it."""
+    """Return the pictures (n, height, width, 3) of a film, and ffmpeg's description of it."""
     done = subprocess.run(
         [get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
         capture_output=True,
@@ -67,16 +67,20 @@ def test_an_unfinished_film_leaves_nothing(tmp_path: Path) -> None:
         write_film(path, interrupted(), (WIDTH, HEIGHT), 25.0)
     assert path.read_bytes() == b"an older one"
     assert list(tmp_path.iterdir()) == [path]
-    with pytest.raises(InputError, match="no picture"):
+    with pytest.raises(InputError, match="at least one picture"):
         write_film(path, iter(()), (WIDTH, HEIGHT), 25.0)
     assert path.read_bytes() == b"an older one"
 
 
 @pytest.mark.parametrize(
     ("size", "fps", "said"),
-    [((95, 64), 25.0, "even"), ((96, 64), 0.0, "a second"), ((96, 64), float("nan"), "a second")],
+    [
+        ((95, 64), 25.0, "even"),
+        ((96, 64), 0.0, "per second"),
+        ((96, 64), float("nan"), "per second"),
+    ],
 )
-def test_what_no_film_can_be_is_refused(
+def test_invalid_film_is_refused(
     tmp_path: Path, size: tuple[int, int], fps: float, said: str
 ) -> None:
     with pytest.raises(InputError, match=said):

@@ -1,4 +1,4 @@
-"""Pictures: the same every time, and showing what is there where it is."""
+"""Tests of pictures: reproducible, with every item at its place."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
 from tests.media.conftest import Workshop
 
 NEAR = Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(40.0), (320, 200))
-"""Cup, basin and hand."""
+"""View of cup, basin and hand."""
 
 UP = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, 0.5))
 
@@ -61,16 +61,16 @@ def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_the_arm_covers_what_pillow_says(
+def test_the_arm_covers_the_same_pixels_as_in_pillow(
     workshop: Workshop, katana: Robot, pose: tuple[float, ...]
 ) -> None:
-    """Another program's projection of another reader's meshes, posed by that reader."""
+    """Compare with a projection by other programs, of meshes that other programs read and pose."""
     view: Viewpoint = camera(katana)
     at = Camera(tuple(view.eye), tuple(view.target), FIELD_OF_VIEW, (SIZE, SIZE))
     scene = RenderScene.of(
         workshop.stage.arm(workshop.session.begin(np.array(pose[:5]), pose[5], 0.0))
     )
-    # Through the middle of each pixel, as in a picture, but without its light.
+    # Rays through the middle of each pixel, as in a picture, but without light.
     y, x = np.mgrid[0.5:SIZE, 0.5:SIZE].reshape(2, -1).astype(np.float32)
     eye = np.array(at.position, dtype=np.float32)
     hits = first_hits(scene, Tracer(scene), eye, at.directions(x, y), -10.0)
@@ -99,7 +99,7 @@ def test_cup_and_water_are_seen(workshop: Workshop, filled: Picture) -> None:
     assert 20 < water.sum() < cup.sum()
     dry = picture(workshop.stage.items(workshop.ready), (), NEAR, LIGHT, 1)
     wet, white = filled.pixels[water].astype(float), dry.pixels[water].astype(float)
-    # Water takes red from the white of the cup.
+    # Water absorbs red of the white cup.
     assert (wet[:, 2] - wet[:, 0]).mean() > (white[:, 2] - white[:, 0]).mean() + 20.0
     assert not dry.shows(CUP).any()
     assert (
@@ -108,7 +108,7 @@ def test_cup_and_water_are_seen(workshop: Workshop, filled: Picture) -> None:
     ).mean() > 0.99
 
 
-def test_a_object_of_ones_own_is_seen_where_it_stands(workshop: Workshop) -> None:
+def test_an_uploaded_object_is_seen_at_its_place(workshop: Workshop) -> None:
     T = se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0))
     box = SceneObject("crate", Shape.BOX, (0.1, 0.1, 0.1), T)
     state = replace(workshop.ready, objects=(box,))
@@ -122,16 +122,16 @@ def test_a_object_of_ones_own_is_seen_where_it_stands(workshop: Workshop) -> Non
     assert ahead > 0.0
 
 
-def test_a_ball_is_as_large_as_geometry_has_it() -> None:
-    """A ball off to no side covers a disc of the sine of its half angle."""
+def test_a_sphere_has_the_size_of_its_projection() -> None:
+    """A distant sphere covers a disc with the sine of its half angle as radius."""
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (300, 300))
     shown = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT, 1)
     radius = math.tan(math.asin(0.3 / 2.0)) / at.pixel
     assert shown.shows("ball").sum() == pytest.approx(math.pi * radius**2, rel=0.01)
 
 
-def test_a_shadow_falls_where_the_key_light_leaves_it() -> None:
-    """A ball 0.5 m up: along the light from its middle to the floor."""
+def test_a_shadow_falls_along_the_key_light() -> None:
+    """The shadow of a sphere 0.5 m up lies along the light's direction from its centre."""
     at = Camera((0.0, -2.5, 2.5), (0.0, 0.0, 0.0), math.radians(50.0), (200, 200))
     items = [Item("ball", ball(0.15), UP)]
     with_ball, without = picture(items, (), at, LIGHT, 4), picture((), (), at, LIGHT, 4)
@@ -146,11 +146,11 @@ def test_a_shadow_falls_where_the_key_light_leaves_it() -> None:
 
 
 def test_edges_are_smooth() -> None:
-    """Between a dark ball and the bright room there are pixels of neither."""
+    """Pixels between a dark sphere and the bright room have intermediate colours."""
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (200, 200))
     row = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT, 1).pixels[:, :, 1].astype(int)
     inside, outside = row[100, 100], row[100, 5]
-    # Where the outline is nearly upright, row after row crosses pixels elsewhere.
+    # A nearly vertical outline crosses pixels at another place in each row.
     rim = row[70:130, 10:60]
     assert ((rim > inside + 15) & (rim < outside - 15)).any(axis=1).mean() > 0.8
 
@@ -168,7 +168,7 @@ def test_a_line_is_a_tube_of_its_length() -> None:
     item = tube("line", circle, 0.01, (10, 160, 80))
     assert item is not None
     mesh = trimesh.Trimesh(item.shape.vertices, item.shape.faces, process=False)
-    # An octagon's outline for the circle's.
+    # The outline is an octagon in place of a circle.
     around = 2.0 * 8 * 0.01 * math.sin(math.pi / 8)
     assert mesh.area == pytest.approx(math.tau * around, rel=0.01)
     out = mesh.face_normals * (mesh.triangles_center - _nearest(mesh.triangles_center))
@@ -177,6 +177,6 @@ def test_a_line_is_a_tube_of_its_length() -> None:
 
 
 def _nearest(points: np.typing.NDArray[np.float64]) -> np.typing.NDArray[np.float64]:
-    """On the unit circle."""
+    """Return the nearest point on the unit circle."""
     flat = points * (1.0, 1.0, 0.0)
     return np.asarray(flat / np.linalg.norm(flat, axis=1, keepdims=True))

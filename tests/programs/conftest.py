@@ -1,4 +1,4 @@
-"""The arm with what stands around it, and its session."""
+"""Fixtures: the arm with scene objects, and its session."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ TICK = 0.01
 
 
 class Stage:
-    """A session on a clock of its own, and programs run on it."""
+    """A session on a simulated clock that runs programs."""
 
     def __init__(self, arm: MountedArm, *, bare: bool = False) -> None:
-        """``bare``: without its gripper."""
+        """Build the session. ``bare``: without the gripper."""
         self.session = describe_robot(replace(Settings(), bare=bare), URDF_PATH, None).session
         self.plan_context = PlanContext(self.session, arm.T_base_shoulder)
 
@@ -39,9 +39,9 @@ class Stage:
         return run, self.session.observe(state, state.setpoint, state.gripper_setpoint)
 
     def loads(self, states: Sequence[State]) -> FloatArray:
-        """(3,) the greatest speed, acceleration and jerk of any joint, to its limit.
+        """Return the maximum speed, acceleration and jerk of all joints (3,), relative to limits.
 
-        From differences of the setpoints alone, which are means of the derivatives.
+        They are differences of the setpoints, so means of the derivatives.
         """
         limits = self.plan_context.arm.limits
         q = np.array([state.setpoint for state in states])
@@ -53,7 +53,7 @@ class Stage:
         return np.array(found)
 
     def play(self, program: Program, state: State, most: int = 5000) -> tuple[Run, list[State]]:
-        """To its end, and every state on the way."""
+        """Run ``program`` to its end; return the run and all states."""
         run, states = Run(state.t), [state]
         while run.phase is Phase.RUNNING and len(states) < most:
             run, state = self.tick(program, run, state)

@@ -1,4 +1,4 @@
-"""The paper's first experiment, run to its end on the arm as the script is for."""
+"""Test of the paper's first experiment, run to its end on an arm without gripper."""
 
 from __future__ import annotations
 

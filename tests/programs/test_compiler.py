@@ -1,4 +1,4 @@
-"""What is planned together: what is put in a row, and the pitch of a grasp with its use."""
+"""Tests of planning across steps: arrangements of objects, and the pitch of a grasp."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from katana450.maths.planning.checkpoint import checked_by
 from tests.programs.conftest import Stage
 
 NEAR = (165.0, 286.0)
-"""[mm] So near the arm that the basin is reached at a steep pitch alone."""
+"""[mm] A place so near the arm that the basin can only be reached at a steep pitch."""
 
 
 def puts(*spots: tuple[str, tuple[float, float]]) -> str:
@@ -28,7 +28,7 @@ def puts(*spots: tuple[str, tuple[float, float]]) -> str:
 
 
 def stood(stage: Stage, name: str) -> tuple[float, float]:
-    """[mm] Where it stands at first."""
+    """Return the initial place of an object [mm]."""
     (scene_object,) = (each for each in stage.begin().objects if each.name == name)
     x, y, _ = (1e3 * scene_object.T[:3, 3]).tolist()
     return x, y
@@ -52,13 +52,13 @@ def test_cup_and_basin_change_places(stage: Stage) -> None:
 @pytest.mark.parametrize(
     ("between", "last", "said"),
     [
-        # What stands still meanwhile is in the way.
+        # An object that is not moved is an obstacle.
         ("  - wait: 0.1\n", (-200.0, 300.0), "cup would stand in basin"),
-        # And so is what is put there last.
+        # An object that is put there last is an obstacle too.
         ("", None, "basin would stand in cup"),
     ],
 )
-def test_an_arrangement_in_which_objects_stand_in_each_other_is_refused(
+def test_an_arrangement_with_overlapping_objects_is_refused(
     stage: Stage, between: str, last: tuple[float, float] | None, said: str
 ) -> None:
     basin = stood(stage, "basin")
@@ -88,8 +88,8 @@ def test_an_object_at_the_edge_of_the_table_is_carried(stage: Stage) -> None:
     assert at["cup"] == pytest.approx((740.0, 690.0))
 
 
-def test_the_same_step_is_planned_anew_when_objects_stand_elsewhere(stage: Stage) -> None:
-    """The second time the basin stands where the arm went the first time."""
+def test_a_repeated_step_is_planned_again_after_objects_have_moved(stage: Stage) -> None:
+    """The second time, the basin stands on the arm's first path."""
     once = (
         "frame: base\ntool: tcp\nsteps:\n  - repeat:\n      times: 1\n      steps:\n"
         "        - move: {x: 360, y: 0, z: 60, pitch: 60}\n        - home\n"
@@ -116,7 +116,7 @@ def test_planning_reports_each_step_of_both_phases(stage: Stage) -> None:
 
 
 def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
-    """Each phase is cancelled in its middle, and the longest gap between checkpoints is short."""
+    """Each phase is cancelled in its middle; the longest gap between checkpoints is short."""
     for phase in (FINDING, TIMING):
         reached: list[PlanningStage] = []
 
@@ -144,7 +144,7 @@ def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
 
 @pytest.fixture
 def untimed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """How long ways take is not what is looked at here."""
+    """Replace the timing of paths, whose duration does not matter here."""
     monkeypatch.setattr(UntimedPath, "timed", lambda self: self)
 
 
@@ -154,10 +154,10 @@ def layout(stage: Stage, text: str) -> tuple[PlanBuilder, Compiler]:
 
 
 @pytest.mark.usefixtures("untimed")
-def test_another_pitch_is_taken_when_the_first_does_not_reach_the_basin(stage: Stage) -> None:
+def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: Stage) -> None:
     builder, found = layout(stage, PourDemo(basin=NEAR).text)
     names = [name for orders in found.all() for name, _ in orders]
-    # What led nowhere has left nothing behind.
+    # Failed attempts leave no actions behind.
     assert names.count("grasp cup: close") == 1
     assert names.count("pour") == 1
     assert builder.taken is None
@@ -168,11 +168,11 @@ def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
     text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
     with pytest.raises(InputError, match="cannot be emptied into basin") as told:
         layout(stage, text)[1].all()
-    assert "another pitch" not in str(told.value)
+    assert "other pitch" not in str(told.value)
 
 
 @pytest.mark.usefixtures("untimed")
-def test_those_that_were_tried_are_told(stage: Stage) -> None:
-    with pytest.raises(InputError, match=r"another pitch .* tried 30, .* and \d+ deg") as told:
+def test_pitches_that_were_tried_are_reported(stage: Stage) -> None:
+    with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as told:
         layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].all()
     assert "with a pitch of 30.0 deg" in str(told.value)

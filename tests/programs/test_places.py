@@ -1,4 +1,4 @@
-"""Cup and basin at random places: all of it gets into the basin, or it is refused beforehand."""
+"""Tests of cup and basin at random places: all water reaches the basin, or a script is refused."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from tests.programs.conftest import Stage
 from tests.programs.test_pour import check_poured
 
 CASES = range(50) if "KATANA450_LONG" in os.environ else (1, 2, 9, 11)
-"""Cup out of reach, cup beyond the table, another pitch, basin out of reach.
+"""Cases: cup out of reach, cup beyond the table, another pitch, basin out of reach.
 
-All of them with `KATANA450_LONG`."""
+`KATANA450_LONG` runs all of them.
+"""
 
 
 def spots(number: int) -> tuple[Spot, Spot]:
-    """[mm] Anywhere about the arm that it might reach, and somewhat beyond."""
+    """Return random places [mm] around the arm, within its reach and somewhat beyond."""
     rng = random.Random(number)
 
     def spot() -> Spot:
@@ -33,7 +34,7 @@ def spots(number: int) -> tuple[Spot, Spot]:
 
 
 @pytest.mark.parametrize("number", CASES)
-def test_every_place_does_or_is_refused(stage: Stage, number: int) -> None:
+def test_every_place_is_poured_from_or_refused(stage: Stage, number: int) -> None:
     cup, basin = spots(number)
     try:
         program = compiled(
@@ -48,7 +49,7 @@ def test_every_place_does_or_is_refused(stage: Stage, number: int) -> None:
 
 
 REASONS = (
-    "cannot be taken where it stands",
+    "cannot be grasped at its place",
     "cannot be emptied into",
     "would stand in",
     "no room",

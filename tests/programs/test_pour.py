@@ -1,4 +1,4 @@
-"""The paper's second experiment, planned from where cup and basin stand, and run to its end."""
+"""Tests of the paper's second experiment, planned for any places of cup and basin, and run."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def planned(stage: Stage, cup: Spot | None = None, basin: Spot | None = None) ->
 
 
 def check_poured(stage: Stage, program: Program) -> None:
-    """Run it to its end: what the demo promises is so at every tick."""
+    """Run the program to its end; check the limits and the water at every tick."""
     run, states = stage.play(program, stage.begin())
     assert (run.phase, run.why) == (Phase.DONE, "")
     end, pouring = states[-1], stage.session.pouring
@@ -34,7 +34,7 @@ def check_poured(stage: Stage, program: Program) -> None:
     found = score(end.poured.water, end.poured.course)
     assert found.emptied_percent >= 99.0
     assert found.spilled_ml == 0.0
-    # Until it is turned over on purpose the surface stays below the lip.
+    # The water surface stays below the lip until the cup is turned over to pour.
     (turned,) = (task.order for task in program.tasks if task.name == POURING)
     assert isinstance(turned, FollowPlan)
     plan = turned.plan
@@ -50,11 +50,11 @@ def check_poured(stage: Stage, program: Program) -> None:
     np.testing.assert_allclose(cup.T, stood.T, rtol=0, atol=1e-6)
 
 
-def test_all_of_it_gets_into_the_basin_and_none_on_the_table(stage: Stage) -> None:
+def test_all_water_reaches_the_basin_and_none_the_table(stage: Stage) -> None:
     check_poured(stage, planned(stage))
 
 
-def test_the_script_that_comes_along_is_the_demo() -> None:
+def test_the_script_of_the_library_is_the_demo() -> None:
     path = Path(katana450.extensions.programs.__file__).parent / "library" / "pour.yaml"
     stored, demo = parse(path.read_text(encoding="utf-8")), parse(PourDemo().text)
     assert stored.expected == demo.expected
@@ -64,9 +64,9 @@ def test_the_script_that_comes_along_is_the_demo() -> None:
 @pytest.mark.parametrize(
     ("cup", "basin", "said"),
     [
-        ((740.0, 0.0), None, "cup cannot be taken where it stands"),
+        ((740.0, 0.0), None, "cup cannot be grasped at its place"),
         ((900.0, 0.0), None, "nothing carries it there"),
-        ((120.0, 0.0), None, "cup cannot be taken where it stands"),
+        ((120.0, 0.0), None, "cup cannot be grasped at its place"),
         (None, (740.0, 600.0), "cannot be emptied into basin"),
         ((220.0, 360.0), None, "cup would stand in basin"),
     ],

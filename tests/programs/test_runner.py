@@ -1,4 +1,4 @@
-"""Programs run on the real session: planned first, then followed, paused, stepped, stopped."""
+"""Tests of programs on the real session: planned, followed, paused, stepped and stopped."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ def program(stage: Stage) -> Program:
 
 
 def point(stage: Stage, state: State) -> np.ndarray:
-    """The tool point in the base frame [mm]."""
+    """Return the tool point in the base frame [mm]."""
     T = stage.plan_context.T_base_shoulder @ forward(
         stage.plan_context.arm.chain_to("tcp"), state.q
     )
     return np.asarray(1e3 * T[:3, 3])
 
 
-def test_it_does_what_the_script_says(stage: Stage, program: Program) -> None:
+def test_the_run_follows_the_script(stage: Stage, program: Program) -> None:
     run, states = stage.play(program, stage.begin())
     assert (run.phase, run.why) == (Phase.DONE, "")
     rests = [
@@ -74,7 +74,7 @@ def test_it_does_what_the_script_says(stage: Stage, program: Program) -> None:
     assert states[-1].gripper == stage.plan_context.arm.gripper.upper
 
 
-def test_lines_round_their_corners_and_rest_at_their_end(stage: Stage) -> None:
+def test_lines_have_rounded_corners_and_end_at_rest(stage: Stage) -> None:
     text = (
         "tool: tcp\nframe: base\nsteps:\n  - move: {x: 320, y: -40, z: 150, pitch: 50, roll: 0}\n"
         "  - lines: {through: [{x: 320, y: 40, z: 150}, {x: 360, y: 40, z: 150, pitch: 60}, "
@@ -97,7 +97,7 @@ def test_lines_round_their_corners_and_rest_at_their_end(stage: Stage) -> None:
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
 
-def test_a_timeline_has_the_arm_where_the_run_has_it(stage: Stage, program: Program) -> None:
+def test_a_timeline_agrees_with_the_run(stage: Stage, program: Program) -> None:
     timeline = Timeline.of(program)
     (first, _), *_, (last, fingers) = timeline.postures(5)
     assert np.array_equal(first, program.start)
@@ -112,7 +112,7 @@ def test_a_timeline_has_the_arm_where_the_run_has_it(stage: Stage, program: Prog
         assert np.abs(run_by - q).max(axis=1).min() < 0.02
 
 
-def test_every_plan_is_clear_and_meets_the_next(program: Program) -> None:
+def test_every_plan_is_clear_and_joins_the_next(program: Program) -> None:
     q = program.start
     for task in program.tasks:
         if isinstance(task.order, FollowPlan):
@@ -130,7 +130,9 @@ def test_a_run_is_the_same_each_time(stage: Stage, program: Program) -> None:
     assert all((a.q == b.q).all() for a, b in zip(one, other, strict=True))
 
 
-def test_a_pause_keeps_to_the_way_and_waits_no_time_away(stage: Stage, program: Program) -> None:
+def test_a_pause_stays_on_the_path_and_does_not_count_as_waiting(
+    stage: Stage, program: Program
+) -> None:
     whole = stage.play(program, stage.begin())[1]
     state, run = stage.begin(), Run(0.0)
     for _ in range(100):
@@ -148,7 +150,7 @@ def test_a_pause_keeps_to_the_way_and_waits_no_time_away(stage: Stage, program: 
 
 
 @pytest.mark.parametrize("cleared", [False, True])
-def test_patience_begins_where_the_way_is_blocked(stage: Stage, cleared: bool) -> None:
+def test_the_timeout_begins_when_the_path_is_blocked(stage: Stage, cleared: bool) -> None:
     script = parse("steps:\n  - joints: [60, -68, 85, 8, 0]")
     program = compiled(script, stage.plan_context, stage.begin(), speed=0.03)
     at = np.eye(4)
@@ -167,7 +169,7 @@ def test_patience_begins_where_the_way_is_blocked(stage: Stage, cleared: bool) -
     while run.phase is Phase.RUNNING:
         run, state = stage.tick(program, run, state)
     assert run.phase is (Phase.DONE if cleared else Phase.FAILED)
-    assert ("and wall would meet" in run.why) is not cleared
+    assert ("and wall would collide" in run.why) is not cleared
 
 
 def test_steps_are_taken_one_at_a_time(stage: Stage, program: Program) -> None:
@@ -184,7 +186,7 @@ def test_steps_are_taken_one_at_a_time(stage: Stage, program: Program) -> None:
     assert rests == [6, 7, 8, 9, 10, 11, 12]
 
 
-def test_stop_ends_it_and_so_does_a_person(stage: Stage, program: Program) -> None:
+def test_stop_and_a_person_end_the_run(stage: Stage, program: Program) -> None:
     for end in ("stop", "halt", "elsewhere"):
         state, run = stage.begin(), Run(0.0)
         for _ in range(60):
@@ -205,15 +207,15 @@ def test_stop_ends_it_and_so_does_a_person(stage: Stage, program: Program) -> No
         assert not (state.q == program.start).all()
 
 
-def test_an_arm_that_stands_elsewhere_does_not_begin(stage: Stage, program: Program) -> None:
+def test_an_arm_away_from_the_start_does_not_begin(stage: Stage, program: Program) -> None:
     state = stage.session.begin(stage.session.ready + 0.01, 0.0, 0.0)
     run, states = stage.play(program, state)
     assert run.phase is Phase.FAILED
-    assert "stand" in run.why
+    assert "start" in run.why
     assert (states[-1].q == state.q).all()
 
 
-def test_speed_is_a_share_of_the_scripts_own(stage: Stage) -> None:
+def test_speed_is_a_fraction_of_the_scripts_own(stage: Stage) -> None:
     script = parse("speed: 0.5\nsteps:\n  - joints: [20, -60, 85, 8, 0]")
     fast, slow = (
         compiled(script, stage.plan_context, stage.begin(), speed) for speed in (1.0, 0.5)
@@ -230,14 +232,14 @@ def test_speed_is_a_share_of_the_scripts_own(stage: Stage) -> None:
         ("  - move: {x: 900, y: 0, z: 0}", 2, "cannot be at"),
         ("  - line: {by: {x: 500}}", 2, "reach"),
         ("  - home\n  - line: {by: {z: -285}}", 3, "table"),
-        ("  - gripper: 90", 2, "fingers go from"),
+        ("  - gripper: 90", 2, "range of the fingers"),
         ("  - tool: hammer", 2, "no tool"),
         ("  - home\n  - line: {by: {y: 0}}", 3, "line moves nothing"),
         ("  - arc: {centre: [400, 0, 200], axis: x, angle: 0}", 2, "arc moves nothing"),
         ("  - circle: {centre: [900, 0, 0], normal: x, radius: 50}", 2, "reach"),
     ],
 )
-def test_a_step_that_cannot_be_is_refused_with_its_line(
+def test_an_impossible_step_is_refused_with_its_line(
     stage: Stage, steps: str, line: int, said: str
 ) -> None:
     with pytest.raises(ScriptError, match=said) as told:
@@ -252,13 +254,13 @@ def test_repetitions_are_planned_once(stage: Stage) -> None:
     )
     program = compiled(parse(text), stage.plan_context, stage.begin())
     plans = {id(task.order.plan) for task in program.tasks if isinstance(task.order, FollowPlan)}
-    # The fingers are neither open nor closed at first, so that round is one of its own.
+    # The fingers are neither open nor closed at first, so the first repetition differs.
     assert len(plans) == 4
     assert program.steps == 160
 
 
 @pytest.mark.parametrize("path", LIBRARY, ids=lambda path: path.stem)
-def test_the_scripts_that_come_along_can_be_read(path: Path) -> None:
+def test_the_scripts_of_the_library_can_be_read(path: Path) -> None:
     script = parse(path.read_text(encoding="utf-8"))
     assert script.name
     assert replace(script, name="x").steps

@@ -1,4 +1,4 @@
-"""What a script may say, and how a person is told what is wrong with one."""
+"""Tests of the script parser and of its error messages."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
     [
         ("steps: []", 1, "list of steps"),
         ("", 1, "empty"),
-        ("just words", 1, "names with values"),
+        ("just words", 1, "mapping of names to values"),
         ("steps:\n  - fly: 3", 2, "no step 'fly'"),
         ("steps:\n  - hme", 2, "did you mean 'home'"),
-        ("steps:\n  - home: 3", 2, "nothing stands behind"),
+        ("steps:\n  - home: 3", 2, "takes no value"),
         ("steps:\n  - wait: .nan", 2, "number"),
         ("steps:\n  - wait: nan", 2, "number"),
         ("steps:\n  - wait: -1", 2, "not between"),
@@ -72,7 +72,7 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps:\n  - joints: [1, 2, 3]", 2, "list of 5"),
         ("steps:\n  - joints: [1, 2, 3, 4, x]", 2, "'x'"),
         ("steps:\n  - line: {to: {x: 1, y: 2}}", 2, "needs 'z'"),
-        ("steps:\n  - line: {to: [1, 2, 3], by: [1, 2, 3]}", 2, "`to` a point or `by`"),
+        ("steps:\n  - line: {to: [1, 2, 3], by: [1, 2, 3]}", 2, "`to` or `by`, not both"),
         ("steps:\n  - lines: {through: [[1, 2, 3]]}", 2, "list of 2 to 50"),
         (
             "steps:\n  - lines: {through: [{x: 1, y: 2, z: 3}, {joints: [1, 2, 3, 4, 5]}]}",
@@ -80,7 +80,7 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
             "`via`",
         ),
         ("steps:\n  - arc:\n      axis: x\n      angle: 20", 3, "needs 'centre'"),
-        ("steps:\n  - arc: {centre: [1, 2, 3], axis: [0, 0, 0], angle: 3}", 2, "not zero"),
+        ("steps:\n  - arc: {centre: [1, 2, 3], axis: [0, 0, 0], angle: 3}", 2, "must not be zero"),
         ("steps:\n  - move: nowhere", 2, "no pose 'nowhere'"),
         ("steps:\n  - {home: , wait: 1}", 2, "one name"),
         ("steps:\n  - repeat: {times: 1001, steps: [home]}", 2, "not between"),
@@ -135,18 +135,18 @@ TREES = st.recursive(
 
 
 def wrong_with(text: str) -> tuple[Problem, ...]:
-    """What is, or nothing; whatever else is raised fails the test."""
+    """Return the problems of a text, none if it is valid; any other exception fails the test."""
     try:
         script = parse(text)
     except ScriptError as error:
         return error.problems
-    # A script that can be read has something to do.
+    # A valid script has at least one step.
     return () if script.steps else (Problem(0, 0, "no steps"),)
 
 
 @settings(max_examples=60, deadline=None)
 @given(TREES)
-def test_no_tree_of_values_is_more_than_an_error(tree: object) -> None:
+def test_any_tree_of_values_is_read_or_refused(tree: object) -> None:
     text = json.dumps({"steps": tree})
     problems = wrong_with(text)
     assert all(problem.line >= 1 and problem.column >= 1 for problem in problems)
@@ -159,7 +159,7 @@ def test_no_tree_of_values_is_more_than_an_error(tree: object) -> None:
 @example("\ud800")
 @example("%YAML 3.0\n---\nsteps: [home]")
 @example("steps: [home]\n---\nsteps: [home]")
-def test_no_text_is_more_than_an_error(text: str) -> None:
+def test_any_text_is_read_or_refused(text: str) -> None:
     assert all(problem.line >= 1 for problem in wrong_with(text))
 
 

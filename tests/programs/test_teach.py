@@ -1,4 +1,4 @@
-"""What a person teaches is a script that goes where they showed."""
+"""Tests of scripts from taught postures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_a_taught_script_goes_through_the_postures(stage: Stage) -> None:
     assert np.abs(np.array(ends) - postures).max() < np.radians(6e-4)
 
 
-def test_a_saved_script_is_among_those_to_choose(tmp_path: Path) -> None:
+def test_a_saved_script_is_listed(tmp_path: Path) -> None:
     scripts = Scripts(tmp_path)
     text = script_from_postures("Mine", [np.zeros(5)])
     scripts.save("Mine", text)
@@ -37,7 +37,7 @@ def test_a_saved_script_is_among_those_to_choose(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "../out", "a/b", ".hidden", "x" * 41, "a\nb", "Mine"])
-def test_a_name_that_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
+def test_an_invalid_name_is_refused(tmp_path: Path, name: str) -> None:
     scripts = Scripts(tmp_path)
     scripts.save("Mine", "steps: [home]")
     with pytest.raises(InputError):
@@ -48,7 +48,7 @@ def test_a_name_that_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
 def test_without_a_folder_nothing_is_saved(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--programs"):
         Scripts().save("Mine", "steps: [home]")
-    with pytest.raises(InputError, match="any more"):
+    with pytest.raises(InputError, match="no longer exists"):
         Scripts().text("Mine")
     with pytest.raises(ConfigurationError, match="--programs"):
         Scripts(tmp_path / "none")

@@ -75,7 +75,7 @@ def test_panel_previews_steers_and_teaches(
     # The first choice is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
     panel.follow()
-    way = panel._preview._way
+    way = panel._preview._path_line
     assert not way.visible
     plan_context = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n"

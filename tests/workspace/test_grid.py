@@ -1,4 +1,4 @@
-"""Every voxel that may hold a reachable point is looked at once."""
+"""Tests of the voxel grid: every voxel that may have a reachable point is visited once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_every_point_of_the_ball_above_the_table_is_in_a_voxel(grid: VoxelGrid) 
     for _ in range(200):
         direction = rng.normal(size=3)
         point = CENTER + REACH * rng.uniform() * direction / np.linalg.norm(direction)
-        # The lowest layer begins half a voxel round the table.
+        # The lowest layer begins within half a voxel of the table.
         if point[2] >= 0.1 + 0.5 * grid.size:
             gap = np.abs(centers - point).max(axis=1)
             assert gap.min() <= 0.5 * grid.size + 1e-12
@@ -38,7 +38,7 @@ def test_no_voxel_is_below_the_table_and_none_is_missing(grid: VoxelGrid) -> Non
     assert np.allclose(np.diff(heights), grid.size)
 
 
-def test_corners_are_multiples_of_the_edge_wherever_the_arm_stands(grid: VoxelGrid) -> None:
+def test_corners_are_multiples_of_the_edge_for_any_place_of_the_arm(grid: VoxelGrid) -> None:
     corners = grid.centers(range(len(grid))) / grid.size - 0.5
     assert np.allclose(corners, np.rint(corners), atol=1e-9)
 
@@ -52,14 +52,14 @@ def test_chunks_are_all_voxels_once_in_order(grid: VoxelGrid) -> None:
 
 
 @pytest.mark.parametrize("size", [0.0, -0.01, 1e-4, 1.0, math.nan, math.inf])
-def test_a_voxel_that_makes_no_grid_is_refused(size: float) -> None:
-    with pytest.raises(InputError, match="makes no map; choose one from 1 to 250 mm"):
+def test_an_invalid_voxel_is_refused(size: float) -> None:
+    with pytest.raises(InputError, match="it must be from 1 to 250 mm"):
         VoxelGrid.around(CENTER, REACH, size, table=0.0)
 
 
 @pytest.mark.parametrize("table", [0.55, 2.0, math.nan, math.inf, -math.inf])
-def test_a_table_that_leaves_nothing_is_refused(table: float) -> None:
-    with pytest.raises(InputError, match="comes up to 550 mm"):
+def test_a_table_above_the_reach_is_refused(table: float) -> None:
+    with pytest.raises(InputError, match="reaches up to 550 mm"):
         VoxelGrid.around(CENTER, REACH, 0.04, table)
 
 

@@ -1,4 +1,4 @@
-"""A whole map: the same from the same seed, whatever the chunks and their order."""
+"""Tests of a whole map: the same seed gives the same map, for any chunks in any order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def survey(arm: MountedArm) -> Survey:
     return Survey(reachability, voxel=0.16, samples=60, seed=9)
 
 
-def test_a_map_holds_what_its_voxels_count(survey: Survey) -> None:
+def test_a_map_has_the_counts_of_its_voxels(survey: Survey) -> None:
     found = survey.map(survey.count(chunk) for chunk in survey.chunks())
     assert len(found.points) > 50
     assert np.array_equal(found.fraction * 12, survey.reachability.count(found.points))
@@ -56,14 +56,14 @@ def test_the_cloud_is_the_tool_at_random_joint_angles(survey: Survey, arm: Mount
 
 
 @pytest.mark.parametrize(("samples", "seed"), [(-1, 0), (0, -1), (10**12, 0), (0, 2**63)])
-def test_numbers_that_cannot_be_are_refused_before_the_work(
+def test_invalid_numbers_are_refused_before_the_work(
     survey: Survey, samples: int, seed: int
 ) -> None:
-    with pytest.raises(InputError, match=r"is -?\d+; give 0 to \d+"):
+    with pytest.raises(InputError, match=r"is -?\d+; it must be from 0 to \d+"):
         Survey(survey.reachability, 0.1, samples, seed)
 
 
-def test_colours_grow_lighter_with_the_share() -> None:
+def test_colours_grow_lighter_with_the_fraction() -> None:
     colors = share_colors(np.array([0.0, 0.1, 0.2, 0.3])).astype(int)
     assert (np.diff(colors.sum(axis=1)) > 0).all()
     assert np.array_equal(colors, share_colors(2.0 * np.array([0.0, 0.1, 0.2, 0.3])))

@@ -1,4 +1,4 @@
-"""The count of orientations, against forward kinematics and against the projection."""
+"""Tests of the count of orientations, against forward kinematics and against the projection."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def rotation_x(angle: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0), (0.0, 0.02), (0.03, -0.01)])
-def test_what_forward_kinematics_reaches_is_counted(
+def test_orientations_from_forward_kinematics_are_counted(
     arm: MountedArm, offset: tuple[float, float]
 ) -> None:
-    """Postures inside the limits with the tool level and unrolled: that one orientation counts.
+    """Postures inside the limits with the tool level and unrolled: this orientation counts.
 
-    offset: of the tool point from the roll axis, sideways and up [m].
+    ``offset`` is the offset of the tool point from the roll axis, sideways and up [m].
     """
     M = np.array(arm.chain.M)
     M[1:3, 3] += offset
@@ -56,7 +56,7 @@ def test_what_forward_kinematics_reaches_is_counted(
     q[:, 4] = 0.0
     q = q[(q[:, 3] >= chain.lower[3]) & (q[:, 3] <= chain.upper[3])]
     T = np.array([forward(chain, each) for each in q])
-    # Facing away from the point the tool points inward, which is pitch pi, not 0.
+    # With its back to the point, the arm has the tool inward, at pitch pi and not 0.
     outward = (T[:, :2, 0] * T[:, :2, 3]).sum(axis=1) > 0.0
     assert outward.sum() > 20
     assert (level.count(level.in_base(T[outward, :3, 3])) == 1).all()
@@ -71,7 +71,10 @@ def of_another_arm(name: str) -> Reachability:
 
 
 def of_a_member(seed: int, *, beside: bool = False) -> Reachability:
-    """One with every offset, also of the tool from the roll axis, and limits of its own."""
+    """Return a member of the family with every offset, and with limits of its own.
+
+    The tool is offset from the roll axis too.
+    """
     rng = np.random.default_rng(seed)
     stand = se3.from_rotation_translation(so3.rotation_z(0.7), np.array([0.1, -0.2, 0.3]))
     turned = se3.from_rotation_translation(so3.exp(rng.normal(size=3)), np.zeros(3))
@@ -108,10 +111,10 @@ def of_a_member(seed: int, *, beside: bool = False) -> Reachability:
         *("tool beside the roll axis", "another beside it"),
     ],
 )
-def test_the_count_is_that_of_poses_the_projection_leaves_alone(
+def test_the_count_is_that_of_poses_unchanged_by_the_projection(
     made: Callable[[MountedArm], Reachability], arm: MountedArm
 ) -> None:
-    """Both ways: nothing is counted that the arm cannot do, and nothing it can is left out."""
+    """The count has neither false orientations nor missing ones."""
     every = made(arm)
     chain, canonical = every.chain, arm_of(every.chain)
     q = postures_inside(chain, 5, 7)
@@ -130,7 +133,7 @@ def test_the_count_is_that_of_poses_the_projection_leaves_alone(
     assert every.count(every.in_base(inside)).max() > 0
 
 
-def test_a_point_on_axis_1_can_be_asked_for(arm: MountedArm) -> None:
+def test_a_point_on_axis_1_can_be_counted(arm: MountedArm) -> None:
     every = reachability(arm)
     above = np.array([[0.0, 0.0, 0.8], [1e-12, 0.0, 0.8]])
     counts = every.count(above)
@@ -138,7 +141,7 @@ def test_a_point_on_axis_1_can_be_asked_for(arm: MountedArm) -> None:
     assert counts[0] == counts[1]
 
 
-def test_what_lies_below_the_table_or_too_far_is_not_counted(arm: MountedArm) -> None:
+def test_points_below_the_table_or_out_of_reach_are_not_counted(arm: MountedArm) -> None:
     point = np.array([[0.3, 0.1, 0.3]])
     assert reachability(arm, table=0.29).count(point)[0] > 0
     assert reachability(arm, table=0.31).count(point)[0] == 0
@@ -149,8 +152,8 @@ def test_what_lies_below_the_table_or_too_far_is_not_counted(arm: MountedArm) ->
     assert reachability(arm).count(np.empty((0, 3))).shape == (0,)
 
 
-def test_elbow_and_wrist_keep_off_the_table(arm: MountedArm) -> None:
-    """Against each link moved from home: clear is what has both points on the table or above."""
+def test_elbow_and_wrist_stay_above_the_table(arm: MountedArm) -> None:
+    """Compare with each link moved from home: both points must not be below the table."""
     chain = arm.chain
     q = postures_inside(chain, 300, 11)
     points = [screws.point_on(S) for S in chain.S.T]
@@ -177,14 +180,14 @@ def test_a_higher_table_never_helps(arm: MountedArm) -> None:
 
 
 def test_rolls_are_those_that_axis_5_can_turn(arm: MountedArm) -> None:
-    """From -164.5 to 171.5 degrees, with only the front shoulder inside the limits."""
+    """Axis 5 turns from -164.5 to 171.5 deg, and only the front shoulder is inside the limits."""
     whole_degrees = reachability(arm, pitches=1, rolls=360)
     p = forward(whole_degrees.chain, np.array([0.0, -0.8, 1.2, -0.4, 0.0]))[None, :3, 3]
     assert whole_degrees.count(whole_degrees.in_base(p)).tolist() == [336]
 
 
 def test_every_limit_counts(arm: MountedArm) -> None:
-    """Each joint's limits alone take orientations away, and wider ones give them back."""
+    """The limits of each joint reduce the orientations, and wider limits restore them."""
     chain = arm.chain
     points = np.random.default_rng(5).uniform([-0.4, -0.4, 0.1], [0.4, 0.4, 0.6], (25, 3))
 
@@ -202,14 +205,14 @@ def test_every_limit_counts(arm: MountedArm) -> None:
 
 
 @pytest.mark.parametrize("steps", [0, -1, MAX_STEPS + 1])
-def test_steps_that_are_none_are_refused(arm: MountedArm, steps: int) -> None:
+def test_invalid_steps_are_refused(arm: MountedArm, steps: int) -> None:
     with pytest.raises(InputError, match="number of pitches"):
         reachability(arm, pitches=steps)
     with pytest.raises(InputError, match="number of rolls"):
         reachability(arm, rolls=steps)
 
 
-def test_an_arm_that_does_not_stand_upright_is_refused(arm: MountedArm) -> None:
+def test_an_arm_that_is_not_upright_is_refused(arm: MountedArm) -> None:
     leaning = np.array(arm.T_base_shoulder)
     leaning[:3, :3] = rotation_x(0.1)
     with pytest.raises(RobotDescriptionError, match="axis 1 must be upright"):

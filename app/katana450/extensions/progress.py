@@ -1,4 +1,4 @@
-"""A progress bar on a terminal; silence anywhere else."""
+"""A progress bar on a terminal; no output on other streams."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PERIOD = 0.1  # s between two drawings
 def progress(
     items: Iterable[T], total: int, label: str, stream: TextIO | None = None
 ) -> Iterator[T]:
-    """Pass on `items`, of which there are `total`, and show how many have been passed."""
+    """Yield ``items``, of which there are ``total``, and show the fraction that was yielded."""
     stream = stream or sys.stderr
     if not stream.isatty():
         yield from items
@@ -41,7 +41,7 @@ def _line(label: str, done: int, total: int, elapsed: float) -> str:
     filled = int(fraction * _WIDTH)
     left = f"{_clock(elapsed * (1.0 - fraction) / fraction)} left" if fraction else ""
     bar = "#" * filled + "." * (_WIDTH - filled)
-    # Trailing blanks wipe what a longer line before left behind.
+    # Trailing blanks overwrite the rest of a longer line.
     return f"\r{label} [{bar}] {fraction:4.0%}  {left:<14}"
 
 

@@ -1,1 +1,1 @@
-"""Scripts and demos run from the command line: on a server, or simulated with a report."""
+"""Commands that run scripts and demos: on a server, or simulated with a report."""

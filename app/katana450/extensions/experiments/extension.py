@@ -1,4 +1,4 @@
-"""The extension ``experiments``: the commands that run a script, or an experiment of the paper."""
+"""The extension ``experiments``: commands that run a script, or an experiment of the paper."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from katana450.extensions.programs.pour import PourDemo
 from katana450.resources import URDF_PATH
 
 URL = "http://127.0.0.1:8080"
+"""Default address of the server."""
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``run`` to ``parser``."""
+    """Add the options of ``katana450 run`` to ``parser``."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a script; see docs/programs.md")
     _add_common(parser)
 
@@ -23,7 +24,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 def add_demo_options(parser: argparse.ArgumentParser) -> None:
     """Add the demos and their options to ``parser``."""
     demos = parser.add_subparsers(dest="demo", required=True, metavar="DEMO")
-    circle = demos.add_parser("circle", help="the paper's circle, or any other")
+    circle = demos.add_parser("circle", help="the circle of the paper, or any other circle")
     default = CircleDemo()
     circle.add_argument(
         "--centre",
@@ -45,7 +46,7 @@ def add_demo_options(parser: argparse.ArgumentParser) -> None:
         "--tool",
         choices=("flange", "tcp", "grasp"),
         default=default.tool,
-        help="flange, of an arm without its gripper, or a tool frame between the fingers",
+        help="flange (the arm without its gripper), or a tool frame between the fingers",
     )
     circle.add_argument(
         "--pitch",
@@ -64,35 +65,37 @@ def add_demo_options(parser: argparse.ArgumentParser) -> None:
             f"--{name}",
             type=_spot,
             metavar="X,Y",
-            help=f"mm on the table, where the {name} stands (default: where it is)",
+            help=f"place of the {name} on the table in mm (default: unchanged)",
         )
     pour.add_argument(
-        "--shake", type=int, default=water.shake, metavar="N", help="times (default: 3)"
+        "--shake", type=int, default=water.shake, metavar="N", help="number of shakes (default: 3)"
     )
     _add_common(pour)
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--headless", action="store_true", help="no server and no browser: on a clock of its own"
+        "--headless", action="store_true", help="simulate, without server and browser"
     )
-    parser.add_argument("--dry-run", action="store_true", help="only plan it and tell what it does")
+    parser.add_argument("--dry-run", action="store_true", help="only plan, and print the tasks")
     parser.add_argument(
-        "--report", type=Path, metavar="DIR", help="figures, measures and a table of the run"
+        "--report", type=Path, metavar="DIR", help="write figures, measures and a table of the run"
     )
     parser.add_argument(
         "--speed", type=_fraction, default=1.0, help="fraction of its own speed (default: 1)"
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="of the ways round what is in between (default: 0)"
+        "--seed", type=int, default=0, help="seed of the paths round obstacles (default: 0)"
     )
     parser.add_argument(
         "--url",
         default=URL,
-        help="of the server that has the arm (default: %(default)s); where none answers on this "
-        "machine, one is started",
+        help="address of the server (default: %(default)s); if none answers on this machine, "
+        "one is started",
     )
-    parser.add_argument("--token", default="", help="of an access link, where one is asked for")
+    parser.add_argument(
+        "--token", default="", help="token of an access link, if the server needs one"
+    )
     parser.add_argument(
         "--urdf", type=Path, default=URDF_PATH, metavar="FILE", help="another arm, for --headless"
     )
@@ -101,17 +104,17 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
 def _spot(text: str) -> tuple[float, float]:
     parts = text.split(",")
     if len(parts) != 2:
-        raise argparse.ArgumentTypeError(f"two numbers X,Y in mm, not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected two numbers X,Y in mm, not {text!r}")
     return _number(parts[0]), _number(parts[1])
 
 
 def _fraction(text: str) -> float:
-    # Loads numpy, so only where a speed is given.
+    # Imported here, because it loads numpy.
     from katana450.arm.control.commands import MIN_SPEED
 
     value = _number(text)
     if not MIN_SPEED <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"a fraction from {MIN_SPEED} to 1, not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected a fraction from {MIN_SPEED} to 1, not {text!r}")
     return value
 
 
@@ -121,14 +124,14 @@ def _number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"a number, not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected a number, not {text!r}")
     return value
 
 
 def _point(text: str) -> tuple[float, float, float]:
     parts = text.split(",")
     if len(parts) != 3:
-        raise argparse.ArgumentTypeError(f"three numbers with commas between, not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected three comma-separated numbers, not {text!r}")
     x, y, z = (_number(part) for part in parts)
     return x, y, z
 

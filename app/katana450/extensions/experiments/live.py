@@ -1,4 +1,4 @@
-"""A script run on a server, with its progress in the terminal; one is started where none is."""
+"""Execution of a script on a server, with progress in the terminal; starts a server if needed."""
 
 from __future__ import annotations
 
@@ -19,38 +19,39 @@ from katana450.platform_support import without_interrupts
 from katana450.server.api import answers
 
 NAME = "Terminal"
-"""As which others see who started the program."""
+"""Name of this client, which others see as the owner of the program."""
 
-PART = 150
-"""Characters of a script sent at once: a request stays small whatever they are."""
+PART_CHARACTERS = 150
+"""Maximum number of characters of a script per request."""
 
-HZ = 10.0
-"""States a second that are asked for."""
+STATE_RATE = 10.0
+"""[Hz] Rate of the states that are requested."""
 
-STARTED = 60.0
-"""[s] By then a server of ours is there."""
+START_TIMEOUT = 60.0
+"""[s] Timeout for the start of a server."""
 
-ENDED = ("done", "stopped", "failed", "refused", "cancelled")
+END_STATUSES = ("done", "stopped", "failed", "refused", "cancelled")
+"""Statuses of a program that has ended."""
 
 
 def run_live(text: str, script: Script, options: Namespace) -> int:
-    """Run ``text`` on the server at ``options.url``; returns the exit status."""
+    """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError."""
     with _server(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             _send(arm, text, options.speed)
             arm.ask(Steer(order=ProgramOrder.RUN))
             return _follow(arm)
         except KeyboardInterrupt:
-            # Before all of the script is sent there is nothing to end.
+            # Refused if the script is not completely sent, because then no program exists.
             with suppress(RefusedError):
                 arm.ask(Steer(order=ProgramOrder.END))
-            print("\nkatana450: the program is ended; the arm holds.", file=sys.stderr)
+            print("\nkatana450: the program has ended; the arm holds.", file=sys.stderr)
             return 130
 
 
 def _send(arm: Client, text: str, speed: float) -> None:
-    """Have it planned. Raises KatanaError with what is wrong with it."""
-    parts = [text[at : at + PART] for at in range(0, len(text), PART)] or [""]
+    """Send the script and wait until it is planned. Raises KatanaError with its errors."""
+    parts = [text[at : at + PART_CHARACTERS] for at in range(0, len(text), PART_CHARACTERS)] or [""]
     for part in parts[:-1]:
         arm.ask(Program(text=part, more=True))
     arm.ask(Program(text=parts[-1], speed=speed))
@@ -58,17 +59,17 @@ def _send(arm: Client, text: str, speed: float) -> None:
         if now.steps and sys.stderr.isatty():
             line = f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}"
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
-        time.sleep(1.0 / HZ)
+        time.sleep(1.0 / STATE_RATE)
     if now is None or now.status != "ready":
         raise KatanaError(now.why if now is not None else "The server has forgotten the script.")
     print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
 
 
 def _follow(arm: Client) -> int:
-    """Tell how it goes, until it has ended."""
+    """Print the progress of the program until it ends. Raises KatanaError if it fails."""
     shown = ""
     terminal = sys.stderr.isatty()
-    for state in arm.states(HZ):
+    for state in arm.states(STATE_RATE):
         now = state.program
         if now is None:
             raise LostError("The server has forgotten the program.")
@@ -80,7 +81,7 @@ def _follow(arm: Client) -> int:
         elif f"{now.step} {now.task}" != shown:
             shown = f"{now.step} {now.task}"
             print(line, flush=True)
-        if now.status in ENDED:
+        if now.status in END_STATUSES:
             if terminal:
                 print(file=sys.stderr)
             if now.status == "done":
@@ -92,7 +93,7 @@ def _follow(arm: Client) -> int:
 
 @contextmanager
 def _server(script: Script, options: Namespace) -> Iterator[str]:
-    """The address of the server that is there, or of one that lasts as long as this."""
+    """Return the address of the running server, or of one that is started for this block."""
     try:
         with connect(options.url, "Look", options.token):
             pass
@@ -103,7 +104,7 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
         yield options.url
         return
     port = str(urlsplit(options.url).port)
-    # -P: Python does not search the current folder, where an `app.py` of the user's may lie.
+    # -P: Python does not search the current folder, which may contain an `app.py`.
     python = [sys.executable, "-P", "-m", "katana450"]
     command = [*python, "serve", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
@@ -111,7 +112,7 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **without_interrupts())
     try:
         _wait_for(server)
-        print(f"Open {options.url} in a browser to see it.", flush=True)
+        print(f"Open {options.url} in a browser to watch it.", flush=True)
         yield options.url
     finally:
         server.terminate()
@@ -119,17 +120,17 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
 
 
 def _may_start_at(url: str) -> bool:
-    """Return whether a server of ours can be started there: this machine, by number, and plain."""
+    """Return whether a server can be started at ``url``: http, on this machine, with a port."""
     parts = urlsplit(url)
     return parts.scheme == "http" and parts.hostname == "127.0.0.1" and parts.port is not None
 
 
 def _wait_for(server: subprocess.Popen[str]) -> None:
     assert server.stdout is not None
-    due = time.monotonic() + STARTED
+    due = time.monotonic() + START_TIMEOUT
     for line in server.stdout:
         if "is ready" in line:
             return
         if time.monotonic() > due:
             break
-    raise ConfigurationError("The server did not start; see above.")
+    raise ConfigurationError("The server did not start. See its messages above.")

@@ -1,4 +1,4 @@
-"""``katana450 run`` and ``katana450 demo``: a script rehearsed here, or run on a server."""
+"""``katana450 run`` and ``katana450 demo``: simulate a script, or run it on a server."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from katana450.extensions.programs.source import ScriptError
 
 
 def run(options: Namespace) -> int:
-    """``katana450 run``."""
+    """Execute ``katana450 run``; return the exit status."""
     return _run(text_of(options.file), str(options.file), options)
 
 
 def demo(options: Namespace) -> int:
-    """``katana450 demo``."""
+    """Execute ``katana450 demo``; return the exit status."""
     if options.demo == "pour":
         text = PourDemo(options.water, options.cup, options.basin, options.shake).text
     else:

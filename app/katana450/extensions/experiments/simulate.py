@@ -1,4 +1,4 @@
-"""A script run without server and browser, on a clock of its own, and what is told of it."""
+"""Simulation of a script on a simulated clock, without server and browser, and its report."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from katana450.extensions.programs.script import Script
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
+"""Note on a simulation without gripper."""
 
 
 def simulate(script: Script, options: Namespace) -> int:
-    """Plan it, and unless that is all run it on a clock of its own and report."""
+    """Plan ``script``, run it unless only planning is requested, and report; return the status."""
     plan = plan_script(script, options.urdf, options.seed, options.speed)
     program, robot = plan.program, plan.robot
     notes = (BARE,) if script.bare else ()
     for note in notes:
         print(note)
     if options.dry_run:
-        _tell(program)
+        _print_tasks(program)
         return 0
     simulation = run_by_clock(plan)
     facts = {
@@ -42,7 +43,7 @@ def simulate(script: Script, options: Namespace) -> int:
     print(f"{script.name}: {len(report.trace.t)} ticks, {report.trace.t[-1]:.2f} s.")
     print("\n".join(f"  {line}" for line in report.lines))
     if options.report is not None:
-        # The pictures of a report are all that needs the renderer.
+        # Imported here, because only the pictures of a report need the renderer.
         from katana450.extensions.media.report_pictures import stage_pictures
 
         pictures = stage_pictures(
@@ -52,20 +53,20 @@ def simulate(script: Script, options: Namespace) -> int:
         print(f"Report: {options.report / 'report.html'}")
     for bound in report.bounds:
         if not bound.held:
-            print(f"katana450: a bound is missed: {bound}", file=sys.stderr)
+            print(f"katana450: a bound is not met: {bound}", file=sys.stderr)
     return 0 if report.held else 1
 
 
-def _tell(program: Program) -> None:
-    """Each task with its line, its time and the nearest it comes to anything."""
+def _print_tasks(program: Program) -> None:
+    """Print each task with its line, duration, length and minimum clearance."""
     for task in program.tasks:
-        said = ""
+        details = ""
         if isinstance(task.order, FollowPlan):
             plan = task.order.plan
-            said = f"{plan.duration:.2f} s, {1e3 * plan.length:.0f} mm"
+            details = f"{plan.duration:.2f} s, {1e3 * plan.length:.0f} mm"
             if plan.nearest is not None:
                 one, other = map(part, plan.nearest.contact.parts)
                 apart = 1e3 * plan.nearest.contact.distance
-                said += f", {apart:.0f} mm from {one} to {other}"
-        print(f"line {task.line:>4}  {task.name:<24} {said}".rstrip())
+                details += f", {apart:.0f} mm from {one} to {other}"
+        print(f"line {task.line:>4}  {task.name:<24} {details}".rstrip())
     print(f"{program.steps} steps, {program.duration:.2f} s of motion at full speed.")

@@ -1,1 +1,1 @@
-"""Files for other programs."""
+"""Export of the robot, its motions and runs to files for other programs."""

@@ -1,7 +1,7 @@
-"""A robot as C: the paper's three arrays a link, a function that draws it, and a viewer.
+"""A robot as C source: the paper's three arrays per link, a draw function, and a viewer.
 
-A link's arrays are `vertices[][3]`, `normals[][3]` and `face_indices[][9]`: for each triangle the
-numbers of its vertices, of its normals and of its texture points, which no link has.
+The arrays of a link are `vertices[][3]`, `normals[][3]` and `face_indices[][9]`: for each triangle
+the numbers of its vertices, of its normals and of its texture points, which no link has.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from katana450.extensions.export.rows import distinct_rows
 from katana450.maths.geometry.arrays import FloatArray
 
 TEMPLATES = ("viewer.c", "Makefile", "CMakeLists.txt")
+"""Files that are copied unchanged."""
 
 DIGITS, NORMAL_DIGITS = 5, 3
-"""Decimals of coordinates [m] and of normals."""
+"""Decimal places of coordinates [m] and of normals."""
 
 RESERVED = frozenset(
     [
@@ -33,11 +34,11 @@ RESERVED = frozenset(
         *("viewer", "main", "con", "prn", "aux", "nul"),
     ]
 )
-"""Words of C, the project's own files, and names Windows has no files of."""
+"""Keywords of C, file names of the project, and names that Windows reserves."""
 
 
 def c_files(robot: Robot, values: Mapping[str, float]) -> dict[str, bytes]:
-    """Name and content of every file; the viewer begins at the joint `values` [rad, m]."""
+    """Return name and content of every file; the viewer starts at the joint ``values`` [rad, m]."""
     links = [link for link in robot.links if link.shapes]
     names = dict(
         zip(
@@ -57,7 +58,7 @@ def c_files(robot: Robot, values: Mapping[str, float]) -> dict[str, bytes]:
 
 
 def _part(link: Link, name: str) -> dict[str, str]:
-    """The header and the source of one link."""
+    """Return the header and the source of one link."""
     vertices, at = distinct_rows([shape.vertices for shape in link.shapes], DIGITS)
     normals, along = distinct_rows([shape.normals for shape in link.shapes], NORMAL_DIGITS)
     firsts = np.cumsum([0] + [len(shape.vertices) for shape in link.shapes])
@@ -87,10 +88,10 @@ def _part(link: Link, name: str) -> dict[str, str]:
             f"extern {arrays[0]};",
             f"extern {arrays[1]};",
             "",
-            "/* Of each triangle: 3 vertices, 3 normals, 3 texture points (there are none). */",
+            "/* Per triangle: 3 vertices, 3 normals, 3 texture points (unused). */",
             f"extern {arrays[2]};",
             "",
-            "/* Draws it with its materials in the frame that is set. */",
+            "/* Draws the link with its materials in the current frame. */",
             f"void {name}_draw(void);",
             "",
             "#ifdef __cplusplus",
@@ -176,7 +177,7 @@ void NAME_draw(void)
 
 def _header(robot: Robot) -> str:
     return f"""\
-/* {_comment(robot.name)}: its joints, and a function that draws all of it. */
+/* {_comment(robot.name)}: its joints, and a function that draws the whole robot. */
 #ifndef ROBOT_H
 #define ROBOT_H
 
@@ -193,23 +194,23 @@ extern "C" {{
 #define ROBOT_NAME {_text(robot.name)}
 #define ROBOT_JOINTS {len(robot.driven)}
 
-/* slides: values are in m, else in rad. */
+/* slides: nonzero if values are in m, else they are in rad. */
 typedef struct {{
     const char *name;
     int slides;
     double lower, upper;
 }} robot_joint;
 
-/* The driven joints, and one more entry that stands for none. */
+/* The driven joints, and one empty entry at the end. */
 extern const robot_joint robot_joints[ROBOT_JOINTS + 1];
 
-/* Where the joints begin. */
+/* Start values of the joints. */
 extern const double robot_start[ROBOT_JOINTS + 1];
 
-/* A camera that sees all of it: metres in the frame of the base, z up; rad from top to bottom. */
+/* A camera that sees the whole robot: m in the base frame, z up; vertical field of view in rad. */
 extern const double robot_eye[3], robot_target[3], robot_field_of_view;
 
-/* Draws every link where the joint values put it. */
+/* Draws every link at the given joint values. */
 void robot_draw(const double q[]);
 
 #ifdef __cplusplus
@@ -262,11 +263,11 @@ void robot_draw(const double q[])
 
 
 def _drawn(robot: Robot, link: Link, names: Mapping[str, str]) -> Iterator[str]:
-    """Statements that draw a link and what hangs on it, and leave the frame changed."""
+    """Yield statements that draw a link and its children; they leave the frame changed."""
     yield f"    /* {_comment(link.name)} */"
     T = link.T_parent_link
     if not np.array_equal(T[:3, :3], np.eye(3)):
-        # OpenGL has its matrices column by column.
+        # OpenGL stores matrices by columns.
         numbers = ", ".join(_double(value) for value in T.T.ravel())
         yield f"    {{ static const double place[16] = {{{numbers}}}; glMultMatrixd(place); }}"
     elif T[:3, 3].any():
@@ -277,7 +278,7 @@ def _drawn(robot: Robot, link: Link, names: Mapping[str, str]) -> Iterator[str]:
         yield f"    {names[link.name]}_draw();"
     children = [child for child in robot.children(link) if _shows(robot, child)]
     for child in children:
-        # The last may spoil the frame, so a long chain needs no deep stack of matrices.
+        # The last child may change the frame, so a long chain needs no deep matrix stack.
         if child is children[-1]:
             yield from _drawn(robot, child, names)
         else:
@@ -320,7 +321,7 @@ def _triple(values: FloatArray) -> str:
 
 
 def _text(text: str) -> str:
-    """A string literal of C, whatever is in it."""
+    """Return ``text`` as a string literal of C, with any characters."""
     plain = (
         chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode()
     )

@@ -24,24 +24,26 @@ from katana450.extensions.export.vrml import vrml_files
 from katana450.resources import URDF_PATH
 
 ANIMATED_FORMATS = ("vrml", "glb")
-"""Formats a motion survives in."""
+"""Formats that can contain a motion."""
 
 OWN_LICENSE = "MIT"
-"""Licence of the Katana450's description, as of this project."""
+"""Licence of the Katana450's description, the same as of this project."""
 
 POSED_FORMATS = ("vrml", "c", "glb")
-"""Formats that stand in a pose."""
+"""Formats that are written at a pose."""
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write the files of one format; tell their names and sizes."""
+    """Write the files of one format; print their names and sizes. Raises InputError."""
     kind: str = options.format
     if options.trajectory is not None and kind not in ANIMATED_FORMATS:
-        raise InputError(f"A file of {kind} holds no motion; {' and '.join(ANIMATED_FORMATS)} do.")
+        raise InputError(
+            f"{kind} has no motion. Use --trajectory with {' or '.join(ANIMATED_FORMATS)}."
+        )
     if options.run is not None:
-        raise InputError(f"A file of {kind} holds no run; html does.")
+        raise InputError(f"{kind} has no run. Use --run with html.")
     if options.pose and kind not in POSED_FORMATS:
-        raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED_FORMATS)} do.")
+        raise InputError(f"{kind} has no pose. Use --pose with {', '.join(POSED_FORMATS)}.")
     robot = load(options.urdf)
     robot.check_complete()
     robot.read_shapes()
@@ -49,20 +51,20 @@ def export(options: argparse.Namespace) -> int:
         print(f"katana450: {note}", file=sys.stderr)
     values = robot.values(options.pose)
     motion = None if options.trajectory is None else load_motion(options.trajectory, robot)
-    made = _package(options) if kind == "urdf" else _made(kind, robot, values, motion)
+    files = _package(options) if kind == "urdf" else _files(kind, robot, values, motion)
     folder: Path = options.out
     try:
-        for path in {(folder / name).parent for name in made}:
+        for path in {(folder / name).parent for name in files}:
             path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder} cannot be made: {error.strerror or error}.") from error
-    write_files({folder / name: writer_of(content) for name, content in made.items()})
-    for name, content in made.items():
+        raise InputError(f"{folder} cannot be created: {error.strerror or error}.") from error
+    write_files({folder / name: writer_of(content) for name, content in files.items()})
+    for name, content in files.items():
         print(f"{folder / name}: {len(content)} bytes")
     return 0
 
 
-def _made(
+def _files(
     kind: str,
     robot: Robot,
     values: Mapping[str, float],
@@ -77,7 +79,7 @@ def _made(
 
 
 def _package(options: argparse.Namespace) -> Mapping[str, bytes]:
-    """Return the ROS package; report what its `package.xml` leaves for the user to state."""
+    """Return the ROS package; print what its `package.xml` leaves for the user to state."""
     own = options.urdf.resolve() == URDF_PATH.resolve()
     license_name = options.license or (OWN_LICENSE if own else UNSTATED_LICENSE)
     maintainer = Maintainer(*options.maintainer) if options.maintainer else UNSTATED_MAINTAINER
@@ -91,7 +93,7 @@ def _package(options: argparse.Namespace) -> Mapping[str, bytes]:
     ]
     if unstated:
         print(
-            f"katana450: package.xml has a TODO for {' and '.join(unstated)}; give "
+            f"katana450: package.xml has a TODO for {' and '.join(unstated)}. State "
             f"{'it' if len(unstated) == 1 else 'them'} before you publish the package.",
             file=sys.stderr,
         )

@@ -1,4 +1,4 @@
-"""The extension ``export``: files for other programs, and the command that writes them."""
+"""The extension ``export``: the command that writes files for other programs."""
 
 from __future__ import annotations
 
@@ -17,30 +17,31 @@ if TYPE_CHECKING:
     from katana450.server.service.nodes import Nodes
 
 FORMATS = {
-    "vrml": "a VRML97 world and a file a part, as LabVIEW, Simulink and X3D browsers read them",
-    "c": "C arrays and draw functions a link, and an OpenGL viewer with its Makefile",
+    "vrml": "a VRML97 world and one file per part, for LabVIEW, Simulink and X3D browsers",
+    "c": "C arrays and a draw function per link, and an OpenGL viewer with its Makefile",
     "glb": "binary glTF 2.0, for browsers, Blender and game engines",
     "urdf": "a zip of a ROS package with the URDF and its meshes",
-    "html": "a page of a run with a slider of its time, which opens without a server",
+    "html": "a page that plays a run, with a time slider; it needs no server",
 }
+"""Export formats and their descriptions."""
 
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
-    """Put them into `parser`."""
+    """Add the options of ``katana450 export`` to ``parser``."""
     parser.add_argument("format", choices=tuple(FORMATS), help=_listed())
     parser.add_argument(
         "--out",
         type=Path,
         required=True,
         metavar="DIR",
-        help="directory for the files, or the file of html",
+        help="directory for the files, or the path of the html file",
     )
     parser.add_argument(
         "--pose",
         type=joint_values,
         default=(),
         metavar="Q",
-        help="values of the driven joints in rad or m with commas between, gripper last, such as "
+        help="comma-separated values of the driven joints in rad or m, gripper last, such as "
         "--pose=0,-1.2,1.4,0.1,0,0.2 (default: all at zero)",
     )
     parser.add_argument(
@@ -53,27 +54,27 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         "--maintainer",
         type=named_address,
         metavar="'NAME <EMAIL>'",
-        help="urdf: who package.xml names as responsible for the package (default: unstated)",
+        help="urdf: person that package.xml names as responsible (default: unstated)",
     )
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument(
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help="vrml, glb and html: a motion the file plays by itself; .csv with the columns "
+        help="vrml, glb and html: motion that the file plays; .csv with the columns "
         "t,theta1,...,theta5,gripper or .json with lists of these names",
     )
     motion.add_argument(
         "--run",
         metavar="SCRIPT",
-        help="html: circle, pour or the file of a script, whose run the page plays",
+        help="html: run that the page plays: circle, pour or the file of a script",
     )
     parser.add_argument(
         "--urdf",
         type=Path,
         default=URDF_PATH,
         metavar="FILE",
-        help="another mechanism: any tree of turning, sliding and mimicking joints "
+        help="another mechanism: any tree of revolute, prismatic and mimic joints "
         "(default: the Katana450)",
     )
 
@@ -81,7 +82,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
 def _export(options: argparse.Namespace) -> int:
     if options.format != "urdf" and (options.license or options.maintainer):
         raise InputError(
-            f"A file of {options.format} states no licence and no maintainer; urdf does."
+            f"{options.format} states no licence and no maintainer. Use these options with urdf."
         )
     if options.format == "html":
         from katana450.extensions.export.page import write_page
@@ -97,19 +98,21 @@ def _listed() -> str:
 
 
 def named_address(text: str) -> tuple[str, str]:
-    """Return name and email of ``NAME <EMAIL>``."""
+    """Return name and email of ``NAME <EMAIL>``. Raises ArgumentTypeError."""
     found = re.fullmatch(r"\s*([^<>]*[^<>\s])\s*<([^<>@\s]+@[^<>@\s]+)>\s*", text)
     if found is None:
-        raise argparse.ArgumentTypeError(f"'NAME <EMAIL>', not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected 'NAME <EMAIL>', not {text!r}")
     return found[1], found[2]
 
 
 def joint_values(text: str) -> tuple[float, ...]:
-    """Of a list with commas between [rad, m]."""
+    """Return the numbers [rad, m] of a comma-separated list. Raises ArgumentTypeError."""
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"numbers with commas between, not {text!r}") from None
+        raise argparse.ArgumentTypeError(
+            f"expected comma-separated numbers, not {text!r}"
+        ) from None
 
 
 def _nodes(robot: Robot, environment: Environment) -> Nodes:

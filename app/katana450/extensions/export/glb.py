@@ -1,4 +1,4 @@
-"""A robot as binary glTF 2.0: a node a link, its joint told in `extras`, and its motion."""
+"""A robot as binary glTF 2.0: one node per link, its joint in `extras`, and its motion."""
 
 from __future__ import annotations
 
@@ -22,22 +22,24 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.srgb import to_light
 
 ARRAY, ELEMENT = 34962, 34963
+"""Targets of a buffer view."""
 FLOAT, USHORT, UINT = 5126, 5123, 5125
+"""Component types of an accessor."""
 
 Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
-"""xyzw: glTF's y is up, the root's z is."""
+"""Rotation (x, y, z, w) from the root's z up to glTF's y up."""
 
 
 def glb_files(
     robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
 ) -> dict[str, bytes]:
-    """Name and content of the one file, at the joint `values` [rad, m] or where a motion begins."""
+    """Return name and content of the file, at ``values`` [rad, m] or at the start of ``motion``."""
     (name,) = distinct([robot.name])
     return {f"{name}.glb": _Document(robot, values, motion).content()}
 
 
 class _Document:
-    """The JSON chunk and the binary one as they grow."""
+    """The JSON chunk and the binary chunk under construction."""
 
     def __init__(
         self, robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None
@@ -48,7 +50,7 @@ class _Document:
         self._accessors: list[dict[str, Any]] = []
         self._meshes: list[dict[str, Any]] = []
         self._materials: dict[Material, int] = {}
-        # Node 0 turns z up into y up; that of link k is node k + 1.
+        # Node 0 rotates z up to y up; the node of link k is node k + 1.
         number = {link.name: place for place, link in enumerate(robot.links, start=1)}
         nodes: list[dict[str, Any]] = [{"name": "z_up", "rotation": Y_UP, "children": [1]}]
         nodes += [self._node(robot, link, values, number) for link in robot.links]
@@ -62,7 +64,7 @@ class _Document:
             self._json["animations"] = [self._animation(robot, motion, number)]
 
     def content(self) -> bytes:
-        """The file."""
+        """Return the content of the file."""
         parts = {
             "meshes": self._meshes,
             "materials": [_material(material) for material in self._materials],
@@ -97,7 +99,7 @@ class _Document:
         if children:
             node["children"] = children
         if joint is not None:
-            node["extras"] = {"joint": _told(joint)}
+            node["extras"] = {"joint": _joint_extras(joint)}
         if link.shapes:
             node["mesh"] = len(self._meshes)
             primitives = [self._primitive(shape) for shape in link.shapes]
@@ -154,7 +156,7 @@ class _Document:
 
     def _vectors(self, rows: FloatArray, target: int | None = None) -> int:
         if not np.isfinite(rows).all():
-            raise InputError("A shape has coordinates that are no finite numbers.")
+            raise InputError("A shape has coordinates that are not finite numbers.")
         return self._add(rows.astype("<f4"), FLOAT, target)
 
     def _add(self, rows: npt.NDArray[Any], kind: int, target: int | None) -> int:
@@ -191,19 +193,19 @@ def _material(material: Material) -> dict[str, Any]:
     }
 
 
-def _told(joint: Joint) -> dict[str, Any]:
-    told: dict[str, Any] = {
+def _joint_extras(joint: Joint) -> dict[str, Any]:
+    extras: dict[str, Any] = {
         "name": joint.name,
         "type": "prismatic" if joint.slides else "revolute",
         "axis": joint.axis.tolist(),
     }
     for side, limit in (("lower", joint.lower), ("upper", joint.upper)):
         if math.isfinite(limit):
-            told[side] = limit
+            extras[side] = limit
     if joint.leader != joint.name:
-        told["mimic"] = {
+        extras["mimic"] = {
             "joint": joint.leader,
             "multiplier": joint.factor,
             "offset": joint.offset,
         }
-    return told
+    return extras

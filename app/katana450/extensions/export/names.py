@@ -1,4 +1,4 @@
-"""Names that other languages allow, and no two alike."""
+"""Distinct identifiers for other languages."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Container, Iterable
 
 
 def distinct(names: Iterable[str], reserved: Container[str] = ()) -> list[str]:
-    """An identifier of letters, digits and `_` for each name, all different also in lower case.
+    """Return an identifier of letters, digits and `_` for each name.
 
-    A name that is one already stays, unless it is `reserved` or was there before.
+    No two identifiers are equal, even without regard to case.
+    A name that is a valid identifier stays, unless it is ``reserved`` or was used before.
     """
     found: list[str] = []
     taken: set[str] = set()

@@ -1,4 +1,4 @@
-"""Wavefront OBJ and its materials, for programs that read no glTF."""
+"""Wavefront OBJ with materials, for programs that do not read glTF."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from katana450.extensions.export.rows import distinct_rows
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 DIGITS = 5
-"""Decimals of a coordinate [m]: a hundredth of a millimetre."""
+"""Decimal places of a coordinate [m]: a hundredth of a millimetre."""
 
 NORMAL_DIGITS = 3
+"""Decimal places of a normal."""
 
 LIBRARY = "materials.mtl"
-"""Name of the file with the materials, beside those that use them."""
+"""Name of the file with the materials, in the folder of the OBJ files."""
 
 SHARPEST = 250.0
 """Exponent of the highlight on a surface without roughness; MTL allows up to 1000."""
 
 
 def obj_text(shapes: Sequence[VisualMesh], material: str | None) -> str:
-    """Return ``shapes`` [m] as one object, in ``material`` of `LIBRARY` where one is named."""
+    """Return ``shapes`` [m] as one object, in ``material`` of `LIBRARY` unless it is None."""
     points, point = distinct_rows([shape.vertices for shape in shapes], DIGITS)
     normals, normal = distinct_rows([shape.normals for shape in shapes], NORMAL_DIGITS)
     starts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])
@@ -53,7 +54,7 @@ def _rows(word: str, rows: FloatArray, digits: int) -> list[str]:
 
 
 def _faces(points: IntArray, normals: IntArray) -> list[str]:
-    """Return the triangles that rounding left: those with three different corners."""
+    """Return the triangles with three different corners after rounding."""
     a, b, c = points.T
     kept = (a != b) & (b != c) & (c != a)
     return [

@@ -1,4 +1,4 @@
-"""``katana450 export html``: a run as a page that plays by itself, without a server."""
+"""``katana450 export html``: a run as a page that plays it without a server."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from katana450.extensions.progress import progress
 from katana450.server.view.recording import recorded
 
 FPS = 25.0
-"""States a second that the page holds; what is in between it leaves out."""
+"""States per second in the page; states between them are left out."""
 
 
 def write_page(options: argparse.Namespace) -> int:
-    """Write the one file; tell its name and size."""
+    """Write the file; print its name and size. Raises InputError."""
     path: Path = options.out
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path} must end in .html.")
@@ -34,7 +34,7 @@ def write_page(options: argparse.Namespace) -> int:
 
 
 def _shown(run: str | None, trajectory: Path | None) -> str:
-    """The name of what the page shows, for its title."""
+    """Return the name of the run or motion, for the title of the page."""
     if trajectory is not None:
         return trajectory.stem
     return "one pose" if run is None else Path(run).stem

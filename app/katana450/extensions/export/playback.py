@@ -1,4 +1,4 @@
-"""States of an arm over time, to be shown: of a script, a table of joint values, or a pose."""
+"""States of an arm over time, for display: of a script, a table of joint values, or a pose."""
 
 from __future__ import annotations
 
@@ -19,7 +19,15 @@ from katana450.settings import Settings
 
 
 class Playback(NamedTuple):
-    """An arm, and its states so many times a second; one where it only stands."""
+    """An arm, and its states at a fixed rate; one state if the arm does not move.
+
+    Attributes:
+        robot: the robot.
+        session: the rules of the arm.
+        states: the states, the first at time 0.
+        rate: states per second [Hz].
+        bare: whether the arm has no gripper.
+    """
 
     robot: Robot
     session: Session
@@ -28,17 +36,17 @@ class Playback(NamedTuple):
     bare: bool = False
 
     def at(self, t: float) -> State:
-        """The state nearest to ``t`` [s]; that at the end if it is later."""
+        """Return the state nearest to ``t`` [s]; the last state after the end."""
         return self.states[min(round(t * self.rate), len(self.states) - 1)]
 
     @property
     def duration(self) -> float:
-        """[s]"""
+        """The duration [s]."""
         return (len(self.states) - 1) / self.rate
 
 
 def chosen(run: str | None, trajectory: Path | None, pose: Sequence[float], urdf: Path) -> Playback:
-    """What a person chose: a script or a demo by its name, a table, or else a pose."""
+    """Return the playback of a script or demo, else of a table, else of a pose."""
     if run is not None:
         return of_script(run, urdf)
     if trajectory is not None:
@@ -47,11 +55,11 @@ def chosen(run: str | None, trajectory: Path | None, pose: Sequence[float], urdf
 
 
 def of_script(name: str, urdf: Path) -> Playback:
-    """Return the run of a demo or of a script in a file; it is simulated with a progress bar.
+    """Return the run of a demo or of a script file, simulated with a progress bar.
 
-    Raises InputError with the line of the script that is wrong.
+    Raises InputError with the line of an error in the script.
     """
-    # A pose or a table can be shown without the extension ``programs``.
+    # Imported here, because poses and tables do not need the extension ``programs``.
     from katana450.extensions.programs.circle import CircleDemo
     from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
     from katana450.extensions.programs.pour import PourDemo
@@ -71,7 +79,7 @@ def of_script(name: str, urdf: Path) -> Playback:
 
 
 def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
-    """Standing at ``pose``: values of the driven joints [rad]; at home where there are none."""
+    """Return the arm at rest at ``pose``, values of the driven joints [rad]; ready if empty."""
     robot, session, _ = _described(urdf)
     if not pose:
         return Playback(robot, session, [_at_rest(session)], 1.0)
@@ -79,7 +87,7 @@ def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
 
 
 def of_trajectory(path: Path, urdf: Path) -> Playback:
-    """As a table of joint values has it. Raises InputError for a file that is none."""
+    """Return the motion of a table of joint values. Raises InputError for an invalid file."""
     robot, session, _ = _described(urdf)
     motion, rate = load_motion(path, robot), Settings().rate
     t = np.arange(int(motion.t[-1] * rate) + 1) / rate
@@ -99,7 +107,7 @@ def _described(urdf: Path) -> tuple[Robot, Session, tuple[str, ...]]:
 
 
 def _at_rest(session: Session) -> State:
-    """Where an arm is that nobody has moved."""
+    """Return the state of an arm at rest in its ready posture."""
     return session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
 
 

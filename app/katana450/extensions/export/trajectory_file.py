@@ -1,12 +1,12 @@
 """A motion as a table of times and joint values, in CSV or JSON.
 
-CSV begins with a line of names, `t` first, and every line after it is one time [s] with the
-value of each joint named [rad, m]:
+The first line of a CSV file has the names of the columns, `t` first. Every line after it has a time
+[s] and the value of each named joint [rad, m]:
 
     t,theta1,theta2,theta3,theta4,theta5,gripper
 
-`theta1` is the first driven joint and so on, `gripper` the driven joint after the fifth; joints can
-be named by their own names too. JSON is an object of lists of the same names, all of one length.
+`theta1` is the first driven joint and so on; `gripper` is the driven joint after the fifth. Joints
+can also have their own names. JSON is an object of lists with the same names, all of one length.
 Joints that are not named stay at zero.
 """
 
@@ -26,32 +26,40 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 THETA = re.compile(r"theta([1-9][0-9]?)")
+"""Pattern of the numbered names of joints."""
 
 GRIPPER = 6
 """Number of the driven joint that `gripper` names."""
 
 MAX_ROWS = 100_000
-"""Rows of a file; a longer one is no animation."""
+"""Maximum number of rows of a file."""
 
 
 WIDEST_TURN = 1.0
-"""[rad] Between two keys; programs take the short way from one to the next, so it must be clear."""
+"""[rad] Maximum rotation between two keys. Programs interpolate on the shorter arc, so it must be
+unambiguous.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """t: (n,) [s], from 0 on, rising. values: (n,) [rad, m] of every joint of a robot."""
+    """The motion of all joints of a robot.
+
+    Attributes:
+        t: (n,) [s], from 0, increasing.
+        values: (n,) [rad, m] of every joint.
+    """
 
     t: FloatArray
     values: Mapping[str, FloatArray]
 
     @property
     def start(self) -> dict[str, float]:
-        """Value [rad, m] of every joint at the first sample."""
+        """The value [rad, m] of every joint at the first sample."""
         return {name: float(values[0]) for name, values in self.values.items()}
 
     def keys(self, name: str) -> tuple[FloatArray, FloatArray]:
-        """Times (k,) [s] and values (k,) of one joint, with more of them where it turns far."""
+        """Return times (k,) [s] and values (k,) of one joint, with more keys in large rotations."""
         values = self.values[name]
         counts = np.maximum(np.ceil(np.abs(np.diff(values)) / WIDEST_TURN), 1.0).astype(int)
         places = [row + np.arange(count) / count for row, count in enumerate(counts.tolist())]
@@ -63,8 +71,8 @@ class RecordedMotion:
 def load_motion(path: Path, robot: Robot) -> RecordedMotion:
     """Return the motion of ``robot`` in a .csv or .json file.
 
-    Raises InputError for a file that cannot be read, is no such table, names what is no joint, or
-    leaves a joint's limits.
+    Raises InputError for a file that cannot be read or is not such a table, for unknown joints, and
+    for values outside the limits of a joint.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -83,7 +91,7 @@ def load_motion(path: Path, robot: Robot) -> RecordedMotion:
 def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
     if not rows:
-        raise InputError(f"{path} is empty; its first line names the columns, t first.")
+        raise InputError(f"{path} is empty. Its first line must name the columns, t first.")
     names = rows[0]
     if len(set(names)) != len(names):
         raise InputError(f"{path} names a column twice: {', '.join(names)}.")
@@ -91,7 +99,7 @@ def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
     for count, row in enumerate(rows[1:], start=1):
         try:
             if len(row) != len(names):
-                raise ValueError(f"has {len(row)} values and not {len(names)}")
+                raise ValueError(f"it has {len(row)} values, not {len(names)}")
             numbers.append([float(cell) for cell in row])
         except ValueError as error:
             raise InputError(f"Row {count} of {path}: {error}.") from error
@@ -102,7 +110,7 @@ def _json_columns(path: Path, text: str) -> dict[str, list[object]]:
     try:
         columns = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no JSON: {error}.") from error
+        raise InputError(f"{path} is not JSON: {error}.") from error
     if not isinstance(columns, dict) or not all(isinstance(v, list) for v in columns.values()):
         raise InputError(f"{path} must hold an object of lists, such as {{'t': [0, 1], ...}}.")
     return columns
@@ -121,7 +129,7 @@ def _motion(path: Path, columns: Mapping[str, list[object]], robot: Robot) -> Re
     t = table.pop("t")
     if not (np.diff(t) > 0.0).all():
         row = int(np.argmin(np.diff(t) > 0.0)) + 2
-        raise InputError(f"t of {path} must rise from row to row; in row {row} it does not.")
+        raise InputError(f"t of {path} must increase from row to row; in row {row} it does not.")
     given: dict[str, FloatArray] = {}
     for column, values in table.items():
         name = _joint(path, column, robot)
@@ -146,7 +154,7 @@ def _joint(path: Path, column: str, robot: Robot) -> str:
     number = int(theta[1]) if theta else GRIPPER if column == "gripper" else 0
     if not 1 <= number <= len(driven):
         raise InputError(
-            f"{path} names {column!r}, which is no driven joint of {robot.name}; "
-            f"these are {', '.join(driven)}."
+            f"{path} names {column!r}, which is not a driven joint of {robot.name}. "
+            f"These are {', '.join(driven)}."
         )
     return driven[number - 1]

@@ -1,8 +1,9 @@
 """A URDF with its meshes as a zip of a ROS package, to be unpacked into a workspace.
 
-Programs differ in what they find and read. `package://` names are for ROS, yourdfpy and PyBullet;
-MuJoCo drops folders from names; the URDF names the folder for it. PyBullet, RViz and Drake have
-trouble with glTF, so such meshes become OBJ, one file a material, and the URDF names the colours.
+Programs differ in the files that they find and read. `package://` names are for ROS, yourdfpy and
+PyBullet. MuJoCo drops folders from names, so the URDF names the folder for it. PyBullet, RViz and
+Drake have trouble with glTF, so such meshes become OBJ, one file per material, and the URDF names
+the colours.
 """
 
 from __future__ import annotations
@@ -25,15 +26,17 @@ from katana450.extensions.export.names import distinct
 from katana450.extensions.export.obj_text import LIBRARY, mtl_text, obj_text
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Of every file in the zip, so that the same robot gives the same bytes."""
+"""Time stamp of every file in the zip: the same robot gives the same bytes."""
 
 CONVERTED = (".glb", ".gltf")
-"""Suffixes of meshes that become OBJ; others are copied as they are."""
+"""Suffixes of meshes that become OBJ; others are copied unchanged."""
 
 MUJOCO = {"strippath": "true", "meshdir": "../meshes", "fusestatic": "false"}
-"""MuJoCo's compiler finds the meshes without `package://`, and keeps links on fixed joints."""
+"""Attributes for MuJoCo's compiler: find meshes without `package://`, keep links on fixed joints.
+"""
 
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""Attributes of an inertia."""
 
 CMAKE = """\
 cmake_minimum_required(VERSION 3.8)
@@ -42,6 +45,7 @@ find_package(ament_cmake REQUIRED)
 install(DIRECTORY {folders} DESTINATION share/${{PROJECT_NAME}})
 ament_package()
 """
+"""Template of CMakeLists.txt."""
 
 MANIFEST = """\
 <?xml version="1.0"?>
@@ -57,6 +61,7 @@ MANIFEST = """\
   </export>
 </package>
 """
+"""Template of package.xml."""
 
 
 class Maintainer(NamedTuple):
@@ -67,12 +72,13 @@ class Maintainer(NamedTuple):
 
 
 UNSTATED_LICENSE = "TODO: License declaration"
+"""Placeholder for an unknown licence, as in ROS's package generator."""
 UNSTATED_MAINTAINER = Maintainer("TODO: Maintainer", "todo@todo.todo")
-"""Placeholders that ROS's own package generator writes where nothing is known."""
+"""Placeholder for an unknown maintainer, as in ROS's package generator."""
 
 
 class _Part(NamedTuple):
-    """A file of a mesh; ``material`` is the name of its one colour, in it and in the URDF."""
+    """A file of a mesh; ``material`` is the name of its only colour, in it and in the URDF."""
 
     stem: str
     suffix: str
@@ -85,9 +91,9 @@ def package_files(
     license_name: str = UNSTATED_LICENSE,
     maintainer: Maintainer = UNSTATED_MAINTAINER,
 ) -> dict[str, bytes]:
-    """Return name and content of the one zip of the URDF file at ``path``.
+    """Return name and content of the zip of the URDF file at ``path``.
 
-    Raises RobotDescriptionError when the file is no URDF, and when a mesh is missing or unreadable.
+    Raises RobotDescriptionError if the file is not a URDF, or a mesh is missing or unreadable.
     """
     try:
         tree = ET.parse(path, parser=ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
@@ -96,7 +102,9 @@ def package_files(
     root = tree.getroot()
     robot = root.get("name", "")
     if root.tag != "robot" or not robot:
-        raise RobotDescriptionError(f"{path} is not a robot description: it names no robot.")
+        raise RobotDescriptionError(
+            f"{path} is not a robot description: its root is not a named robot."
+        )
     (plain,) = distinct([robot])
     package = f"{plain.lower()}_description"
     _weigh_frames(root)
@@ -120,9 +128,9 @@ def package_files(
 
 
 def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes]:
-    """Point the URDF ``root`` at copies of its meshes and return these by place in the package.
+    """Point the URDF ``root`` at copies of its meshes; return them by path in the package.
 
-    ``folder``: that of the URDF. ``prefix``: stands before a place where the URDF names it.
+    ``folder`` is the folder of the URDF. ``prefix`` precedes a path in the URDF.
     """
     used = [
         (parent, element, mesh_file(mesh.get("filename", ""), folder))
@@ -140,10 +148,10 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
         if source.suffix.lower() in CONVERTED and source not in shapes:
             shapes[source] = shapes_of(Visual(np.eye(4), np.ones(3), source))
             if not shapes[source]:
-                raise RobotDescriptionError(f"{source} holds no triangles. Export the mesh anew.")
+                raise RobotDescriptionError(f"{source} has no triangles. Export the mesh again.")
     shown = dict.fromkeys(source for _, element, source in used if element.tag == "visual")
     names = _names(root, [shape.material for source in shown for shape in shapes.get(source, ())])
-    # A mesh that is only copied is one file for both uses.
+    # A mesh that is only copied is one file for visual and collision.
     keys = [(source, source in shapes and element.tag == "visual") for _, element, source in used]
     groups = {
         (source, shown): _parts(source, shapes.get(source), names if shown else None)
@@ -161,7 +169,7 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
             parent.insert(at + k, _pointed(element, prefix + place, part.material, k))
     for k, (material, name) in enumerate(names.items()):
         root.insert(k, _material(name, material))
-    _tell_mujoco(root)
+    _configure_mujoco(root)
     files = {place: part.content for group in placed.values() for place, part in group}
     if names:
         files[f"meshes/{LIBRARY}"] = mtl_text({n: m for m, n in names.items()}).encode()
@@ -169,7 +177,7 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
 
 
 def _names(root: ET.Element, materials: Sequence[Material]) -> dict[Material, str]:
-    """Return a name for each of ``materials`` that neither the URDF nor another one has."""
+    """Return a name for each of ``materials`` that is not used in the URDF or by another."""
     known = dict.fromkeys(element.get("name", "") for element in root.iter("material"))
     new = list(dict.fromkeys(materials))
     names = distinct([*known, *(material.name for material in new)])
@@ -179,7 +187,7 @@ def _names(root: ET.Element, materials: Sequence[Material]) -> dict[Material, st
 def _parts(
     source: Path, shapes: Sequence[VisualMesh] | None, names: Mapping[Material, str] | None
 ) -> list[_Part]:
-    """Return the files of a mesh: as it is, as one OBJ, or with ``names`` as one a material."""
+    """Return the files of a mesh: a copy, one OBJ, or with ``names`` one OBJ per material."""
     stem = f"{source.parent.name}_{source.stem}"
     if shapes is None:
         return [_Part(stem, source.suffix, source.read_bytes())]
@@ -197,9 +205,9 @@ def _parts(
 
 
 def _pointed(element: ET.Element, name: str, material: str | None, number: int) -> ET.Element:
-    """Return a copy of a visual or collision with the mesh ``name`` and, if it has none, a colour.
+    """Return a copy of a visual or collision for the mesh ``name``, with a colour if it has none.
 
-    ``number`` keeps the names of several copies apart.
+    ``number`` distinguishes the names of several copies.
     """
     copied = copy.deepcopy(element)
     for mesh in copied.iterfind("geometry/mesh"):
@@ -222,7 +230,7 @@ def _material(name: str, material: Material) -> ET.Element:
 
 
 def _weigh_frames(root: ET.Element) -> None:
-    """Write that links without mass on fixed joints weigh nothing; PyBullet would take 1 kg."""
+    """Set the mass of links without inertia on fixed joints to 0; PyBullet would assume 1 kg."""
     fixed = {
         child.get("link")
         for joint in root.iterfind("joint[@type='fixed']")
@@ -235,8 +243,8 @@ def _weigh_frames(root: ET.Element) -> None:
             ET.SubElement(inertial, "inertia", dict.fromkeys(MOMENTS, "0"))
 
 
-def _tell_mujoco(root: ET.Element) -> None:
-    """Set the attributes of `MUJOCO`; what else the file tells MuJoCo stays."""
+def _configure_mujoco(root: ET.Element) -> None:
+    """Set the attributes of `MUJOCO`; other attributes for MuJoCo stay."""
     extension = root.find("mujoco")
     if extension is None:
         extension = ET.Element("mujoco")
@@ -249,10 +257,10 @@ def _tell_mujoco(root: ET.Element) -> None:
 
 
 def _zipped(files: dict[str, bytes]) -> bytes:
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as archive:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
         for name, content in sorted(files.items()):
             entry = zipfile.ZipInfo(name, EPOCH)
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
-    return made.getvalue()
+    return buffer.getvalue()

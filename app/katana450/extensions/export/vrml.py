@@ -1,10 +1,10 @@
-"""A robot as a VRML97 world, the way the paper's LabVIEW and Simulink scenes take it.
+"""A robot as a VRML97 world, in the structure of the paper's LabVIEW and Simulink scenes.
 
-Geometry stands where it is at zero, in the root's frame, as a CAD program exports an assembly; each
-joint is a Transform whose `center` is a point of its axis and whose `rotation` is about that axis.
-The nested Transforms are therefore the product of exponentials, link by link.
+Geometry is given in the root's frame with all joints at zero, as a CAD program exports an assembly.
+Each joint is a Transform whose `center` is a point of its axis and whose `rotation` is about that
+axis. The nested Transforms are therefore the product of exponentials, link by link.
 
-A link's shapes stand in a Switch: 0 as they are made, 1 painted in one colour, -1 hidden.
+The shapes of a link are in a Switch: 0 shows them as made, 1 painted in one colour, -1 hides them.
 """
 
 from __future__ import annotations
@@ -29,14 +29,16 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
 DIGITS = 5
-"""Decimals of a coordinate [m]: a hundredth of a millimetre."""
+"""Decimal places of a coordinate [m]: a hundredth of a millimetre."""
 
 NORMAL_DIGITS = 3
+"""Decimal places of a normal."""
 
 SKY = (0.87, 0.89, 0.92)
+"""Colour of the background."""
 
 Z_UP = (1.0, 0.0, 0.0, -math.pi / 2.0)
-"""VRML's y is up, the root's z is."""
+"""Rotation (axis, angle) from the root's z up to VRML's y up."""
 
 _TURN = so3.rotation_x(-math.pi / 2.0)
 
@@ -44,9 +46,9 @@ _TURN = so3.rotation_x(-math.pi / 2.0)
 def world_of(
     robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
 ) -> World:
-    """Return the whole robot at the joint `values` [rad, m]; with a motion it plays it by itself.
+    """Return the whole robot at the joint ``values`` [rad, m], or playing ``motion``.
 
-    A motion also sets the static pose to its first sample, for programs that play none.
+    A motion also sets the static pose to its first sample, for programs that do not play it.
     """
     values = values if motion is None else motion.start
     names = VrmlNames(robot)
@@ -61,17 +63,17 @@ def world_of(
         nodes.append(Node("TimeSensor", tuple(clock), names.clock))
         for name, joint in robot.joints.items():
             nodes.append(_interpolator(joint, robot, motion, names))
-            target, way = names.joints[name], f"{names.joints[name]}{names.way}"
+            target, source = names.joints[name], f"{names.joints[name]}{names.way}"
             setter = "set_translation" if joint.slides else "set_rotation"
-            routes.append(Route(names.clock, "fraction_changed", way, "set_fraction"))
-            routes.append(Route(way, "value_changed", target, setter))
+            routes.append(Route(names.clock, "fraction_changed", source, "set_fraction"))
+            routes.append(Route(source, "value_changed", target, setter))
     return World(tuple(nodes), tuple(routes))
 
 
 def vrml_files(
     robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
 ) -> dict[str, bytes]:
-    """Name and content of the file of the whole, and of one for each link with a shape."""
+    """Return name and content of the file of the robot, and of one file per link with shapes."""
     (whole,) = distinct([robot.name])
     files = {f"{whole}.wrl": world_text(world_of(robot, values, motion)).encode()}
     links = [link for link in robot.links if link.shapes]
@@ -81,7 +83,7 @@ def vrml_files(
 
 
 def part_world(robot: Robot, link: Link) -> World:
-    """One link alone where it is at zero, z up, so that all of them loaded make the robot."""
+    """Return one link at its place with all joints at zero, z up; all of them form the robot."""
     names = VrmlNames(robot)
     shapes = _shapes(robot, link, names, set())
     part = Node("Group", (("children", tuple(shapes)),), names.links[link.name])
@@ -115,9 +117,12 @@ def _surroundings(robot: Robot) -> list[Node]:
     ]
 
 
-def _looking(way: FloatArray) -> FloatArray:
-    """(3, 3) of a camera in the root that looks along `way` (3,): its x right, y up, -z ahead."""
-    back = -way / np.linalg.norm(way)
+def _looking(direction: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) in the root of a camera along ``direction`` (3,).
+
+    Its x points right, y up and -z ahead.
+    """
+    back = -direction / np.linalg.norm(direction)
     right = np.cross((0.0, 0.0, 1.0), back)
     right /= np.linalg.norm(right)
     return np.column_stack((right, np.cross(back, right), back))
@@ -128,13 +133,13 @@ def _link(
     link: Link,
     values: Mapping[str, float],
     names: VrmlNames,
-    told: set[Material],
+    written: set[Material],
 ) -> Node:
-    """The node of a link with all that hangs on it."""
-    own = _switch(robot, link, names, told)
-    hung = [_link(robot, other, values, names, told) for other in robot.children(link)]
+    """Return the node of a link with all its children; ``written`` collects the materials."""
+    own = _switch(robot, link, names, written)
+    children_nodes = [_link(robot, other, values, names, written) for other in robot.children(link)]
     center = ("center", _rounded(robot.home[link.name][:3, 3], 9))
-    children = ("children", (*own, *hung))
+    children = ("children", (*own, *children_nodes))
     if link.joint is None:
         return Node("Transform", (center, children), names.links[link.name])
     group = Node("Group", (children,), names.links[link.name])
@@ -142,8 +147,8 @@ def _link(
     return Node("Transform", (center, moved, ("children", (group,))), names.joints[link.joint.name])
 
 
-def _switch(robot: Robot, link: Link, names: VrmlNames, told: set[Material]) -> tuple[Node, ...]:
-    """The shapes of a link as they are made, and once more to be painted."""
+def _switch(robot: Robot, link: Link, names: VrmlNames, written: set[Material]) -> tuple[Node, ...]:
+    """Return the Switch of a link: its shapes as made, and again to be painted."""
     if not link.shapes:
         return ()
     dressed = names.dressed[link.name]
@@ -151,7 +156,7 @@ def _switch(robot: Robot, link: Link, names: VrmlNames, told: set[Material]) -> 
     paint: Node | Use = Node("Material", colours, dressed.paint)
     made: list[Node] = []
     painted: list[Node] = []
-    for number, shape in enumerate(_shapes(robot, link, names, told)):
+    for number, shape in enumerate(_shapes(robot, link, names, written)):
         name = f"{names.links[link.name]}{names.surface}{number}"
         look, (field, surface) = shape.fields
         assert isinstance(surface, Node)
@@ -170,18 +175,18 @@ def _moved(robot: Robot, joint: Joint, value: float) -> tuple[str, Value]:
     return "rotation", (*_rounded(axis, 9), value)
 
 
-def _shapes(robot: Robot, link: Link, names: VrmlNames, told: set[Material]) -> list[Node]:
+def _shapes(robot: Robot, link: Link, names: VrmlNames, written: set[Material]) -> list[Node]:
     T = robot.home[link.name]
-    return [_shape(shape, T, names, told) for shape in link.shapes]
+    return [_shape(shape, T, names, written) for shape in link.shapes]
 
 
-def _shape(shape: VisualMesh, T: FloatArray, names: VrmlNames, told: set[Material]) -> Node:
+def _shape(shape: VisualMesh, T: FloatArray, names: VrmlNames, written: set[Material]) -> Node:
     name = names.appearance(shape.material)
     appearance: Node | Use
-    if shape.material in told:
+    if shape.material in written:
         appearance = Use(name)
     else:
-        told.add(shape.material)
+        written.add(shape.material)
         appearance = Node("Appearance", (("material", _material(shape.material)),), name)
     points = shape.vertices @ T[:3, :3].T + T[:3, 3]
     normals = shape.normals @ T[:3, :3].T
@@ -221,8 +226,8 @@ def _interpolator(joint: Joint, robot: Robot, motion: RecordedMotion, names: Vrm
 
 
 def _rounded(values: object, digits: int) -> tuple[float, ...]:
-    # Adding zero makes 0 of -0.
+    # Adding zero turns -0 into 0.
     flat = np.round(np.asarray(values, dtype=float), digits).ravel() + 0.0
     if not np.isfinite(flat).all():
-        raise InputError("A shape has coordinates that are no finite numbers.")
+        raise InputError("A shape has coordinates that are not finite numbers.")
     return tuple(flat.tolist())

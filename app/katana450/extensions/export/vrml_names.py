@@ -1,4 +1,4 @@
-"""VRML's names for all that has one, in the files that are written and on a running server."""
+"""VRML names of all named nodes, in exported files and on a running server."""
 
 from __future__ import annotations
 
@@ -11,51 +11,56 @@ from katana450.extensions.export.names import distinct
 from katana450.extensions.export.vrml_node import KEYWORDS
 
 CLOCK = "Clock"
+"""Name of the TimeSensor."""
 
 LOOK, PAINT = "look", "paint"
-"""Of a link that has shapes: the Switch between what it is made of and one colour all over, and the
-Material of that colour."""
+"""Suffixes for a link with shapes: the Switch between its materials and one colour, and the
+Material of that colour.
+"""
 
 
 @dataclass(frozen=True)
 class NodeNames:
-    """The nodes that say how a link or an object is shown."""
+    """Names of the nodes that define the appearance of a link or object: Switch and Material."""
 
     appearance: str
     paint: str
 
 
 class VrmlNames:
-    """No two alike, however the URDF calls them.
+    """Distinct VRML names for everything of a robot, for any names in its URDF.
 
     Attributes:
-        links, joints: the name of each, by its own.
-        dressed: of each link that has a shape.
-        clock: of the TimeSensor of a motion.
-        way: what is put behind a joint's name for its interpolator.
+        links: VRML name of each link, by its own name.
+        joints: VRML name of each joint, by its own name.
+        dressed: names of the appearance of each link with a shape.
+        clock: name of the TimeSensor of a motion.
+        way: suffix of a joint's name for its interpolator.
+        surface: suffix, before a number, of a link's name for its face sets.
     """
 
     def __init__(self, robot: Robot) -> None:
+        """Derive the names from ``robot``."""
         links = [link.name for link in robot.links]
         shown = [link.name for link in robot.links if link.shapes]
         materials = {shape.material for link in robot.links for shape in link.shapes}
         ordered = sorted(materials, key=repr)
-        wanted = [
+        requested = [
             *links,
             *robot.joints,
             *(f"{name}_{part}" for name in shown for part in (LOOK, PAINT)),
             *(material.name for material in ordered),
             CLOCK,
         ]
-        self._made = distinct(wanted, KEYWORDS)
-        made = iter(self._made)
-        self.links: Mapping[str, str] = {name: next(made) for name in links}
-        self.joints: Mapping[str, str] = {name: next(made) for name in robot.joints}
+        self._made = distinct(requested, KEYWORDS)
+        unused = iter(self._made)
+        self.links: Mapping[str, str] = {name: next(unused) for name in links}
+        self.joints: Mapping[str, str] = {name: next(unused) for name in robot.joints}
         self.dressed: Mapping[str, NodeNames] = {
-            name: NodeNames(next(made), next(made)) for name in shown
+            name: NodeNames(next(unused), next(unused)) for name in shown
         }
-        self._appearances = {material: next(made) for material in ordered}
-        self.clock = next(made)
+        self._appearances = {material: next(unused) for material in ordered}
+        self.clock = next(unused)
         self.way = "_motion"
         while any(f"{joint}{self.way}" in self._made for joint in self.joints.values()):
             self.way += "_"
@@ -65,14 +70,14 @@ class VrmlNames:
             self.surface += "_"
 
     def appearance(self, material: Material) -> str:
-        """Of its Appearance."""
+        """Return the name of the Appearance of ``material``."""
         return self._appearances[material]
 
     def objects(self, names: Sequence[str]) -> Mapping[str, tuple[str, NodeNames]]:
-        """Of what stands around, by its own name: its Transform, and how it is shown.
+        """Return the names of the Transform and the appearance of each object.
 
-        They come after all that is in the files.
+        They follow after all names in the exported files.
         """
-        wanted = [part for name in names for part in (name, f"{name}_{LOOK}", f"{name}_{PAINT}")]
-        made = iter(distinct([*self._made, *wanted], KEYWORDS)[len(self._made) :])
-        return {name: (next(made), NodeNames(next(made), next(made))) for name in names}
+        requested = [part for name in names for part in (name, f"{name}_{LOOK}", f"{name}_{PAINT}")]
+        unused = iter(distinct([*self._made, *requested], KEYWORDS)[len(self._made) :])
+        return {name: (next(unused), NodeNames(next(unused), next(unused))) for name in names}

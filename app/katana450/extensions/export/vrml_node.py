@@ -1,4 +1,4 @@
-"""VRML97 as values: nodes with their fields, and the routes between them.
+"""VRML97 as values: nodes with their fields, and routes between them.
 
 Field names and types are those of ISO/IEC 14772-1:1997, chapter 6, for the nodes that are used.
 """
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 
 class Type(Enum):
-    """Of a field: how many numbers make one value, and whether there can be any number of them."""
+    """The type of a field: the kind of its values, and whether it is a list (MF)."""
 
     BOOL = "SFBool"
     INT = "SFInt32"
@@ -52,9 +52,10 @@ WIDTHS: Mapping[Type, int] = MappingProxyType(
         Type.ROTATION_LIST: 4,
     }
 )
-"""Numbers a value of those types that are made of numbers."""
+"""Numbers per value of the numeric types."""
 
 LISTS = frozenset(kind for kind in Type if kind.value.startswith("MF"))
+"""Types with any number of values."""
 
 _CHILDREN = {"children": Type.NODE_LIST}
 
@@ -112,7 +113,7 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
         "PositionInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.VECTOR_LIST},
     }
 )
-"""Every node that is written, with the types of its fields."""
+"""The fields of every node that is written, with their types."""
 
 EVENTS: Mapping[tuple[str, str], Type] = MappingProxyType(
     {
@@ -121,7 +122,7 @@ EVENTS: Mapping[tuple[str, str], Type] = MappingProxyType(
         ("PositionInterpolator", "value_changed"): Type.VECTOR,
     }
 )
-"""Events that go out of nodes."""
+"""Outgoing events of nodes."""
 
 SETTERS: Mapping[tuple[str, str], Type] = MappingProxyType(
     {
@@ -131,7 +132,7 @@ SETTERS: Mapping[tuple[str, str], Type] = MappingProxyType(
         ("Transform", "set_translation"): Type.VECTOR,
     }
 )
-"""Events that nodes take."""
+"""Incoming events of nodes."""
 
 KEYWORDS = frozenset(
     [
@@ -139,20 +140,26 @@ KEYWORDS = frozenset(
         *("eventIn", "eventOut", "exposedField", "field"),
     ]
 )
+"""Words that cannot be names."""
 
 
 class Use(NamedTuple):
-    """A node that was named before, once more."""
+    """A reference to a node with a DEF name."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class Node:
-    """kind: a key of FIELDS. fields: name and value of each that is set. name: of its DEF.
+    """A node of a world.
 
-    Values are bool, float, str, tuples of them, a Node or Use, or a tuple of those; the numbers of
-    lists stand in one row.
+    Values are bool, float, str, tuples of them, a Node or Use, or a tuple of those. Lists of
+    vectors are flat tuples of numbers.
+
+    Attributes:
+        kind: a key of FIELDS.
+        fields: name and value of each field that is set.
+        name: its DEF name.
     """
 
     kind: str
@@ -160,11 +167,11 @@ class Node:
     name: str | None = None
 
     def get(self, field: str) -> Value | None:
-        """The value of a field, if it is set."""
+        """Return the value of a field; None if it is not set."""
         return next((value for name, value in self.fields if name == field), None)
 
     def walk(self) -> Iterator[Node]:
-        """It and all nodes in it, in the order of a file."""
+        """Yield this node and all nodes in it, in the order of a file."""
         yield self
         for _, value in self.fields:
             for part in value if isinstance(value, tuple) else (value,):
@@ -173,10 +180,11 @@ class Node:
 
 
 Value = bool | float | str | Node | Use | tuple["float | str | Node | Use", ...]
+"""The value of a field."""
 
 
 class Route(NamedTuple):
-    """Node and event it goes out of, node and event it goes into."""
+    """A route from an event of a node to an event of another."""
 
     source: str
     out: str
@@ -186,11 +194,11 @@ class Route(NamedTuple):
 
 @dataclass(frozen=True)
 class World:
-    """What a file holds."""
+    """The content of a file."""
 
     nodes: tuple[Node, ...]
     routes: tuple[Route, ...] = ()
 
     def named(self) -> dict[str, Node]:
-        """Every node that has a DEF."""
+        """Return every node with a DEF name, by that name."""
         return {n.name: n for top in self.nodes for n in top.walk() if n.name is not None}

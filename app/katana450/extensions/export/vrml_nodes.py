@@ -1,7 +1,7 @@
-"""The VRML world of a running arm, by its DEF names: what can be read of it, and what can be set.
+"""The VRML world of a running arm by DEF names: the values that can be read and set.
 
-A joint's rotation is an order to go there, never a place it is put at; what objects and paints are
-set to goes through the same door. The names are those of the exported files.
+Setting a joint's rotation makes it the target of a motion; it never sets the position itself.
+Settings of objects and paints become commands as well. The names are those of the exported files.
 """
 
 from __future__ import annotations
@@ -31,13 +31,14 @@ from katana450.server.api import answers, requests
 from katana450.server.service.nodes import Nodes
 
 AXIS_TOLERANCE = 1e-6
-"""[rad] By which the axis of a rotation may be beside that of the joint."""
+"""[rad] Maximum angle between the axis of a rotation and that of the joint."""
 
 FieldValue = float | list[float]
+"""The value of a field: one number or several."""
 
 
 class _Orders:
-    """What one message comes to, until all of it is understood."""
+    """The commands of one message, collected until all of it is parsed."""
 
     def __init__(self, state: State) -> None:
         self.state = state
@@ -45,14 +46,16 @@ class _Orders:
         self.others: list[cmd.Command] = []
 
     def command(self) -> cmd.Command:
-        """All of them, at once."""
+        """Return all of them as one command."""
         turned = (cmd.SetAxes(tuple(self.axes.items())),) if self.axes else ()
-        said = (*turned, *self.others)
-        return said[0] if len(said) == 1 else cmd.Batch(said)
+        commands = (*turned, *self.others)
+        return commands[0] if len(commands) == 1 else cmd.Batch(commands)
 
 
 @dataclass(frozen=True, eq=False)
 class _Field:
+    """A field: its type, the function that reads it, and one that sets it if that is possible."""
+
     type: Type
     read: Callable[[State], FieldValue]
     put: Callable[[_Orders, FieldValue | None], None] | None = None
@@ -60,30 +63,33 @@ class _Field:
 
 @dataclass(frozen=True, eq=False)
 class _Node:
+    """A node: its kind, the object that it belongs to, and its fields."""
+
     kind: str
     of: str
     fields: Mapping[str, _Field]
 
 
 class VrmlNodes(Nodes):
-    """Everything that has a DEF name. Changes nothing by itself."""
+    """All nodes with DEF names. It changes no state itself."""
 
     def __init__(self, robot: Robot, environment: Environment) -> None:
+        """Build the nodes of ``robot``; those of objects follow from the state."""
         super().__init__(robot)
         arm = robot.arm
         axes = robot.driven if arm is None else arm.chain.names
         self._axes: Mapping[str, int] = {name: axis for axis, name in enumerate(axes)}
         self._fingers = () if arm is None else tuple(arm.fingers)
-        # A finger that follows another is set by it alone.
+        # A finger that follows another can only be set through that one.
         self._gripper = next((f for f in self._fingers if robot.joints[f].leader == f), None)
         self._surroundings = environment
         self._names = VrmlNames(robot)
         self._fixed = self._of_the_robot()
-        # Of the objects there are at present, by the names they had.
+        # The nodes for the present objects, with the names of these objects as the key.
         self._known: tuple[tuple[str, ...], Mapping[str, _Node]] = ((), self._fixed)
 
     def world(self, state: State) -> answers.World:
-        """All nodes with what they are now."""
+        """Return all nodes with their present values."""
         return answers.World(
             nodes=[
                 answers.Node(
@@ -105,7 +111,7 @@ class VrmlNodes(Nodes):
         )
 
     def read(self, state: State, asked: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:
-        """What the fields are now. Raises InputError for a name there is none of."""
+        """Return the present values of the fields. Raises InputError for an unknown name."""
         return tuple(
             answers.Value(
                 node=each.node,
@@ -116,19 +122,19 @@ class VrmlNodes(Nodes):
         )
 
     def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:
-        """What sets all of these. Raises InputError when one cannot be set, which and why."""
+        """Return the command for all settings. Raises InputError with the reason of a refusal."""
         orders = _Orders(state)
         for each in settings:
             name = f"{each.node}.{each.field}"
             field = self._field(state, each.node, each.field)
             if field.put is None:
-                raise InputError(f"{name} can be read and not set.")
+                raise InputError(f"{name} can be read but not set.")
             field.put(orders, None if each.value is None else _fitting(name, field, each.value))
         self._check_carried(orders)
         return orders.command()
 
     def _check_carried(self, orders: _Orders) -> None:
-        """Raise InputError for an object that would stand on nothing once all is moved."""
+        """Raise InputError if an object has no support after all moves."""
         moves = [each for each in orders.others if isinstance(each, cmd.MoveObject)]
         objects = functools.reduce(with_moved_object, moves, orders.state).objects
         for name in {each.name for each in moves}:
@@ -139,10 +145,12 @@ class VrmlNodes(Nodes):
     def _field(self, state: State, node: str, field: str) -> _Field:
         found = self._nodes(state).get(node)
         if found is None:
-            raise InputError(f"There is no node {node!r}; `query` of `world` lists them.")
+            raise InputError(
+                f"There is no node {node!r}. The request `query` of `world` lists all nodes."
+            )
         if field not in found.fields:
             known = ", ".join(found.fields)
-            raise InputError(f"{node!r} is a {found.kind} with {known}, and has no {field!r}.")
+            raise InputError(f"{node!r} is a {found.kind} with {known}; it has no field {field!r}.")
         return found.fields[field]
 
     def _nodes(self, state: State) -> Mapping[str, _Node]:
@@ -175,18 +183,18 @@ class VrmlNodes(Nodes):
 
         def put(orders: _Orders, value: FieldValue | None) -> None:
             if not isinstance(value, list):
-                raise InputError(f"{name} has no value of its own to go back to; say where it is.")
+                raise InputError(f"{name} has no default. Give a value.")
             if joint.leader != name:
-                raise InputError(f"{name} follows {joint.leader}: set that.")
+                raise InputError(f"{name} follows {joint.leader}. Set that joint.")
             amount = _along(name, axis, value) if joint.slides else _about(name, axis, value)
             if name in self._axes:
                 orders.axes[self._axes[name]] = amount
             elif name == self._gripper:
                 orders.others.append(cmd.SetGripper(amount))
             elif name in self._fingers:
-                raise InputError(f"{name} is driven together with {self._gripper}: set that.")
+                raise InputError(f"{name} is driven together with {self._gripper}. Set that joint.")
             else:
-                raise InputError(f"{name} stays where it is: it is no joint of the arm.")
+                raise InputError(f"{name} cannot move: it is not a joint of the arm.")
 
         moved = "translation" if joint.slides else "rotation"
         kind = Type.VECTOR if joint.slides else Type.ROTATION
@@ -225,12 +233,12 @@ class VrmlNodes(Nodes):
 
 
 def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, _Node]:
-    """The Switch of a link or object, and the Material of its paint."""
+    """Return the Switch of a link or object, and the Material of its paint."""
 
     def put(trait: AppearanceTrait) -> Callable[[_Orders, FieldValue | None], None]:
         def changed(orders: _Orders, value: FieldValue | None) -> None:
-            said = tuple(value) if isinstance(value, list) else value
-            orders.others.append(cmd.SetAppearance(name, trait, said))
+            trait_value = tuple(value) if isinstance(value, list) else value
+            orders.others.append(cmd.SetAppearance(name, trait, trait_value))
 
         return changed
 
@@ -266,43 +274,43 @@ def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, 
 
 
 def _fitting(name: str, field: _Field, value: FieldValue) -> FieldValue:
-    """``value`` if it is one of the field's type."""
+    """Return ``value`` if it fits the type of the field. Raises InputError."""
     numbers = value if isinstance(value, list) else [value]
     if len(numbers) != WIDTHS[field.type] or isinstance(value, list) != (len(numbers) > 1):
-        wanted = "a number" if WIDTHS[field.type] == 1 else f"{WIDTHS[field.type]} numbers"
-        raise InputError(f"{name} is a {field.type.value}, which is {wanted}, not {value}.")
+        expected = "a number" if WIDTHS[field.type] == 1 else f"{WIDTHS[field.type]} numbers"
+        raise InputError(f"{name} is a {field.type.value}, which is {expected}, not {value}.")
     if not all(map(math.isfinite, numbers)):
-        raise InputError(f"{name} has to be finite: {value}.")
+        raise InputError(f"{name} must be finite, not {value}.")
     return value
 
 
 def _out_of_the_hand(orders: _Orders, name: str, value: FieldValue | None) -> list[float]:
-    """``value``, where the object of that name can be moved."""
+    """Return ``value`` if the object can be moved. Raises InputError."""
     if _known_object(orders.state, name).held:
-        raise InputError(f"{name!r} is held: open the gripper first.")
+        raise InputError(f"{name!r} is held. Open the gripper first.")
     if not isinstance(value, list):
-        raise InputError(f"{name} has no place of its own to go back to; say where it is to be.")
+        raise InputError(f"{name} has no default place. Give a place.")
     return value
 
 
 def _about(name: str, axis: FloatArray, rotation: list[float]) -> float:
-    """The angle [rad] about ``axis`` of a rotation, which must be about that alone."""
+    """Return the angle [rad] of ``rotation`` about ``axis``. Raises InputError for another axis."""
     angle = rotation[3]
     if angle == 0.0:
         return 0.0
     given = _unit(rotation[:3])
     if given is None or float(np.linalg.norm(np.cross(axis, given))) > AXIS_TOLERANCE:
         about = _shown(np.array(rotation[:3]))
-        raise InputError(f"{name} turns about {_shown(axis)}, and cannot turn about {about}.")
+        raise InputError(f"{name} turns about {_shown(axis)} and cannot turn about {about}.")
     return angle if float(axis @ given) > 0.0 else -angle
 
 
 def _along(name: str, axis: FloatArray, translation: list[float]) -> float:
-    """How far [m] along ``axis`` a translation is, which must be along that alone."""
+    """Return the distance [m] along ``axis``. Raises InputError for another direction."""
     given = np.array(translation)
     amount = float(axis @ given)
     if float(np.linalg.norm(given - amount * axis)) > AXIS_TOLERANCE * max(abs(amount), 1.0):
-        raise InputError(f"{name} slides along {_shown(axis)}, and cannot go to {_shown(given)}.")
+        raise InputError(f"{name} slides along {_shown(axis)} and cannot move to {_shown(given)}.")
     return amount
 
 
@@ -311,17 +319,17 @@ def _shown(vector: FloatArray) -> str:
 
 
 def _rotation(name: str, given: list[float]) -> FloatArray:
-    """(3, 3) of a VRML rotation: an axis, and an angle about it [rad]."""
+    """Return the matrix (3, 3) of a VRML rotation: an axis and an angle [rad]."""
     if given[3] == 0.0:
         return np.eye(3)
     axis = _unit(given[:3])
     if axis is None:
-        raise InputError(f"{name} cannot turn about an axis without a direction.")
+        raise InputError(f"{name} cannot turn about an axis of length 0.")
     return so3.exp(math.remainder(given[3], math.tau) * axis)
 
 
 def _unit(given: list[float]) -> FloatArray | None:
-    """The direction of a vector of any length; None of one without."""
+    """Return the direction of a vector; None for a zero vector."""
     largest = max(map(abs, given))
     if largest == 0.0:
         return None
@@ -330,7 +338,7 @@ def _unit(given: list[float]) -> FloatArray | None:
 
 
 def _axis_angle(R: FloatArray) -> list[float]:
-    """The VRML rotation (4,) of ``R`` (3, 3)."""
+    """Return the VRML rotation (4,) of ``R`` (3, 3)."""
     w = so3.log(R)
     angle = float(np.linalg.norm(w))
     return [*(w / angle).tolist(), angle] if angle else [0.0, 0.0, 1.0, 0.0]

@@ -1,4 +1,4 @@
-"""VRML97 values as text, and strictly back."""
+"""Text of VRML97 values, and a strict parser for it."""
 
 from __future__ import annotations
 
@@ -27,17 +27,18 @@ T = TypeVar("T")
 N = TypeVar("N", int, float)
 
 HEADER = "#VRML V2.0 utf8"
+"""First line of a file."""
 
 LINE = 16
-"""Rows of numbers a line: long enough to be small, short enough for old readers."""
+"""Rows of numbers per line: few enough for old readers, enough for small files."""
 
 MAX_QUOTED_CHARACTERS = 160
-"""Characters of what an error tells of a file."""
+"""Maximum length of a quotation from a file in an error message."""
 
 MAX_DEPTH = 200
-"""Nodes in nodes; a file that goes deeper is refused before Python's stack ends."""
+"""Maximum nesting of nodes, within the limit of Python's stack."""
 
-# Possessive, so that what does not match fails at once, whatever a stranger wrote.
+# Possessive quantifiers, so that a mismatch in an untrusted file fails without backtracking.
 _TOKEN = re.compile(
     r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
 )
@@ -51,7 +52,7 @@ _NAME = re.compile(r"[^\x00-\x20\"#',.\[\]\\{}\x7f0-9+-][^\x00-\x20\"#',.\[\]\\{
 
 
 def world_text(world: World) -> str:
-    """The file; floats are written so that they come back the same."""
+    """Return the text of a file; floats are written so that they can be read back exactly."""
     parts = [HEADER, "\n"]
     for node in world.nodes:
         _write(parts, node, 0)
@@ -111,23 +112,23 @@ def _short(numbers: str) -> str:
 
 
 def read_world(text: str, name: str = "The file") -> World:
-    """What a file of the nodes in FIELDS holds.
+    """Return the content of a file that uses only the nodes in FIELDS.
 
-    `name` says in errors which file it is. Raises InputError, with the line, for anything that
-    VRML97 does not allow or that is not among those nodes and fields.
+    ``name`` is the name of the file for messages. Raises InputError with the line for anything that
+    VRML97 does not allow, or that is not among those nodes and fields.
     """
     if not re.match(f"{re.escape(HEADER)}(?![^ \r\n])", text):
-        raise InputError(f"{name} does not begin with {HEADER!r}, so it is not VRML97.")
+        raise InputError(f"{name} is not VRML97: it must begin with {HEADER!r}.")
     return Reader(text, name).world()
 
 
 class Reader:
-    """Reads the nodes of a table of their fields; what else is there it refuses."""
+    """A parser of the nodes in a table of fields; it refuses all others."""
 
     fields = FIELDS
 
     def __init__(self, text: str, name: str) -> None:
-        """`name` says in errors which file the `text` is of."""
+        """Parse ``text`` of the file ``name``, which is used in messages."""
         self._text, self._name = text, name
         self._at = self._next = 0
         self._tokens = self._scan()
@@ -135,7 +136,7 @@ class Reader:
         self._named: dict[str, Node | None] = {}
 
     def world(self) -> World:
-        """What the file holds."""
+        """Return the content of the file. Raises InputError with the line of an error."""
         nodes: list[Node] = []
         routes: list[Route] = []
         while self._ahead:
@@ -144,7 +145,7 @@ class Reader:
             else:
                 node = self._node(0)
                 if isinstance(node, Use):
-                    raise self._error("a file's own nodes are no USE")
+                    raise self._error("USE is not allowed at the top level")
                 nodes.append(node)
         return World(tuple(nodes), tuple(routes))
 
@@ -153,7 +154,7 @@ class Reader:
         while True:
             found = _TOKEN.match(self._text, self._next)
             if found is None:
-                raise self._error("a text that does not end, or a stray sign")
+                raise self._error("unterminated text or unexpected character")
             self._at, self._next = found.start(1), found.end()
             yield found[1]
 
@@ -171,18 +172,18 @@ class Reader:
 
     def _expect(self, token: str) -> None:
         if self._ahead != token:
-            raise self._error(f"{token!r} is wanted, not {self._ahead!r}")
+            raise self._error(f"expected {token!r}, not {self._ahead!r}")
         self._take()
 
     def _new_name(self) -> str:
         name = self._take()
         if not _NAME.fullmatch(name) or name in KEYWORDS:
-            raise self._error(f"{name!r} is no name")
+            raise self._error(f"{name!r} is not a name")
         return name
 
     def _node(self, depth: int) -> Node | Use:
         if depth > MAX_DEPTH:
-            raise self._error(f"nodes lie more than {MAX_DEPTH} deep in each other")
+            raise self._error(f"nodes are nested more than {MAX_DEPTH} deep")
         name: str | None = None
         token = self._take()
         if token == "USE":
@@ -209,7 +210,7 @@ class Reader:
                 self._stray(token, field)
                 continue
             if field in fields:
-                raise self._error(f"the field {field} stands twice in one {token}")
+                raise self._error(f"the field {field} is given twice in one {token}")
             fields[field] = self._value(kinds[field], depth)
         self._take()
         node = Node(token, tuple(fields.items()), name)
@@ -226,11 +227,11 @@ class Reader:
         return Use(name)
 
     def _unknown(self, kind: str, _name: str | None) -> Node:
-        """A node that is not in the table."""
-        raise self._error(f"{kind!r} is no node that is understood")
+        """Parse a node that is not in the table."""
+        raise self._error(f"the node {kind!r} is not supported")
 
     def _stray(self, kind: str, field: str) -> None:
-        """What stands where a node of that kind would have a field."""
+        """Parse a token in the place of a field of a node ``kind``."""
         raise self._error(f"{kind} has no field {field!r}")
 
     def _value(self, kind: Type, depth: int) -> Value:
@@ -242,7 +243,7 @@ class Reader:
             case Type.BOOL:
                 token = self._take()
                 if token not in ("TRUE", "FALSE"):
-                    raise self._error(f"TRUE or FALSE is wanted, not {token!r}")
+                    raise self._error(f"expected TRUE or FALSE, not {token!r}")
                 return token == "TRUE"
             case Type.STRING:
                 return self._string()
@@ -257,14 +258,14 @@ class Reader:
         if kind not in LISTS:
             row = tuple(self._float() for _ in range(width))
             return row[0] if width == 1 else row
-        # One value of a list may stand without brackets.
+        # A list of one value may omit its brackets.
         if self._ahead != "[":
             return tuple(self._float() for _ in range(width))
         numbers = self._row(_NUMBERS, float)
         if numbers is None:
             numbers = tuple(self._items(self._float))
         if len(numbers) % width:
-            raise self._error(f"{len(numbers)} numbers are no rows of {width}")
+            raise self._error(f"{len(numbers)} numbers do not form rows of {width}")
         return numbers
 
     def _items(self, one: Callable[[], T]) -> Iterator[T]:
@@ -277,7 +278,7 @@ class Reader:
         self._take()
 
     def _row(self, pattern: re.Pattern[str], one: Callable[[str], N]) -> tuple[N, ...] | None:
-        """A list that holds plain numbers alone, at once; None if it is not that simple."""
+        """Return a list of plain numbers at once; None if the list is not that simple."""
         if self._ahead != "[":
             return None
         end = self._text.find("]", self._next)
@@ -295,22 +296,22 @@ class Reader:
     def _string(self) -> str:
         token = self._take()
         if not token.startswith('"'):
-            raise self._error(f"a text in quotes is wanted, not {token!r}")
+            raise self._error(f"expected a text in quotes, not {token!r}")
         return re.sub(r"\\(.)", r"\1", token[1:-1], flags=re.DOTALL)
 
     def _float(self) -> float:
         token = self._take()
         if not _NUMBER.fullmatch(token):
-            raise self._error(f"a number is wanted, not {token!r}")
+            raise self._error(f"expected a number, not {token!r}")
         value = float(token)
         if not math.isfinite(value):
-            raise self._error(f"{token!r} is too large a number")
+            raise self._error(f"the number {token!r} is too large")
         return value
 
     def _integer(self) -> int:
         token = self._take()
         if not _INTEGER.fullmatch(token):
-            raise self._error(f"a whole number is wanted, not {token!r}")
+            raise self._error(f"expected a whole number, not {token!r}")
         return int(token, 0) if "x" in token.lower() else int(token)
 
     def _route(self) -> Route:
@@ -320,7 +321,7 @@ class Reader:
         target, into = self._end(SETTERS, "into")
         kinds = {name: node.kind for name, node in self._named.items() if node is not None}
         if EVENTS[kinds[source], out] is not SETTERS[kinds[target], into]:
-            raise self._error(f"{source}.{out} and {target}.{into} are of two types")
+            raise self._error(f"{source}.{out} and {target}.{into} have different types")
         return Route(source, out, target, into)
 
     def _end(self, events: Mapping[tuple[str, str], Type], which: str) -> tuple[str, str]:
@@ -328,5 +329,5 @@ class Reader:
         name, _, event = token.partition(".")
         node = self._named.get(name)
         if node is None or (node.kind, event) not in events:
-            raise self._error(f"no route goes {which} {token!r}")
+            raise self._error(f"a route cannot go {which} {token!r}")
         return name, event

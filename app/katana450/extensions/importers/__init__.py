@@ -1,1 +1,1 @@
-"""Files of other programs, read as shapes and scenes."""
+"""Readers of shape and scene files of other programs."""

@@ -1,4 +1,4 @@
-"""COLLADA by pycollada, which trimesh reads it with too.
+"""COLLADA, read with pycollada, the library that trimesh uses for it too.
 
 Source: Khronos Group, COLLADA 1.4.1 (2008). trimesh cuts concave polygons into fans, so the parts
 of the scene are taken from pycollada. No entity is expanded and no other file is opened.
@@ -37,9 +37,10 @@ LEFT_OUT = {
     "lines": "lines",
     "linestrips": "lines",
 }
-"""Elements that say what is not read, and the words for it."""
+"""XML elements that are not read, and their names in messages."""
 
 SURFACES = (BoundTriangleSet, BoundPolylist)
+"""Classes of primitives that have a surface."""
 
 X_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Rotation from x up to y up."""
@@ -54,7 +55,7 @@ def read_dae(data: bytes, name: str) -> MeshReading:
             io.BytesIO(etree.tostring(root)), ignore=[DaeError], aux_file_loader=_no_file
         )
         if document.scene is None:
-            raise InputError(f"{name} has no scene that is shown.")
+            raise InputError(f"{name} shows no scene.")
         for number, part in enumerate(document.scene.objects("geometry")):
             if number >= MAX_COPIES:
                 raise InputError(f"{name} shows more than {MAX_COPIES} nodes.")
@@ -64,9 +65,9 @@ def read_dae(data: bytes, name: str) -> MeshReading:
         surface = builder.surface()
         unit = document.assetInfo.unitmeter
         up = str(document.assetInfo.upaxis)
-    left_out = [said for tag, said in LEFT_OUT.items() if root.find(f".//{{*}}{tag}") is not None]
+    left_out = [words for tag, words in LEFT_OUT.items() if root.find(f".//{{*}}{tag}") is not None]
     if document.errors:
-        left_out.append(f"{len(document.errors)} parts that are broken")
+        left_out.append(f"{len(document.errors)} corrupt parts")
     if up == "X_UP":
         surface = MeshSurface(surface.vertices @ X_UP.T, surface.faces, surface.colours)
     return MeshReading(
@@ -83,17 +84,17 @@ def _document(data: bytes, name: str) -> etree._Element:
     try:
         root = etree.fromstring(data, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
-        said = " ".join(str(error).split())[:120].rstrip(".")
-        raise InputError(f"{name} is broken, or no COLLADA: {said}.") from error
+        reason = " ".join(str(error).split())[:120].rstrip(".")
+        raise InputError(f"{name} is corrupt or not COLLADA: {reason}.") from error
     if root.getroottree().docinfo.doctype:
-        raise InputError(f"{name} declares entities of its own, which are not read.")
+        raise InputError(f"{name} declares XML entities, which are not supported.")
     if etree.QName(root).localname != "COLLADA":
-        raise InputError(f"{name} is no COLLADA: its first element is another.")
+        raise InputError(f"{name} is not COLLADA: its root element has another name.")
     return root
 
 
 def _no_file(_path: str) -> None:
-    """Find no other file, whatever the file names."""
+    """Return None for every other file that the file refers to."""
 
 
 def _surface(primitive: BoundPrimitive, is_mirrored: bool, name: str) -> MeshSurface:
@@ -103,7 +104,7 @@ def _surface(primitive: BoundPrimitive, is_mirrored: bool, name: str) -> MeshSur
         sizes = np.diff(np.asarray(primitive.polyindex, dtype=np.int64).reshape(-1, 2)).ravel()
     corners = corners.ravel()
     if (sizes < 0).any() or sizes.sum() != len(corners):
-        raise InputError(f"{name} is broken: its polygons do not have the corners they say.")
+        raise InputError(f"{name} is corrupt: its polygons do not have the corners they declare.")
     surface = of_polygons(
         doubles(primitive.vertex).reshape(-1, 3),
         corners,
@@ -117,9 +118,9 @@ def _surface(primitive: BoundPrimitive, is_mirrored: bool, name: str) -> MeshSur
 
 
 def _colours(primitive: BoundPrimitive, count: int, name: str) -> FloatArray | None:
-    """Return (count, 4) 0..1 of the corners, else of the material; None without any.
+    """Return (count, 4) 0..1, colours of the corners or of the material; None without colours.
 
-    Programs disagree on what is opaque in COLLADA: every surface is.
+    Every surface is opaque, because programs disagree on the meaning of opacity in COLLADA.
     """
     listed = primitive.original.sources.get("COLOR")
     if listed:
@@ -132,5 +133,5 @@ def _colours(primitive: BoundPrimitive, count: int, name: str) -> FloatArray | N
             return None
         colours = np.tile(np.asarray(diffuse, dtype=np.float64), (count, 1))
     if colours.ndim != 2 or colours.shape[1] < 3 or len(colours) != count:
-        raise InputError(f"{name} is broken: it has colours that do not go with its corners.")
+        raise InputError(f"{name} is corrupt: the colours do not match the corners.")
     return np.column_stack((colours[:, :3], np.ones(count)))

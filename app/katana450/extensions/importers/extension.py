@@ -1,4 +1,4 @@
-"""The extension ``importers``: meshes and scenes read from files, at the start and by upload."""
+"""The extension ``importers``: meshes and scenes from files, at the start and by upload."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 def add_serve_options(parser: ArgumentParser) -> None:
-    """Add to ``katana450 serve`` the options that say what stands around."""
+    """Add the options for the initial scene to ``katana450 serve``."""
     parser.add_argument(
         "--scene",
         type=Path,
         metavar="FILE",
-        help="what stands around: a scene.yaml with its meshes beside it, or a .zip of both",
+        help="initial scene: a scene.yaml with its meshes beside it, or a .zip of both",
     )
     parser.add_argument(
         "--object",
@@ -31,8 +31,8 @@ def add_serve_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE[@x,y,z]",
-        help="an object besides, of a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf "
-        "file; where it stands in mm, else in front of the arm; as often as there are",
+        help="additional object from a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf "
+        "file, at x,y,z in mm or else in front of the arm; can be repeated",
     )
 
 

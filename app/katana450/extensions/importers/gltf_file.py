@@ -1,4 +1,4 @@
-"""glTF 2.0, as .glb or .gltf with its buffers inside.
+"""glTF 2.0, as .glb, or as .gltf with embedded buffers.
 
 Source: Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022). No other file is opened.
 """
@@ -30,11 +30,13 @@ from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.srgb import to_srgb
 
 Natural = Annotated[int, msgspec.Meta(ge=0)]
+"""A whole number from 0."""
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-"""numpy's types by their numbers."""
+"""Component types: numpy types by their numbers in the specification."""
 
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+"""Number of components of each accessor type."""
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 """Modes of a primitive."""
@@ -46,15 +48,19 @@ IGNORED_EXTENSIONS = (
     "KHR_lights_",
     "EXT_texture",
 )
-"""Beginnings of extensions that a file may require although only surfaces are read."""
+"""Prefixes of required extensions that can be ignored, because only surfaces are read."""
 
 
 class Buffer(msgspec.Struct, rename="camel"):
+    """A buffer of the file."""
+
     byte_length: Natural
     uri: str | None = None
 
 
 class BufferView(msgspec.Struct, rename="camel"):
+    """A part of a buffer."""
+
     buffer: Natural
     byte_length: Natural
     byte_offset: Natural = 0
@@ -62,6 +68,8 @@ class BufferView(msgspec.Struct, rename="camel"):
 
 
 class Accessor(msgspec.Struct, rename="camel"):
+    """An array of numbers in a buffer view."""
+
     component_type: int
     count: Natural
     type: str
@@ -72,6 +80,8 @@ class Accessor(msgspec.Struct, rename="camel"):
 
 
 class Primitive(msgspec.Struct, rename="camel"):
+    """A part of a mesh with one material."""
+
     attributes: dict[str, Natural]
     indices: Natural | None = None
     material: Natural | None = None
@@ -80,10 +90,14 @@ class Primitive(msgspec.Struct, rename="camel"):
 
 
 class Mesh(msgspec.Struct, rename="camel"):
+    """A mesh of the file."""
+
     primitives: list[Primitive]
 
 
 class Node(msgspec.Struct, rename="camel"):
+    """A node of the scene tree."""
+
     children: list[Natural] = []
     mesh: Natural | None = None
     skin: Natural | None = None
@@ -93,7 +107,7 @@ class Node(msgspec.Struct, rename="camel"):
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     def pose(self) -> FloatArray:
-        """(4, 4) in its parent."""
+        """Return its pose (4, 4) in the frame of its parent."""
         if self.matrix is not None:
             return np.array(self.matrix).reshape(4, 4).T
         x, y, z, w = self.rotation
@@ -103,24 +117,32 @@ class Node(msgspec.Struct, rename="camel"):
 
 
 class Scene(msgspec.Struct, rename="camel"):
+    """A scene: the numbers of its root nodes."""
+
     nodes: list[Natural] = []
 
 
 class Metallic(msgspec.Struct, rename="camel"):
+    """The metallic-roughness model of a material."""
+
     base_color_factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     base_color_texture: Any = None
 
 
 class Material(msgspec.Struct, rename="camel"):
+    """A material of the file."""
+
     pbr_metallic_roughness: Metallic = msgspec.field(default_factory=Metallic)
 
 
 class Asset(msgspec.Struct, rename="camel"):
+    """The metadata of the file."""
+
     version: str
 
 
 class Document(msgspec.Struct, rename="camel"):
-    """What of a file is looked at; names are the specification's, in snake case."""
+    """The parts of the JSON document that are read, named as in the specification in snake case."""
 
     asset: Asset
     extensions_required: list[str] = []
@@ -136,45 +158,47 @@ class Document(msgspec.Struct, rename="camel"):
 
 
 def read_gltf(data: bytes, name: str) -> MeshReading:
-    """All triangles of the scene; metres, y up. Raises InputError for what is none."""
-    told, binary = _chunks(data, name) if data.startswith(b"glTF") else (data, None)
+    """Return all triangles of the scene in metres, y up. Raises InputError for an invalid file."""
+    content, binary = _chunks(data, name) if data.startswith(b"glTF") else (data, None)
     try:
-        document = msgspec.json.decode(told, type=Document)
+        document = msgspec.json.decode(content, type=Document)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{name} is no glTF 2.0, or is broken: {error}.") from error
+        raise InputError(f"{name} is corrupt or not glTF 2.0: {error}.") from error
     if not document.asset.version.startswith("2."):
         version = document.asset.version[:20]
-        raise InputError(f"{name} is glTF {version}; only glTF 2.0 is read.")
-    for wanted in document.extensions_required:
-        if not wanted.startswith(IGNORED_EXTENSIONS):
+        raise InputError(f"{name} is glTF {version}; only glTF 2.0 is supported.")
+    for extension in document.extensions_required:
+        if not extension.startswith(IGNORED_EXTENSIONS):
             raise InputError(
-                f"{name} needs the extension {wanted[:60]}, which is not read; "
-                "save it without compression."
+                f"{name} needs the extension {extension[:60]}, which is not supported. "
+                "Save it without compression."
             )
     try:
         return _File(document, binary, name).reading()
     except IndexError as error:
-        raise InputError(f"{name} is broken: it refers to a part that it has not.") from error
+        raise InputError(f"{name} is corrupt: it refers to a part that is missing.") from error
 
 
 def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
-    """Document and buffer of a .glb; other chunks may be left alone."""
+    """Return the document and the buffer of a .glb; other chunks are ignored."""
     found: dict[bytes, bytes] = {}
     at = 12
     if len(data) < at or struct.unpack_from("<II", data, 4) != (2, len(data)):
-        raise InputError(f"{name} is broken, or no GLB 2.0: its length is not what it says.")
+        raise InputError(f"{name} is corrupt or not GLB 2.0: its length differs from its header.")
     while at + 8 <= len(data):
         size, kind = struct.unpack_from("<I4s", data, at)
         if at + 8 + size > len(data):
-            raise InputError(f"{name} is broken: it ends within a chunk.")
+            raise InputError(f"{name} is corrupt: it ends within a chunk.")
         found.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
     if b"JSON" not in found:
-        raise InputError(f"{name} is broken: it has no JSON chunk.")
+        raise InputError(f"{name} is corrupt: it has no JSON chunk.")
     return found[b"JSON"], found.get(b"BIN\0")
 
 
 class _File:
+    """The surfaces of a decoded file."""
+
     def __init__(self, document: Document, binary: bytes | None, name: str) -> None:
         self._document, self._name = document, name
         self._buffers = [
@@ -185,7 +209,7 @@ class _File:
         self._meshes: dict[int, MeshSurface] = {}
 
     def reading(self) -> MeshReading:
-        """Of the scene that is shown first."""
+        """Return the surface of the default scene."""
         builder = MeshBuilder(self._name)
         waiting = [(root, np.eye(4)) for root in self._roots()]
         seen: set[int] = set()
@@ -193,14 +217,14 @@ class _File:
             number, T_parent = waiting.pop()
             if number in seen or len(seen) > MAX_COPIES:
                 raise self._broken(
-                    f"node {number} hangs in two places, or there are over {MAX_COPIES}"
+                    f"node {number} is used twice, or there are over {MAX_COPIES} nodes"
                 )
             seen.add(number)
             node = self._document.nodes[number]
             with np.errstate(over="ignore", invalid="ignore"):
                 T = T_parent @ node.pose() if any(node.rotation) else T_parent * np.nan
             if not np.isfinite(T).all():
-                raise self._broken(f"node {number} is at no finite place")
+                raise self._broken(f"node {number} has a pose that is not finite")
             waiting += [(child, T) for child in reversed(node.children)]
             if node.skin is not None:
                 self._left_out["bones"] += 1
@@ -214,8 +238,8 @@ class _File:
         document = self._document
         if document.scenes:
             return document.scenes[document.scene or 0].nodes[::-1]
-        hung = {child for node in document.nodes for child in node.children}
-        return [number for number in range(len(document.nodes)) if number not in hung]
+        children = {child for node in document.nodes for child in node.children}
+        return [number for number in range(len(document.nodes)) if number not in children]
 
     def _buffer(self, buffer: Buffer, binary: bytes | None) -> bytes:
         if buffer.uri is None:
@@ -224,14 +248,14 @@ class _File:
             try:
                 data = base64.b64decode(buffer.uri.partition(",")[2], validate=True)
             except (binascii.Error, ValueError) as error:
-                raise self._broken(f"a buffer is no base64: {error}") from error
+                raise self._broken(f"a buffer is not base64: {error}") from error
         else:
             raise InputError(
-                f"{self._name} keeps its shapes in another file, {buffer.uri[:60]!r}, which is "
-                "not opened; save it as .glb, or as .gltf with all in it."
+                f"{self._name} has its shapes in another file, {buffer.uri[:60]!r}, which is not "
+                "opened. Save it as .glb, or as .gltf with embedded buffers."
             )
         if data is None or len(data) < buffer.byte_length:
-            raise self._broken("a buffer is shorter than it says, or is not there")
+            raise self._broken("a buffer is missing or shorter than declared")
         return data
 
     def _mesh(self, number: int) -> MeshSurface:
@@ -265,10 +289,10 @@ class _File:
         )
 
     def _corners(self, index: IntArray, mode: int) -> IntArray:
-        """(3 m,) of triangles, strips or fans."""
+        """Return the corners (3 m,) of triangles, strips or fans."""
         if mode == TRIANGLES:
             if len(index) % 3:
-                raise self._broken(f"{len(index)} corners make no triangles")
+                raise self._broken(f"{len(index)} corners do not form triangles")
             return index
         count = max(len(index) - 2, 0)
         check_triangles(count, self._name)
@@ -281,7 +305,7 @@ class _File:
         return index[places.ravel()] if count else index[:0]
 
     def _colours(self, primitive: Primitive, count: int) -> FloatArray | None:
-        """(count, 4) sRGB and opacity 0..1 of the vertices; None without any."""
+        """Return (count, 4) sRGB and opacity 0..1 of the vertices; None without colours."""
         factor = None
         if primitive.material is not None:
             material = self._document.materials[primitive.material].pbr_metallic_roughness
@@ -291,7 +315,7 @@ class _File:
         if "COLOR_0" in primitive.attributes:
             own = self._numbers(primitive.attributes["COLOR_0"], None)
             if own.shape not in ((count, 3), (count, 4)):
-                raise self._broken("colours do not go with the vertices")
+                raise self._broken("the colours do not match the vertices")
             if own.shape[1] == 3:
                 own = np.column_stack((own, np.ones(count)))
             factor = own if factor is None else own * factor
@@ -301,7 +325,7 @@ class _File:
         return np.broadcast_to(shown, (count, 4))
 
     def _numbers(self, number: int, width: int | None) -> FloatArray:
-        """(count, width) of an accessor; whole numbers that stand for 0..1 or -1..1 as these."""
+        """Return (count, width) of an accessor; normalized integers become 0..1 or -1..1."""
         rows = self._rows(number, width)
         accessor = self._document.accessors[number]
         if accessor.normalized and rows.dtype.kind in "iu":
@@ -309,17 +333,17 @@ class _File:
         return doubles(rows)
 
     def _rows(self, number: int, width: int | None) -> npt.NDArray[Any]:
-        """(count, width) of an accessor as it is; any width if None."""
+        """Return (count, width) of an accessor in its own type; any width if None."""
         accessor = self._document.accessors[number]
         if accessor.sparse is not None or accessor.buffer_view is None:
             raise InputError(
-                f"{self._name} has sparse or packed numbers, which are not read; "
-                "save it without compression."
+                f"{self._name} has sparse or packed numbers, which are not supported. "
+                "Save it without compression."
             )
         columns = WIDTHS.get(accessor.type, 0)
         kind = COMPONENTS.get(accessor.component_type)
         if kind is None or columns == 0 or (width is not None and columns != width):
-            raise self._broken(f"accessor {number} is of a wrong type")
+            raise self._broken(f"accessor {number} has a wrong type")
         view = self._document.buffer_views[accessor.buffer_view]
         item = np.dtype(kind).itemsize * columns
         stride = view.byte_stride or item
@@ -335,4 +359,4 @@ class _File:
         )
 
     def _broken(self, what: str) -> InputError:
-        return InputError(f"{self._name} is broken: {what}.")
+        return InputError(f"{self._name} is corrupt: {what}.")

@@ -1,4 +1,4 @@
-"""The scene and the objects that ``katana450 serve`` is given as files."""
+"""The initial scene of ``katana450 serve``, from the files given on the command line."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from katana450.maths.geometry import se3
 from katana450.server.service.scenes import free_name
 
 PLACED = re.compile(r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?")
-"""FILE, or FILE@x,y,z."""
+"""Pattern of an ``--object`` value: FILE, or FILE@x,y,z."""
 
 
 def initial_scene(
     session: Session, scene: Path | None, object_files: Sequence[str]
 ) -> InitialScene:
-    """Return the scene to start with. Raises InputError; see ``load_initial_scene``."""
+    """Return the initial scene. Raises InputError; see ``load_initial_scene``."""
     stored, notes = load_initial_scene(session, scene, object_files)
     command = cmd.ReplaceScene(stored.scene.objects, stored.scene.water)
     return InitialScene(command, stored.scene.joints, stored.meshes, notes)
@@ -40,10 +40,11 @@ def initial_scene(
 def load_initial_scene(
     session: Session, scene: Path | None, object_files: Sequence[str]
 ) -> tuple[StoredScene, tuple[str, ...]]:
-    """The scene of the file ``scene`` and the ``objects`` besides, FILE[@x,y,z] each, in mm.
+    """Return the scene of the file ``scene`` with the objects of ``object_files``, and notes.
 
-    Without a scene what there is of the robot's own; and sentences on what was read. Raises
-    InputError for what cannot be read, or cannot stand there.
+    Each of ``object_files`` is FILE[@x,y,z] in mm. Without a scene file, the scene has the robot's
+    own objects. Raises InputError for a file that cannot be read, and for an object that cannot
+    stand at its place.
     """
     hand = session.environment.hand
     stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).objects))
@@ -54,21 +55,21 @@ def load_initial_scene(
         if not session.require_arm().chain.within_limits(q):
             raise InputError(f"{scene}: the joints lie outside the limits of this arm.")
     if stored.scene.water is not None and all(t.name != CUP for t in stored.scene.objects):
-        raise InputError(f"{scene}: there is water, and no cup for it.")
-    objects, meshes, said = list(stored.scene.objects), list(stored.meshes), []
-    for told in object_files:
-        mesh, scene_object = _object(told, objects)
+        raise InputError(f"{scene}: there is water, but no cup.")
+    objects, meshes, notes = list(stored.scene.objects), list(stored.meshes), []
+    for argument in object_files:
+        mesh, scene_object = _object(argument, objects)
         objects.append(scene_object)
         meshes.append(mesh)
-        said.append(f"{scene_object.name}: {mesh.text}")
+        notes.append(f"{scene_object.name}: {mesh.text}")
     session.check(cmd.ReplaceScene(tuple(objects), stored.scene.water))
     kept = {mesh.key: mesh for mesh in meshes}
-    whole = StoredScene(replace(stored.scene, objects=tuple(objects)), tuple(kept.values()))
-    return whole, tuple(said)
+    complete = StoredScene(replace(stored.scene, objects=tuple(objects)), tuple(kept.values()))
+    return complete, tuple(notes)
 
 
-def _object(told: str, objects: Sequence[SceneObject]) -> tuple[Mesh, SceneObject]:
-    match = PLACED.fullmatch(told)
+def _object(argument: str, objects: Sequence[SceneObject]) -> tuple[Mesh, SceneObject]:
+    match = PLACED.fullmatch(argument)
     assert match is not None
     path = Path(match["file"])
     try:
@@ -84,5 +85,5 @@ def _object(told: str, objects: Sequence[SceneObject]) -> tuple[Mesh, SceneObjec
     try:
         at = [1e-3 * float(each) for each in match["at"].split(",")]
     except ValueError:
-        raise InputError(f"{told!r}: where it stands is x,y,z in mm, as in @300,0,0.") from None
+        raise InputError(f"{argument!r}: the place must be x,y,z in mm, as in @300,0,0.") from None
     return mesh, replace(scene_object, T=se3.from_rotation_translation(np.eye(3), at))

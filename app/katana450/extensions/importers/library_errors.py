@@ -1,4 +1,4 @@
-"""Failures of libraries that parse untrusted files, as sentences about the file."""
+"""Conversion of exceptions in libraries that parse untrusted files to messages about the file."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from katana450.errors import InputError
 
 @contextmanager
 def failures_in_words(name: str) -> Iterator[None]:
-    """Raise InputError about the file ``name`` for whatever a library raises in the block."""
+    """Raise InputError about the file ``name`` for any exception of a library in the block."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            # Older numpy only warns of text that is no number.
+            # Older numpy only warns about text that is not a number.
             warnings.filterwarnings("error", message="string or file could not be read")
             yield
     except (InputError, MemoryError, RecursionError):
         raise
     except (IndexError, KeyError, StopIteration) as error:
-        raise InputError(f"{name} is broken: it refers to a part that it has not.") from error
+        raise InputError(f"{name} is corrupt: it refers to a part that is missing.") from error
     except Exception as error:
-        said = " ".join(str(error).split())[:120].rstrip(".")
-        raise InputError(f"{name} is broken: {said or type(error).__name__}.") from error
+        reason = " ".join(str(error).split())[:120].rstrip(".")
+        raise InputError(f"{name} is corrupt: {reason or type(error).__name__}.") from error

@@ -1,4 +1,4 @@
-"""The mesh of an object, read from its file."""
+"""The mesh of a scene object, read from its file."""
 
 from __future__ import annotations
 
@@ -19,17 +19,22 @@ from katana450.extensions.importers.shape_file import (
 from katana450.maths.collision.convex_body import ConvexBody
 
 HULL_DISTANCE_TO_REPORT = 2e-3
-"""[m] That a hull stands off is worth a word from here on."""
+"""[m] Distance of a hull from its mesh from which it is reported."""
 
 HULL_VOLUME_RATIO_TO_REPORT = 1.2
-"""[1] Likewise how many times as large it is."""
+"""[1] Ratio of the volumes of hull and mesh from which it is reported."""
 
 
 def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = None) -> Mesh:
-    """The mesh in a file of that name.
+    """Return the mesh in a file, read in a subprocess within some seconds.
 
-    unit: a key of UNITS; None to guess. up: as `read_shape` has it. Reads in a process of its own,
-    and takes up to some seconds. Raises InputError with what is wrong.
+    Args:
+        data: content of the file.
+        file: name of the file.
+        unit: a key of UNITS; None to guess it.
+        up: axis that points up, as in `read_shape`.
+
+    Raises InputError with the defect of the file.
     """
     format = Format.of(file)
     metres = None if unit is None else unit_of(unit)
@@ -37,8 +42,8 @@ def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = N
     sign = next(sign for sign, length in UNITS.items() if length == shape.unit)
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     foot = np.array((*(0.5 * (low + high)[:2]), low[2]))
-    told = f"{format.value} {sign} {'' if up is None else up.value}\n".encode()
-    key = hashlib.sha256(told + data).hexdigest()[:32]
+    settings = f"{format.value} {sign} {'' if up is None else up.value}\n".encode()
+    key = hashlib.sha256(settings + data).hexdigest()[:32]
     x, y, z = (high - low).tolist()
     return Mesh(
         data,
@@ -55,27 +60,27 @@ def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = N
 
 
 def unit_of(sign: str) -> float:
-    """[m] Of a unit by its sign. Raises InputError."""
+    """Return the length [m] of the unit ``sign``. Raises InputError for an unknown unit."""
     if sign not in UNITS:
-        raise InputError(f"A unit is one of {', '.join(UNITS)}, not {sign!r}.")
+        raise InputError(f"The unit must be one of {', '.join(UNITS)}, not {sign!r}.")
     return UNITS[sign]
 
 
 def _counted(shape: ShapeFile, found: ConvexBody) -> str:
-    """What it counts as where contacts are looked for."""
-    said = ["Contacts are looked for with its convex hull"]
+    """Return a sentence on the convex hull that stands for the mesh in collision checks."""
+    notes = ["Collision checks use its convex hull"]
     if found.thickened:
-        said.append("it is flat, and counts as a little thick")
+        notes.append("it is flat, so the hull is made slightly thick")
     if found.off > HULL_DISTANCE_TO_REPORT:
-        said.append(f"that is simplified, and reaches up to {1e3 * found.off:.1f} mm over it")
+        notes.append(f"the hull is simplified and reaches up to {1e3 * found.off:.1f} mm beyond it")
     volume = _volume(shape)
     if volume is not None and found.volume > HULL_VOLUME_RATIO_TO_REPORT * volume:
-        said.append(f"its hollows count as filled: {found.volume / volume:.1f} times what it is")
-    return "; ".join(said) + "."
+        notes.append(f"its hollows count as filled: {found.volume / volume:.1f} times its volume")
+    return "; ".join(notes) + "."
 
 
 def _volume(shape: ShapeFile) -> float | None:
-    """[m^3] Of a closed surface, by the tetrahedra over its faces; None of another."""
+    """Return the volume [m^3] of a closed surface by tetrahedra over its faces; None if open."""
     edges = np.sort(shape.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     counts = np.unique(edges, axis=0, return_counts=True)[1]
     if not (counts == 2).all():

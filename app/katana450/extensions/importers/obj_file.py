@@ -1,7 +1,7 @@
 """Wavefront OBJ: vertices with their colours, and polygons.
 
-Source: Alias|Wavefront, Advanced Visualizer manual, appendix B1. No other file is opened, whatever
-a file names.
+Source: Alias|Wavefront, Advanced Visualizer manual, appendix B1. No other file is opened, even if
+the file names one.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ LEFT_OUT = {
         "free-form curves and surfaces",
     ),
 }
-"""Statements that say what is not read, and the words for it."""
+"""Statements that are not read, and their names in messages."""
 
 
 def read_obj(data: bytes, name: str) -> MeshReading:
-    """All polygons. Raises InputError, with the line, for what is none."""
+    """Return all polygons. Raises InputError with the line of an invalid statement."""
     found = _Lines(name)
     text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", " ")
     for number, line in enumerate(text.split("\n"), 1):
@@ -52,6 +52,8 @@ def read_obj(data: bytes, name: str) -> MeshReading:
 
 
 class _Lines:
+    """The statements of a file, collected line by line."""
+
     def __init__(self, name: str) -> None:
         self._name = name
         self._vertices: list[list[float]] = []
@@ -62,7 +64,7 @@ class _Lines:
         self._left_out: Counter[str] = Counter()
 
     def take(self, words: list[str], line: int) -> None:
-        """One statement."""
+        """Take the words of one statement. Raises InputError."""
         kind = words[0]
         if kind == "v":
             self._vertex(words[1:], line)
@@ -71,10 +73,10 @@ class _Lines:
         elif kind in LEFT_OUT:
             self._left_out[LEFT_OUT[kind]] += 1
         elif kind not in IGNORED_STATEMENTS:
-            raise self._wrong(line, f"{kind[:20]!r} is no statement of OBJ")
+            raise self._wrong(line, f"{kind[:20]!r} is not an OBJ statement")
 
     def reading(self) -> MeshReading:
-        """Of all lines."""
+        """Return the surface of all statements."""
         vertex_colours = None
         if self._colours:
             vertex_colours = np.full((len(self._vertices), 4), 0.8)
@@ -93,10 +95,10 @@ class _Lines:
         try:
             numbers = [float(word) for word in words]
         except ValueError:
-            raise self._wrong(line, "a vertex is made of numbers") from None
-        # A fourth is a weight; three more are a colour, which no manual has but many programs.
+            raise self._wrong(line, "the coordinates of a vertex must be numbers") from None
+        # A fourth number is a weight; three more are a colour, an extension of many programs.
         if not (3 <= len(numbers) <= 8 and all(map(math.isfinite, numbers))):
-            raise self._wrong(line, "a vertex has three finite coordinates")
+            raise self._wrong(line, "a vertex must have three finite coordinates")
         if len(numbers) >= 6:
             self._colours[len(self._vertices)] = numbers[-3:] if len(numbers) == 7 else numbers[3:6]
         self._vertices.append(numbers[:3])
@@ -107,7 +109,7 @@ class _Lines:
             try:
                 index = int(word.partition("/")[0])
             except ValueError:
-                raise self._wrong(line, f"{word[:20]!r} is no corner of a face") from None
+                raise self._wrong(line, f"{word[:20]!r} is not a corner of a face") from None
             if index == 0 or not -count <= index < 1 << 31:
                 raise self._wrong(line, f"there is no vertex {index}")
             self._corners.append(index - 1 if index > 0 else count + index)

@@ -1,4 +1,4 @@
-"""OFF of text: vertices with their colours, and polygons.
+"""OFF as text: vertices with their colours, and polygons.
 
 Source: Geomview manual, OFF. trimesh cuts concave polygons into fans and reads no colours.
 """
@@ -16,37 +16,35 @@ from katana450.extensions.importers.surface import MeshReading, of_polygons
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 HEADERS = ("OFF", "COFF", "NOFF", "CNOFF")
-"""Words that a file begins with: C has colours, N has normals."""
+"""First words of a file: C stands for colours, N for normals."""
 
 
 Rows = list[tuple[int, str]]
-"""Lines with their numbers."""
+"""Lines of a file with their numbers."""
 
-LONGEST_ROW = 400
-"""Characters of a line up to which rows become one array."""
+MAX_ARRAY_ROW = 400
+"""Maximum number of characters of a line for conversion of all rows as one array."""
 
 
 def read_off(data: bytes, name: str) -> MeshReading:
-    """Return all polygons. Raises InputError with the line of what is none."""
+    """Return all polygons. Raises InputError with the line of an error."""
     lines = enumerate(data.decode("utf-8", "replace").splitlines(), 1)
     rows = [(number, row) for number, line in lines if (row := line.partition("#")[0].strip())]
     header, _, after = rows[0][1].partition(" ") if rows else ("", "", "")
     if header not in HEADERS or "BINARY" in after:
-        raise InputError(
-            f"{name} does not begin with {' or '.join(HEADERS)} and is no OFF of text."
-        )
+        raise InputError(f"{name} is not OFF text: it must begin with {' or '.join(HEADERS)}.")
     rows[:1] = [(rows[0][0], after)] if after.strip() else []
     counts = re.match(r"([0-9]{1,9})\s+([0-9]{1,9})\b", rows[0][1].strip()) if rows else None
     if counts is None:
-        raise InputError(f"{name} is broken: it does not tell how many vertices and faces it has.")
+        raise InputError(f"{name} is corrupt: the numbers of vertices and faces are missing.")
     count, polygons = int(counts[1]), int(counts[2])
     if count + polygons > len(rows) - 1:
-        raise InputError(f"{name} is broken: it ends too early.")
+        raise InputError(f"{name} is corrupt: it ends too early.")
     table = _numbers(rows[1 : 1 + count], name)
     corners, sizes = _faces(rows[1 + count : 1 + count + polygons], name)
     width = 3 + 3 * ("N" in header)
     if table.shape[1] < width:
-        raise InputError(f"{name} has vertices with less than {width} numbers.")
+        raise InputError(f"{name} has vertices with fewer than {width} numbers.")
     colours = None
     if header.startswith("C") and table.shape[1] >= width + 3:
         colours = table[:, width : width + 4]
@@ -57,7 +55,7 @@ def read_off(data: bytes, name: str) -> MeshReading:
 
 
 def _numbers(rows: Rows, name: str) -> FloatArray:
-    """Return (n, k) numbers, as many of each row as all rows have."""
+    """Return (n, k) numbers, where k is the length of the shortest row."""
     found = _array(rows, np.float64)
     if found is not None:
         return found
@@ -66,13 +64,13 @@ def _numbers(rows: Rows, name: str) -> FloatArray:
         try:
             table.append([float(word) for word in row.split()])
         except ValueError as error:
-            raise InputError(f"{name}, line {number}: numbers are wanted.") from error
+            raise InputError(f"{name}, line {number}: expected numbers.") from error
     width = min(map(len, table), default=0)
     return np.array([row[:width] for row in table], dtype=np.float64).reshape(len(table), width)
 
 
 def _faces(rows: Rows, name: str) -> tuple[IntArray, IntArray]:
-    """Return the corners of one face after another, and how many each has."""
+    """Return the corners of all faces, face after face, and the number of corners of each."""
     found = _array(rows, np.int64)
     size = -1 if found is None else int(found[0, 0])
     if found is not None and 0 <= size < found.shape[1] and (found[:, 0] == size).all():
@@ -85,17 +83,17 @@ def _faces(rows: Rows, name: str) -> tuple[IntArray, IntArray]:
             sizes.append(int(words[0]))
             corners += [int(word) for word in words[1 : 1 + max(sizes[-1], 0)]]
         except ValueError as error:
-            raise InputError(f"{name}, line {number}: whole numbers are wanted.") from error
+            raise InputError(f"{name}, line {number}: expected whole numbers.") from error
         if not 0 <= sizes[-1] < len(words):
             raise InputError(f"{name}, line {number}: this face does not have {words[0]} corners.")
     if any(abs(corner) > 1 << 31 for corner in corners):
-        raise InputError(f"{name} has a face with a vertex that is not there.")
+        raise InputError(f"{name} has a face with a vertex that does not exist.")
     return np.array(corners, dtype=np.int64), np.array(sizes, dtype=np.int64)
 
 
 def _array(rows: Rows, kind: type[Any]) -> npt.NDArray[Any] | None:
-    """Return the numbers of all rows; None if they differ in length, or one is no number."""
-    if not rows or max(len(row) for _, row in rows) > LONGEST_ROW:
+    """Return the numbers of all rows; None if rows differ in length or hold other text."""
+    if not rows or max(len(row) for _, row in rows) > MAX_ARRAY_ROW:
         return None
     try:
         return np.array([row.split() for _, row in rows]).astype(kind)

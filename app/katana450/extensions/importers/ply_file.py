@@ -1,6 +1,7 @@
-"""PLY, text and binary of either byte order.
+"""PLY, as text and as binary of either byte order.
 
-Source: G. Turk, The PLY Polygon File Format (1994); types by size, as int32, are of later programs.
+Source: G. Turk, The PLY Polygon File Format (1994). Types by size, such as int32, come from later
+programs.
 """
 
 from __future__ import annotations
@@ -20,20 +21,30 @@ TYPES = {
     **{"ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4"},
     **{"float": "f4", "float32": "f4", "double": "f8", "float64": "f8"},
 }
+"""numpy types by their names in the header."""
 
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+"""numpy byte orders by the formats in the header; empty for text."""
 
 MAX_HEADER_BYTES = 64 * 1024
-"""[bytes]"""
+"""[bytes] Maximum size of a header."""
 
 CORNERS = ("vertex_indices", "vertex_index")
+"""Names of the property with the corners of a face."""
 
 PAINT = ("red", "green", "blue", "alpha")
+"""Names of the properties of a colour."""
 
 
 @dataclass(frozen=True)
 class Property:
-    """Of an element. counts: numpy's type of the length of a list; None of a single number."""
+    """A property of an element.
+
+    Attributes:
+        name: its name.
+        numbers: numpy type of its values.
+        counts: numpy type of the length of a list; None for a single number.
+    """
 
     name: str
     numbers: str
@@ -42,7 +53,7 @@ class Property:
 
 @dataclass(frozen=True)
 class Element:
-    """Rows of one kind, as the header tells them."""
+    """An element of the header: a number of rows with the same properties."""
 
     name: str
     rows: int
@@ -51,7 +62,7 @@ class Element:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """The values of a property: one a row, or row after row as many as ``sizes`` (rows,) says."""
+    """The values of a property: one per row, or a list per row of lengths ``sizes`` (rows,)."""
 
     values: npt.NDArray[Any]
     sizes: npt.NDArray[np.int64] | None
@@ -59,7 +70,7 @@ class Column:
 
 
 def read_ply(data: bytes, name: str) -> MeshReading:
-    """All faces. Raises InputError for what is none."""
+    """Return all faces. Raises InputError for an invalid file."""
     order, elements, body = _header(data, name)
     source = _Binary(body, order, name) if order else _Text(body, name)
     found: dict[str, dict[str, Column]] = {}
@@ -73,7 +84,7 @@ def read_ply(data: bytes, name: str) -> MeshReading:
     if listed is None or listed.sizes is None:
         listed = Column(np.zeros(0), np.zeros(0, dtype=np.int64), "i4")
     assert listed.sizes is not None
-    # What is no number of a vertex becomes one that is none.
+    # Values that cannot be an index become -1, which `of_polygons` refuses.
     usable = np.abs(doubles(listed.values)) < 2.0**53
     corners = np.where(usable, listed.values, -1).astype(np.int64)
     colours, of_vertices = _paint(faces), _paint(vertices)
@@ -90,13 +101,13 @@ def read_ply(data: bytes, name: str) -> MeshReading:
 
 
 def _header(data: bytes, name: str) -> tuple[str, list[Element], bytes]:
-    """The byte order, the elements, and what follows."""
+    """Return the byte order, the elements, and the data after the header."""
     if not data.startswith((b"ply\n", b"ply\r")):
-        raise InputError(f"{name} does not begin with 'ply', so it is no PLY file.")
+        raise InputError(f"{name} is not a PLY file: it must begin with 'ply'.")
     ends = data.find(b"end_header", 0, MAX_HEADER_BYTES)
     line_end = data.find(b"\n", ends)
     if ends < 0 or line_end < 0:
-        raise InputError(f"{name} is broken: its header does not end.")
+        raise InputError(f"{name} is corrupt: its header does not end.")
     order: str | None = None
     elements: dict[str, Element] = {}
     for line in data[:ends].decode("utf-8", "replace").splitlines()[1:]:
@@ -118,9 +129,9 @@ def _header(data: bytes, name: str) -> tuple[str, list[Element], bytes]:
                     listed = Property(kind, TYPES[numbers], TYPES[counts])
                     _last(elements).properties.append(listed)
                     continue
-        raise InputError(f"{name} is broken: {line[:60]!r} in its header is not understood.")
+        raise InputError(f"{name} is corrupt: {line[:60]!r} in its header is invalid.")
     if order is None:
-        raise InputError(f"{name} is broken: its header tells no format.")
+        raise InputError(f"{name} is corrupt: its header has no format.")
     return order, list(elements.values()), data[line_end + 1 :]
 
 
@@ -129,7 +140,7 @@ def _last(elements: dict[str, Element]) -> Element:
 
 
 def _paint(columns: dict[str, Column]) -> FloatArray | None:
-    """(rows, 4) 0..1, of numbers 0..1 or 0..255 by their type; None where there are no colours."""
+    """Return colours (rows, 4) 0..1, scaled by the type of the numbers; None without colours."""
     found = [columns[key] for key in PAINT if key in columns and columns[key].sizes is None]
     if len(found) < 3:
         return None
@@ -140,17 +151,17 @@ def _paint(columns: dict[str, Column]) -> FloatArray | None:
 
 
 class _Text:
-    """The numbers behind the header of a file of text, row after row."""
+    """The numbers after the header of a text file, row by row."""
 
     def __init__(self, body: bytes, name: str) -> None:
         self._name, self._at = name, 0
         try:
             self._numbers = np.array(list(map(float, body.split())), dtype=np.float64)
         except ValueError as error:
-            raise InputError(f"{name} is broken: {str(error)[:80]}.") from error
+            raise InputError(f"{name} is corrupt: {str(error)[:80]}.") from error
 
     def columns(self, element: Element) -> dict[str, Column]:
-        """Of the rows that come next."""
+        """Return the columns of ``element``, from the next rows."""
         plain = all(each.counts is None for each in element.properties)
         lengths = [1] * len(element.properties) if plain else self._lengths(element)
         if lengths is None:
@@ -170,7 +181,7 @@ class _Text:
         return found
 
     def _lengths(self, element: Element) -> list[int] | None:
-        """Of each property, if all rows have lists of the same lengths."""
+        """Return the number of values of each property, if it is equal in all rows; else None."""
         lengths: list[int] = []
         at = self._at
         for each in element.properties:
@@ -204,24 +215,24 @@ class _Text:
     def _count(self, at: int) -> int:
         count = float(self._numbers[at]) if at < len(self._numbers) else -1.0
         if not (0.0 <= count <= len(self._numbers) and count == int(count)):
-            raise InputError(f"{self._name} is broken: a list has no length, or the file ends.")
+            raise InputError(f"{self._name} is corrupt: a list has no length, or the file ends.")
         return int(count)
 
     def _take(self, count: int) -> FloatArray:
         if self._at + count > len(self._numbers):
-            raise InputError(f"{self._name} is broken: it ends too early.")
+            raise InputError(f"{self._name} is corrupt: it ends too early.")
         self._at += count
         return self._numbers[self._at - count : self._at]
 
 
 class _Binary:
-    """The same of a file of bytes."""
+    """The numbers after the header of a binary file, row by row."""
 
     def __init__(self, body: bytes, order: str, name: str) -> None:
         self._body, self._order, self._name, self._at = body, order, name, 0
 
     def columns(self, element: Element) -> dict[str, Column]:
-        """Of the rows that come next."""
+        """Return the columns of ``element``, from the next rows."""
         if not (element.rows and element.properties):
             return {each.name: _column(each, []) for each in element.properties}
         start = self._at
@@ -260,14 +271,14 @@ class _Binary:
         }
 
     def _list(self, each: Property) -> npt.NDArray[Any]:
-        """The next value, or list of values."""
+        """Return the next value or list of values."""
         count = 1 if each.counts is None else int(self._take(each.counts, 1)[0])
         return self._take(each.numbers, count)
 
     def _take(self, numbers: str, count: int) -> npt.NDArray[Any]:
         kind = np.dtype(self._order + numbers)
         if not 0 <= count * kind.itemsize <= len(self._body) - self._at:
-            raise InputError(f"{self._name} is broken: it ends too early.")
+            raise InputError(f"{self._name} is corrupt: it ends too early.")
         self._at += count * kind.itemsize
         return np.frombuffer(self._body, kind, count, self._at - count * kind.itemsize)
 

@@ -1,6 +1,6 @@
-"""Polygons in space cut into triangles: fans of convex ones, ears of the others.
+"""Triangulation of polygons in space: fans for convex polygons, ear clipping for the others.
 
-Source of the ears: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82 (1975).
+Source of ear clipping: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82 (1975).
 """
 
 from __future__ import annotations
@@ -13,12 +13,16 @@ from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 
 def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray]:
-    """Triangles (m, 3) as places in `corners`, and (m,) the polygon each is of.
+    """Return triangles (m, 3) as places in ``corners``, and the polygon (m,) of each.
 
-    vertices: (n, 3) finite. corners: (k,) indices of them, polygon after polygon. sizes: (p,)
-    corners each. A polygon of k corners gives k - 2 triangles, in its own sense of turning; one
-    that crosses itself gives as many, somehow. The effort grows with the corners of a concave one
-    times those of them that lie as far along it as an ear does.
+    Args:
+        vertices: (n, 3), finite.
+        corners: (k,) indices of vertices, polygon after polygon.
+        sizes: (p,) number of corners of each polygon.
+
+    A polygon of k corners gives k - 2 triangles with its own orientation. A polygon that crosses
+    itself gives as many, of arbitrary shape. The effort for a concave polygon grows with its number
+    of corners times the number that lies within the extent of an ear.
     """
     starts = np.cumsum(sizes) - sizes
     triangles, owners = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
@@ -39,13 +43,13 @@ def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntAr
 
 
 def _normals(points: FloatArray) -> FloatArray:
-    """(p, 3) by Newell's sum, of polygons (p, k, 3); of any length."""
+    """Return normals (p, 3) of polygons (p, k, 3), of any length, by Newell's sum."""
     ahead = np.roll(points, -1, axis=1)
     return np.asarray(np.cross(points, ahead).sum(axis=1))
 
 
 def _concave(points: FloatArray) -> IntArray:
-    """(p,) whether a corner of the polygons (p, k, 3) turns the other way."""
+    """Return for each polygon of (p, k, 3) whether it has a concave corner, (p,)."""
     points = points - points[:, :1]
     before, ahead = np.roll(points, 1, axis=1), np.roll(points, -1, axis=1)
     turns = np.einsum("pkc,pc->pk", np.cross(points - before, ahead - points), _normals(points))
@@ -54,7 +58,7 @@ def _concave(points: FloatArray) -> IntArray:
 
 
 def _ears(points: FloatArray) -> IntArray:
-    """(k - 2, 3) corners of one polygon (k, 3)."""
+    """Return the triangles (k - 2, 3) of one polygon (k, 3), as numbers of its corners."""
     points = points - points[0]
     normal = _normals(points[None])[0]
     axis = int(np.argmax(np.abs(normal)))
@@ -64,7 +68,7 @@ def _ears(points: FloatArray) -> IntArray:
     count = len(flat)
     before, ahead = [*range(-1, count - 1)], [*range(1, count), 0]
     before[0] = count - 1
-    rest = _Rest(flat)
+    rest = _RemainingCorners(flat)
     is_ear = [rest.is_ear(before[b], b, ahead[b]) for b in range(count)]
     ears = deque(b for b in range(count) if is_ear[b])
     found: list[tuple[int, int, int]] = []
@@ -72,13 +76,13 @@ def _ears(points: FloatArray) -> IntArray:
     while len(found) < count - 2:
         while ears and not is_ear[ears[0]]:
             ears.popleft()
-        # When nothing is an ear the polygon crosses itself, and any corner will do.
+        # Without an ear the polygon crosses itself; then any corner is taken.
         b = ears.popleft() if ears else ahead[b]
         a, c = before[b], ahead[b]
         found.append((a, b, c))
         rest.left[b] = is_ear[b] = False
         ahead[a], before[c] = c, a
-        # Of the others none becomes an ear by this, or ceases to be one.
+        # Only the two neighbours can become an ear by this, or cease to be one.
         for corner in (a, c):
             was, is_ear[corner] = (
                 is_ear[corner],
@@ -89,8 +93,8 @@ def _ears(points: FloatArray) -> IntArray:
     return np.array(found, dtype=np.int64)
 
 
-class _Rest:
-    """The corners (k, 2) of a polygon that are left, in order along the axis it is longer on."""
+class _RemainingCorners:
+    """The remaining corners (k, 2) of a polygon, sorted along its longer axis."""
 
     def __init__(self, flat: FloatArray) -> None:
         self._flat = flat
@@ -100,7 +104,7 @@ class _Rest:
         self._along = flat[self._order, self._axis]
 
     def is_ear(self, a: int, b: int, c: int) -> bool:
-        """Whether the corner b turns left and none of those left is in its triangle."""
+        """Return whether corner b is convex, and no remaining corner lies in its triangle."""
         ends = self._flat[[a, b, c]]
         if _turn(ends[0], ends[1], ends[2:])[0] <= 0.0:
             return False
@@ -114,11 +118,11 @@ class _Rest:
             & (_turn(ends[1], ends[2], others) >= 0.0)
             & (_turn(ends[2], ends[0], others) >= 0.0)
         )
-        # Its own corners do not count, nor those that a bridge to a hole puts there once more.
+        # Corners equal to its own do not count, such as those that a bridge to a hole duplicates.
         return bool((others[inside][:, None] == ends).all(axis=2).any(axis=1).all())
 
 
 def _turn(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:
-    """(k,) twice the area a, b, p for each point p of (k, 2): positive to the left of a, b."""
+    """Return twice the signed area of a, b, p for each point p of (k, 2); positive left of a, b."""
     (ax, ay), (bx, by) = a, b
     return np.asarray((bx - ax) * (points[:, 1] - ay) - (by - ay) * (points[:, 0] - ax))

@@ -1,9 +1,9 @@
-"""Reads one shape from standard input and writes it as .npz to standard output.
+"""The subprocess that reads one shape from standard input and writes .npz to standard output.
 
-``python -m katana450.extensions.importers.reading FORMAT NAME UNIT UP`` is started by
-`read_shape_guarded`. It bounds its memory and time before it reads its input. Keys of the .npz:
-vertices, faces, colours if there are any, unit and said, and corners, off,
-thickened and volume of the convex body round it; or error alone, a sentence.
+`read_shape_guarded` starts it as ``python -m katana450.extensions.importers.reading FORMAT NAME
+UNIT UP``. It limits its memory and time before it reads its input. Keys of the .npz: vertices,
+faces, colours if there are any, unit and text, and corners, off, thickened and volume of the convex
+body; or error alone, with a message.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from katana450.platform_support import limit_resources
 
 
 def main(words: list[str]) -> None:
-    """Of one file; fails only where the bounds are met."""
+    """Read one file. The process fails only at the limits of memory and time."""
     bind()
     format, name, unit, up = words
     data = sys.stdin.buffer.read()
@@ -46,14 +46,14 @@ def main(words: list[str]) -> None:
         found = {
             key: getattr(shape, key) for key in ("vertices", "faces", "colours", "unit", "text")
         } | vars(body)
-    made = io.BytesIO()
+    buffer = io.BytesIO()
     arrays = {key: np.array(value) for key, value in found.items() if value is not None}
-    np.savez(made, allow_pickle=False, **arrays)
-    sys.stdout.buffer.write(made.getvalue())
+    np.savez(buffer, allow_pickle=False, **arrays)
+    sys.stdout.buffer.write(buffer.getvalue())
 
 
 def bind() -> None:
-    """Bound the memory and time of this process, as far as the system does."""
+    """Limit the memory and time of this process, as far as the system supports it."""
     limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
 
 

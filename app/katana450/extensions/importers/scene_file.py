@@ -1,6 +1,6 @@
-"""A scene with its meshes: as a folder, and as one .zip of the same files.
+"""A scene with its meshes: as a folder, or as one .zip of the same files.
 
-All of it is read and checked before anybody sees any of it. A path leads to nothing outside.
+All of it is read and checked before it is used. Paths cannot lead outside of the scene.
 """
 
 from __future__ import annotations
@@ -23,31 +23,34 @@ from katana450.extensions.scene.text import parsed, written
 from katana450.maths.geometry.arrays import FloatArray
 
 SCENE = "scene.yaml"
-"""Its text in a .zip."""
+"""Name of the scene's text in a .zip."""
 
 FOLDER = "meshes"
+"""Folder of the meshes in a .zip."""
 
 MAX_ZIP_BYTES = 60_000_000
-"""Bytes of one, and of what is in it."""
+"""[bytes] Maximum size of a .zip, and of its content."""
 
 MOST_FILES = 64
+"""Maximum number of files in a .zip."""
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
-"""The oldest time that a .zip knows: the same scene is the same bytes."""
+"""Time stamp of all files, the earliest of the format: the same scene gives the same bytes."""
 
 
 @dataclass(frozen=True, eq=False)
 class StoredScene:
-    """A scene, and the meshes its objects are of."""
+    """A scene, and the meshes of its objects."""
 
     scene: Scene
     meshes: tuple[Mesh, ...] = ()
 
 
 def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
-    """The scene in a .zip. Raises InputError; ScriptError with the lines where its text is wrong.
+    """Return the scene in a .zip.
 
-    ``T_palm_tool``: see ``Hand``; None for an arm without.
+    ``T_palm_tool``: see ``Hand``; None for an arm without a hand. Raises InputError; for errors in
+    the text ScriptError with the lines.
     """
     if len(data) > MAX_ZIP_BYTES:
         raise InputError(f"A scene has at most {MAX_ZIP_BYTES // 1_000_000} MB.")
@@ -66,25 +69,30 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
                 nonlocal left
                 if path not in names:
                     raise InputError(f"There is no file {path} in the .zip.")
-                # What a .zip says of its sizes need not be so.
+                # The sizes that a .zip declares can be false.
                 with archive.open(path) as file:
                     content = file.read(min(maximum, left) + 1)
                 left -= len(content)
                 if left < 0:
-                    raise InputError(f"Unpacked it has more than {MAX_ZIP_BYTES // 1_000_000} MB.")
+                    raise InputError(
+                        f"Unpacked, the .zip has more than {MAX_ZIP_BYTES // 1_000_000} MB."
+                    )
                 return content
 
             return _read(_text(opened(SCENE, MAX_BYTES), SCENE), opened, T_palm_tool)
     except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError) as error:
-        raise InputError(f"This is no .zip that can be read: {error}.") from error
+        raise InputError(f"This .zip cannot be read: {error}.") from error
     except (OSError, EOFError, ValueError, zlib.error) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"The .zip is broken: {error}.") from error
+        raise InputError(f"The .zip is corrupt: {error}.") from error
 
 
 def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene:
-    """The scene whose text is the file ``path``, its meshes beside or below it; or a .zip."""
+    """Return the scene of the text file ``path``, with meshes in or below its folder; or of a .zip.
+
+    Raises InputError.
+    """
     if path.suffix.lower() == ".zip":
         return read_scene_zip(_content(path, MAX_ZIP_BYTES), T_palm_tool)
     folder = path.resolve().parent
@@ -102,7 +110,7 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
 
 
 def scene_zip(stored: StoredScene, T_palm_tool: FloatArray | None) -> bytes:
-    """The scene as a .zip."""
+    """Return the scene as the content of a .zip."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in _files(stored, T_palm_tool).items():
@@ -111,11 +119,11 @@ def scene_zip(stored: StoredScene, T_palm_tool: FloatArray | None) -> bytes:
 
 
 def _files(stored: StoredScene, T_palm_tool: FloatArray | None) -> dict[str, bytes]:
-    """What there is to write, by relative paths."""
+    """Return the content of all files of a scene, by relative paths."""
     files: dict[str, MeshFile] = {}
     contents: dict[str, bytes] = {}
     for mesh in stored.meshes:
-        # Two files of one name are told apart by what is in them.
+        # Files of the same name are distinguished by the hash of their content.
         stem = re.sub(r"[^A-Za-z0-9_-]+", "_", mesh.name).strip("_") or "mesh"
         path = f"{FOLDER}/{stem}.{mesh.format}"
         if path in contents:
@@ -129,10 +137,12 @@ def _read(
     text: str, opened: Callable[[str, int], bytes], T_palm_tool: FloatArray | None
 ) -> StoredScene:
     draft = parsed(text)
-    wanted = {entry.mesh: entry.at for entry in reversed(draft.entries) if entry.mesh is not None}
+    mesh_files = {
+        entry.mesh: entry.at for entry in reversed(draft.entries) if entry.mesh is not None
+    }
     meshes: dict[MeshFile, Mesh] = {}
     problems: list[Problem] = []
-    for file, at in reversed(wanted.items()):
+    for file, at in reversed(mesh_files.items()):
         try:
             meshes[file] = _mesh(file, opened)
         except InputError as error:
@@ -152,13 +162,13 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
         or re.search(r"[\\:\0]", file.path)
         or not file.path.isprintable()
     ):
-        raise InputError(f"{file.path!r} is no relative path within the scene.")
+        raise InputError(f"{file.path!r} is not a relative path within the scene.")
     content = opened(file.path, MAX_FILE_BYTES)
     mesh = read_mesh(content, file.path, file.unit, None if file.up is None else Up(file.up))
     if file.sha256 is not None and mesh.sha256 != file.sha256:
         raise InputError(
-            f"{file.path} is another file than the scene was saved with: its SHA-256 is "
-            f"{mesh.sha256}. If it is meant, leave `sha256` out."
+            f"{file.path} is not the file that the scene was saved with: its SHA-256 is "
+            f"{mesh.sha256}. To use it nevertheless, remove `sha256`."
         )
     return mesh
 
@@ -175,4 +185,4 @@ def _text(content: bytes, name: str) -> str:
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(f"{name} is no text in UTF-8: {error.reason}.") from error
+        raise InputError(f"{name} is not UTF-8 text: {error.reason}.") from error

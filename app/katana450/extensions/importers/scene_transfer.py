@@ -1,4 +1,4 @@
-"""Meshes and scenes between files and the server: read, kept until they are asked for, saved."""
+"""Transfer of meshes and scenes between files and the server."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from katana450.server.service.scenes import free_name, used_in
 
 
 def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
-    """Keep ``mesh``, so that it can be placed. Raises InputError if there is no room for it."""
+    """Store ``mesh``, so that it can be placed. Raises InputError if there is no room for it."""
     state = None if hub.arm is None else hub.arm.state
     hub.meshes.put([mesh], used_in(state))
     names = {scene_object.name for scene_object in state.objects} if state is not None else set()
@@ -31,22 +31,19 @@ def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
 
 
 def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmInterface) -> answers.Scene:
-    """Keep ``stored``, which came as ``data``, so that it can be loaded.
-
-    Raises InputError where that cannot be.
-    """
+    """Store ``stored``, read from ``data``, so that it can be loaded. Raises InputError."""
     key = hashlib.sha256(data).hexdigest()[:32]
     scene = stored.scene
     hub.scenes.keep(key, cmd.ReplaceScene(scene.objects, scene.water), stored.meshes, arm)
     names = [scene_object.name for scene_object in scene.objects]
-    said = f"{len(names)} object{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
+    text = f"{len(names)} object{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
     if scene.joints is not None:
-        said += " The arm stays where it is."
-    return answers.Scene(key=key, objects=names, text=said)
+        text += " The arm does not move."
+    return answers.Scene(key=key, objects=names, text=text)
 
 
 def zipped(hub: Hub, arm: ArmInterface) -> bytes:
-    """Return the present scene as a .zip. Raises InputError, LeaseError if it cannot be saved."""
+    """Return the present scene as a .zip. Raises InputError or LeaseError if it cannot be saved."""
     hand = arm.environment.hand
     return scene_zip(_stored(hub, arm), None if hand is None else hand.T_palm_tool)
 
@@ -55,7 +52,9 @@ def _stored(hub: Hub, arm: ArmInterface) -> StoredScene:
     state = arm.state
     held = state.held
     if held is not None:
-        raise LeaseError(f"{held.name!r} is held: set it down first, a scene has nothing in hand.")
+        raise LeaseError(
+            f"{held.name!r} is held. Set it down first: a scene cannot have held objects."
+        )
     water = None
     if state.poured is not None:
         water = ML * state.poured.water.cup / MILLILITRE

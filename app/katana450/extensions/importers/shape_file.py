@@ -1,7 +1,7 @@
 """Shapes of other programs as triangles in metres, z up: meshes and worlds in nine formats.
 
-A file is a stranger's. Readers open no other file, run nothing, and stop at bounds of their own;
-`read_shape_guarded` adds those of the system, in a process that can be lost.
+Files are untrusted. Readers open no other file, execute nothing, and stop at limits of their own.
+`read_shape_guarded` adds limits of the system, in a disposable subprocess.
 """
 
 from __future__ import annotations
@@ -31,29 +31,31 @@ from katana450.maths.collision.convex_body import ConvexBody
 from katana450.maths.geometry.arrays import FloatArray, IntArray, frozen
 
 MAX_FILE_BYTES = 20_000_000
+"""[bytes] Maximum size of a file."""
 
 MAX_SIZE, MIN_SIZE = 2.0, 1e-3
-"""[m] Bounds of the longest side, the same as in arm/control/scene_objects, which takes long to
-load."""
+"""[m] Bounds of the longest side. They repeat those of arm/control/scene_objects, which takes long
+to import.
+"""
 
 ROUNDING = 1e-6
-"""[1] Of a bound: what single precision makes of a length that is on it."""
+"""[1] Relative tolerance of a bound, for lengths rounded to single precision."""
 
 LONGEST_NAME = 40
-"""Characters; of objects too."""
+"""Maximum number of characters of a name, of objects too."""
 
 SECONDS = 5.0
-"""Until a file has to be read."""
+"""[s] Timeout of reading a file."""
 
 MAX_MEMORY_BYTES = 1 << 30
-"""[bytes] That reading it may take."""
+"""[bytes] Maximum memory for reading a file."""
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "m": 1.0}
-"""[m] Those that programs write, by their signs."""
+"""[m] Length of each known unit."""
 
 
 class Format(Enum):
-    """By the end of a file's name."""
+    """A file format, by the suffix of the file."""
 
     WRL = "wrl"
     STL = "stl"
@@ -67,12 +69,12 @@ class Format(Enum):
 
     @classmethod
     def of(cls, file: str) -> Format:
-        """That of a file's name; .wrz is a .wrl that is compressed. Raises InputError."""
+        """Return the format of a file by its name; .wrz is a compressed .wrl. Raises InputError."""
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
         known = {each.value: each for each in cls} | {"wrz": cls.WRL}
         if suffix not in known:
             raise InputError(
-                f"{label(file)} is of no format that is read; give a file that ends in "
+                f"{label(file)} has an unknown format. Use a file that ends in "
                 f"{', '.join(f'.{each}' for each in known)}."
             )
         return known[suffix]
@@ -83,7 +85,7 @@ Y_UP = (Format.WRL, Format.GLB, Format.GLTF)
 
 
 class Up(Enum):
-    """Which axis of a file points up."""
+    """The axis of a file that points up."""
 
     Y = "y"
     Z = "z"
@@ -91,15 +93,15 @@ class Up(Enum):
 
 @dataclass(frozen=True, eq=False)
 class ShapeFile:
-    """What was read, in metres, z up.
+    """A shape in metres, z up.
 
     Attributes:
-        name: from the file's, fit for an object.
-        vertices: (n, 3) [m], each of a face and no two alike.
-        faces: (m, 3) indices of them, counter-clockwise seen from outside.
-        colours: (m, 4) sRGB and opacity a face; None where the file says none.
-        unit: metres a unit of the file.
-        said: for people: the unit and why, how many triangles, how large, what was left out.
+        name: name for an object, from the name of the file.
+        vertices: (n, 3) [m], each used by a face, no two equal.
+        faces: (m, 3) indices of vertices, counter-clockwise seen from outside.
+        colours: (m, 4) sRGB and opacity of the faces; None if the file has none.
+        unit: unit of the file [m].
+        text: note for people: unit and its source, number of triangles, size, omitted parts.
     """
 
     name: str
@@ -118,23 +120,23 @@ class ShapeFile:
 def read_shape(
     data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
 ) -> ShapeFile:
-    """The shape in a file of that name.
+    """Return the shape in a file.
 
     Args:
-        data: its bytes.
-        format: of which kind it is.
-        name: of the file, with or without folders.
-        unit: metres a unit of the file; None to guess.
-        up: its axis that points up; None for the one that the format has.
+        data: content of the file.
+        format: its format.
+        name: its name, with or without folders.
+        unit: its unit [m]; None to guess it.
+        up: its axis that points up; None for the default of the format.
 
-    Raises InputError for a file that is broken, too large, or not of that format.
+    Raises InputError for a file that is corrupt, too large, or of another format.
     """
     file = label(name)
     _check(data, file, unit)
     try:
         reading = _read(data, format, file)
     except RecursionError as error:
-        raise InputError(f"{file} is broken: its parts lie too deep in each other.") from error
+        raise InputError(f"{file} is corrupt: its parts are nested too deeply.") from error
     reading = _in_known_unit(reading, file)
     surface = reading.surface.tidy()
     if not len(surface.faces):
@@ -142,25 +144,25 @@ def read_shape(
         raise InputError(f"{file} has no triangles.{without}")
     sides = np.ptp(surface.vertices, axis=0)
     longest = float(sides.max())
-    told, why = _unit(format, longest, unit, reading.unit)
-    _check_size(longest, told, file)
+    metres, why = _unit(format, longest, unit, reading.unit)
+    _check_size(longest, metres, file)
     axis = up or Up(reading.up or ("y" if format in Y_UP else "z"))
-    vertices = surface.vertices * told
+    vertices = surface.vertices * metres
     if axis is Up.Y:
         vertices = vertices[:, (0, 2, 1)] * (1.0, -1.0, 1.0)
-    said = f"{_size(vertices, surface)}; {why}; {_turned(axis, up)}."
+    text = f"{_size(vertices, surface)}; {why}; {_turned(axis, up)}."
     if reading.left_out:
-        said += f" Left out: {_listed(reading.left_out)}."
-    return ShapeFile(object_name(name), vertices, surface.faces, surface.colours, told, said)
+        text += f" Left out: {_listed(reading.left_out)}."
+    return ShapeFile(object_name(name), vertices, surface.faces, surface.colours, metres, text)
 
 
 def read_shape_guarded(
     data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
 ) -> tuple[ShapeFile, ConvexBody]:
-    """As `read_shape`, with the convex body round it, both worked out in a process of its own.
+    """Return the result of `read_shape`, and its convex body, from a subprocess.
 
-    It has `SECONDS` and, where the system counts it, `MAX_MEMORY_BYTES`; InputError beyond that
-    too, and when it crashes.
+    The subprocess has `SECONDS` and, where the system supports it, `MAX_MEMORY_BYTES`. Raises
+    InputError as `read_shape`, at these limits, and after a crash.
     """
     file = label(name)
     _check(data, file, unit)
@@ -170,12 +172,12 @@ def read_shape_guarded(
         "" if unit is None else str(float(unit)),
         "" if up is None else up.value,
     ]
-    # One thread: a pool for every core would take address space, which is what is bounded.
+    # One thread, because a pool for every core would take address space, which is limited.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
             [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
-            # The folder that holds the package.
+            # The parent folder of the package.
             cwd=Path(__file__).resolve().parents[3],
             env=environment,
             input=data,
@@ -185,13 +187,12 @@ def read_shape_guarded(
         )
     except subprocess.TimeoutExpired as error:
         raise InputError(
-            f"{file} takes longer than {SECONDS:g} s to read; save it simpler."
+            f"{file} takes longer than {SECONDS:g} s to read. Try a simpler export."
         ) from error
     if done.returncode:
         raise InputError(
-            f"{file} cannot be read: it wants more than {SECONDS:g} s or {MAX_MEMORY_BYTES >> 20} "
-            f"MiB, or is "
-            "broken in a new way; save it simpler."
+            f"{file} cannot be read: it needs more than {SECONDS:g} s or {MAX_MEMORY_BYTES >> 20} "
+            "MiB, or the file is corrupt. Try a simpler export."
         )
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
         if "error" in found:
@@ -214,16 +215,16 @@ def read_shape_guarded(
 
 
 def label(name: str) -> str:
-    """What a file is called in sentences: without folders, and short."""
+    """Return the name of a file for messages: without folders, and short."""
     last = re.split(r"[\\/]", name)[-1]
-    printed = "".join(sign for sign in last if sign.isprintable()).strip()
-    if len(printed) > LONGEST_NAME:
-        printed = f"{printed[: LONGEST_NAME - 9]}…{printed[-8:]}"
-    return printed or "The file"
+    shown = "".join(sign for sign in last if sign.isprintable()).strip()
+    if len(shown) > LONGEST_NAME:
+        shown = f"{shown[: LONGEST_NAME - 9]}…{shown[-8:]}"
+    return shown or "The file"
 
 
 def object_name(name: str) -> str:
-    """What an object of that file is called."""
+    """Return the name of an object from the name of its file."""
     stem = label(name).rpartition(".")[0].strip()
     return stem or "shape"
 
@@ -231,11 +232,11 @@ def object_name(name: str) -> str:
 def _check(data: bytes, file: str, unit: float | None) -> None:
     if len(data) > MAX_FILE_BYTES:
         raise InputError(
-            f"{file} has {len(data) / 1e6:.1f} MB; at most {MAX_FILE_BYTES // 1_000_000} are read; "
-            "save it coarser, or as a binary file."
+            f"{file} has {len(data) / 1e6:.1f} MB; at most {MAX_FILE_BYTES // 1_000_000} are read. "
+            "Save it coarser, or as a binary file."
         )
     if unit is not None and not (math.isfinite(unit) and unit > 0.0):
-        raise InputError(f"The unit has to be a length in metres above 0, not {unit}.")
+        raise InputError(f"The unit must be a length in metres above 0, not {unit}.")
 
 
 def _read(data: bytes, format: Format, file: str) -> MeshReading:
@@ -250,7 +251,7 @@ def _read(data: bytes, format: Format, file: str) -> MeshReading:
             return read_ply(data, file)
         case Format.OFF:
             return read_off(data, file)
-        # The libraries of these take as long to load as a file takes to read.
+        # The libraries for these formats take as long to import as a file takes to read.
         case Format.DAE:
             from katana450.extensions.importers.dae_file import read_dae
 
@@ -263,29 +264,29 @@ def _read(data: bytes, format: Format, file: str) -> MeshReading:
 
 
 def _in_known_unit(reading: MeshReading, file: str) -> MeshReading:
-    """Return the reading in metres if its file tells a unit that is none of UNITS."""
+    """Return the reading in metres if its unit is not in UNITS, else unchanged."""
     if reading.unit is None or reading.unit in UNITS.values():
         return reading
     if not 1e-9 < reading.unit < 1e9:
-        raise InputError(f"{file} is broken: its unit has {reading.unit:g} m.")
+        raise InputError(f"{file} is corrupt: its unit is {reading.unit:g} m.")
     surface = reading.surface
     scaled = replace(surface, vertices=surface.vertices * reading.unit)
     return replace(reading, surface=scaled, unit=1.0)
 
 
 def _unit(
-    format: Format, longest: float, told: float | None, of_file: float | None
+    format: Format, longest: float, given: float | None, of_file: float | None
 ) -> tuple[float, str]:
-    """Metres a unit, and why."""
-    if told is not None:
-        return told, f"the unit is {_sign(told)}, as told"
+    """Return the unit [m], and a clause on its source."""
+    if given is not None:
+        return given, f"the unit is {_sign(given)}, as given"
     if of_file is not None:
-        return of_file, f"the unit is {_sign(of_file)}, as the file tells"
+        return of_file, f"the unit is {_sign(of_file)}, as in the file"
     if format in (Format.GLB, Format.GLTF):
-        return 1.0, "the unit is m, as glTF has it"
+        return 1.0, "the unit is m, as in all glTF files"
     if longest > MAX_SIZE * (1.0 + ROUNDING):
-        return 1e-3, f"the unit is taken as mm, since {longest:.4g} m would be too large"
-    return 1.0, f"the unit is taken as m, since {longest:.4g} mm would be small"
+        return 1e-3, f"the unit is assumed to be mm, since {longest:.4g} m would be too large"
+    return 1.0, f"the unit is assumed to be m, since {longest:.4g} mm would be small"
 
 
 def _sign(unit: float) -> str:
@@ -298,10 +299,10 @@ def _check_size(longest: float, unit: float, file: str) -> None:
         return
     fitting = [s for s, metres in UNITS.items() if MIN_SIZE <= longest * metres <= MAX_SIZE]
     hint = f"it would fit with the unit {' or '.join(fitting)}" if fitting else "no unit would fit"
-    said = digits_beyond(1e3 * length, 1e3 * MIN_SIZE, 1e3 * MAX_SIZE)
+    size = digits_beyond(1e3 * length, 1e3 * MIN_SIZE, 1e3 * MAX_SIZE)
     raise InputError(
-        f"{file} would be {said} mm long, with {_sign(unit)} as its unit; "
-        f"from {MIN_SIZE * 1e3:g} to {MAX_SIZE * 1e3:g} mm can be shown, and {hint}."
+        f"{file} would be {size} mm long, with {_sign(unit)} as its unit; "
+        f"the range is {MIN_SIZE * 1e3:g} to {MAX_SIZE * 1e3:g} mm, and {hint}."
     )
 
 
@@ -311,9 +312,9 @@ def _size(vertices: FloatArray, surface: MeshSurface) -> str:
     return f"{count} triangle{'s' if count > 1 else ''}, {x} × {y} × {z} mm"
 
 
-def _turned(axis: Up, told: Up | None) -> str:
-    why = ", as told" if told is not None else ""
-    return f"z is up{why}" if axis is Up.Z else f"y of the file is up{why}, and turned to z"
+def _turned(axis: Up, given: Up | None) -> str:
+    why = ", as given" if given is not None else ""
+    return f"z is up{why}" if axis is Up.Z else f"y of the file is up{why}, and rotated to z"
 
 
 def _listed(parts: tuple[str, ...]) -> str:

@@ -1,4 +1,7 @@
-"""STL, binary and text, as 3D Systems' StereoLithography Interface Specification (1989) has it."""
+"""STL, binary and text.
+
+Source: 3D Systems, StereoLithography Interface Specification (1989).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,6 @@ import re
 
 import numpy as np
 
-from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError
 from katana450.extensions.importers.surface import (
     MeshReading,
@@ -17,9 +19,10 @@ from katana450.extensions.importers.surface import (
 from katana450.maths.geometry.arrays import FloatArray
 
 HEADER = 84
-"""[bytes] Anything, and the number of triangles."""
+"""[bytes] Size of the binary header: 80 bytes of any content, and the number of triangles."""
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+"""A triangle of a binary file."""
 
 _VERTEX = rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)\s+"
 _FACET = re.compile(
@@ -32,28 +35,30 @@ _SOLID = re.compile(rb"\s*(end)?solid\b[^\r\n]*", re.IGNORECASE)
 
 
 def read_stl(data: bytes, name: str) -> MeshReading:
-    """All triangles of all solids. Raises InputError for what is none."""
+    """Return all triangles of all solids. Raises InputError for an invalid file."""
     count = int.from_bytes(data[80:84], "little")
-    # Text begins with "solid", but so do some binary files.
+    # Some binary files begin with "solid" too, so the size decides.
     if len(data) >= HEADER and len(data) == HEADER + count * TRIANGLE.itemsize:
         check_triangles(count, name)
         rows = np.frombuffer(data, TRIANGLE, count, HEADER)
-        left_out = ("colours, which STL has no rule for",) if rows["extra"].any() else ()
+        left_out = (
+            ("colours, which the STL standard does not define",) if rows["extra"].any() else ()
+        )
         return _reading(doubles(rows["corners"]), name, left_out)
     if _SOLID.match(data) and (b"facet" in data.lower() or len(data) < HEADER):
         return _reading(_text(data, name), name)
     if len(data) < HEADER:
         raise InputError(
-            f"{name} is no STL file: neither a text that begins with 'solid', nor long."
+            f"{name} is not an STL file: it has less than {HEADER} bytes and no text of a 'solid'."
         )
     raise InputError(
-        f"{name} is broken, or no STL file: it says {count} triangles, which take "
-        f"{HEADER + count * TRIANGLE.itemsize} bytes, but has {len(data)}."
+        f"{name} is corrupt or not an STL file: it declares {count} triangles, which take "
+        f"{HEADER + count * TRIANGLE.itemsize} bytes, but has {len(data)} bytes."
     )
 
 
 def _text(data: bytes, name: str) -> FloatArray:
-    """(m, 3, 3) corners."""
+    """Return the corners (m, 3, 3) of a text file."""
     found: list[tuple[bytes, ...]] = []
     at, end, is_open = 0, len(data.rstrip()), False
     while at < end:
@@ -64,7 +69,7 @@ def _text(data: bytes, name: str) -> FloatArray:
         else:
             match = _SOLID.match(data, at)
             if match is None or bool(match[1]) != is_open:
-                raise _broken(data, at, name, "a facet, 'solid' or 'endsolid' is wanted")
+                raise _broken(data, at, name, "expected a facet, 'solid' or 'endsolid'")
             is_open = not is_open
         at = match.end()
     if is_open:
@@ -73,20 +78,17 @@ def _text(data: bytes, name: str) -> FloatArray:
         return np.array(found, dtype=object).astype(np.float64).reshape(-1, 3, 3)
     except ValueError as error:
         raise InputError(
-            f"{name} has coordinates that are no numbers: {str(error)[:80]}."
+            f"{name} has coordinates that are not numbers: {str(error)[:80]}."
         ) from error
 
 
 def _broken(data: bytes, at: int, name: str, what: str) -> InputError:
     blank = len(data[at:]) - len(data[at:].lstrip())
     line = data.count(b"\n", 0, at + blank) + 1
-    return InputError(f"{name} is broken at line {line}: {what}.")
+    return InputError(f"{name} is corrupt at line {line}: {what}.")
 
 
 def _reading(corners: FloatArray, name: str, left_out: tuple[str, ...] = ()) -> MeshReading:
     places = np.arange(3 * len(corners))
-    no_colours: Colours | None = None
-    surface = of_polygons(
-        corners.reshape(-1, 3), places, np.full(len(corners), 3), name, no_colours
-    )
+    surface = of_polygons(corners.reshape(-1, 3), places, np.full(len(corners), 3), name)
     return MeshReading(surface, left_out)

@@ -1,4 +1,4 @@
-"""Triangles on their way in: what every reader makes of a file."""
+"""Triangle surfaces as all readers produce them."""
 
 from __future__ import annotations
 
@@ -15,19 +15,23 @@ from katana450.extensions.importers.polygons import cut
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 GREY = (204, 204, 204, 255)
-"""What has no colour beside something that has: VRML97's own default."""
+"""Colour (RGBA bytes) of uncoloured parts beside coloured ones: the default of VRML97."""
 
 MOST_TRIANGLES = 200_000
+"""Maximum number of triangles of a file."""
 
 MAX_COPIES = 20_000
-"""Nodes of a scene, each counted as often as it is used."""
+"""Maximum number of nodes of a scene, each counted as often as it is used."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
-    """vertices: (n, 3). faces: (m, 3) indices of them, counter-clockwise seen from outside.
+    """A surface of triangles.
 
-    colours: (m, 4) sRGB and opacity a face; None where the file says none.
+    Attributes:
+        vertices: (n, 3).
+        faces: (m, 3) indices of vertices, counter-clockwise seen from outside.
+        colours: (m, 4) sRGB and opacity of the faces; None if the file has none.
     """
 
     vertices: FloatArray
@@ -35,14 +39,14 @@ class MeshSurface:
     colours: Colours | None = None
 
     def moved(self, T: FloatArray) -> MeshSurface:
-        """Under the affine map `T` (4, 4); a mirrored surface keeps its outside."""
+        """Return it under the affine map ``T`` (4, 4); a mirrored surface keeps its outside."""
         with np.errstate(over="ignore", invalid="ignore"):
             vertices = self.vertices @ T[:3, :3].T + T[:3, 3]
             mirrored = float(np.linalg.det(T[:3, :3])) < 0.0
         return MeshSurface(vertices, self.faces[:, ::-1] if mirrored else self.faces, self.colours)
 
     def painted(self, colour: Sequence[float] | None) -> MeshSurface:
-        """In one colour (4,) 0..1, where it has none of its own."""
+        """Return it in one colour (4,) 0..1, unless it has colours of its own."""
         if colour is None or self.colours is not None:
             return self
         return MeshSurface(
@@ -50,9 +54,9 @@ class MeshSurface:
         )
 
     def tidy(self) -> MeshSurface:
-        """With equal vertices made one, and without what is of no face or spans no triangle."""
+        """Return it with equal vertices merged, without unused vertices or degenerate triangles."""
         rows, faces = _used(self.vertices, self.faces)
-        # Adding zero makes 0 of -0.
+        # Adding zero turns -0 into 0.
         rows = rows + 0.0
         order = np.lexsort(rows.T)
         first = np.ones(len(rows), dtype=bool)
@@ -67,7 +71,7 @@ class MeshSurface:
 
 
 def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Those vertices that are of a face, and the faces with their new indices."""
+    """Return the vertices that a face uses, and the faces with their new indices."""
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     return vertices[used], (np.cumsum(used) - 1)[faces]
@@ -75,10 +79,13 @@ def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class MeshReading:
-    """What a reader found: the surface in the file's own units and axes.
+    """The result of a reader, in the units and axes of the file.
 
-    left_out: in words what was not read. unit: metres a unit of the file, if it tells. up: its axis
-    that points up, y or z, if it tells.
+    Attributes:
+        surface: the surface.
+        left_out: names of the parts that were not read.
+        unit: unit [m], if the file gives it.
+        up: axis that points up, y or z, if the file gives it.
     """
 
     surface: MeshSurface
@@ -88,23 +95,23 @@ class MeshReading:
 
 
 class MeshBuilder:
-    """Surfaces that are put together to one, as long as they are few enough."""
+    """A builder that joins surfaces to one, within the maximum number of triangles."""
 
     def __init__(self, name: str) -> None:
-        """`name` says in errors which file it is."""
+        """Start without surfaces. ``name`` is the name of the file for messages."""
         self._name = name
         self._parts: list[MeshSurface] = []
         self._triangles = 0
 
     def add(self, part: MeshSurface) -> None:
-        """Raises InputError for more triangles than may be, and for places that are not finite."""
+        """Add ``part``. Raises InputError for too many triangles or non-finite coordinates."""
         self._triangles += len(part.faces)
         check_triangles(self._triangles, self._name)
         check_finite(part.vertices, self._name)
         self._parts.append(part)
 
     def surface(self) -> MeshSurface:
-        """All of them; in colour if one of them is."""
+        """Return all parts as one surface, with colours if any part has them."""
         coloured = any(part.colours is not None for part in self._parts)
         offsets = np.cumsum([0, *(len(part.vertices) for part in self._parts)])
         paint = [value / 255.0 for value in GREY]
@@ -122,11 +129,11 @@ class MeshBuilder:
 
 
 def check_triangles(count: int, name: str) -> None:
-    """InputError for more than may be."""
+    """Raise InputError if ``count`` exceeds MOST_TRIANGLES."""
     if count > MOST_TRIANGLES:
         raise InputError(
-            f"{name} has more than {MOST_TRIANGLES} triangles, which is the most; "
-            "save it coarser, or in parts."
+            f"{name} has more than {MOST_TRIANGLES} triangles, the maximum. "
+            "Save it coarser, or in parts."
         )
 
 
@@ -139,19 +146,19 @@ def of_polygons(
     corner_colours: FloatArray | None = None,
     vertex_colours: FloatArray | None = None,
 ) -> MeshSurface:
-    """The surface of polygons, concave ones too.
+    """Return the surface of polygons, which may be concave.
 
     Args:
         vertices: (n, 3).
         corners: (k,) indices of vertices, polygon after polygon.
-        sizes: (p,) corners each; polygons of fewer than three are left out.
-        name: of the file.
-        colours: (p, 4) a polygon.
-        corner_colours: (k, 4) 0..1 a corner; a triangle has the mean of its three.
-        vertex_colours: (n, 4) 0..1 a vertex; the same.
+        sizes: (p,) number of corners of each polygon; polygons of fewer than three are left out.
+        name: name of the file for messages.
+        colours: (p, 4) bytes of each polygon.
+        corner_colours: (k, 4) 0..1 of each corner; a triangle gets the mean of its three.
+        vertex_colours: (n, 4) 0..1 of each vertex; a triangle gets the mean of its three.
 
-    Raises InputError for indices of no vertex, coordinates that are no finite numbers, and more
-    triangles than may be.
+    Raises InputError for indices without a vertex, coordinates that are not finite, and too many
+    triangles.
     """
     check_triangles(int(np.maximum(sizes - 2, 0).sum()), name)
     wrong = (corners < 0) | (corners >= len(vertices))
@@ -172,18 +179,18 @@ def of_polygons(
 
 
 def doubles(values: npt.NDArray[Any]) -> FloatArray:
-    """The same numbers in double precision, quietly where one is no number."""
+    """Return ``values`` in double precision, without a warning for NaN."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64)
 
 
 def check_finite(vertices: FloatArray, name: str) -> None:
-    """InputError for NaN, infinity, and what soon would be."""
+    """Raise InputError for NaN, infinity, and magnitudes from 1e30."""
     if not (np.abs(vertices) < 1e30).all():
-        raise InputError(f"{name} has coordinates that are no finite numbers.")
+        raise InputError(f"{name} has coordinates that are not finite numbers.")
 
 
 def as_bytes(colours: Iterable[Sequence[float]] | FloatArray) -> Colours:
-    """(m, 4) bytes of colours 0..1; what is beyond is brought in."""
+    """Return colours 0..1 as bytes (m, 4); values outside are clipped."""
     rows = np.nan_to_num(np.asarray(colours, dtype=np.float64))
     return np.rint(np.clip(rows, 0.0, 1.0) * 255.0).astype(np.uint8).reshape(-1, 4)

@@ -1,7 +1,7 @@
-"""3MF by trimesh.
+"""3MF, read with trimesh.
 
-Source: 3MF Consortium, 3MF Core Specification 1.3. The archive is measured before it is unpacked;
-trimesh expands no entity and opens no file outside of it.
+Source: 3MF Consortium, 3MF Core Specification 1.3. The size of the archive is checked before it is
+unpacked. trimesh expands no entity and opens no file outside of the archive.
 """
 
 from __future__ import annotations
@@ -24,21 +24,22 @@ from katana450.extensions.importers.surface import (
 )
 
 MAX_FILES = 256
-"""Files of an archive."""
+"""Maximum number of files of an archive."""
 
 MODEL = "3d/3dmodel.model"
+"""Path of the model in the archive, in lower case."""
 
 UNITS = {
     **{"micron": 1e-6, "millimeter": 1e-3, "millimeters": 1e-3, "centimeter": 1e-2},
     **{"inch": 0.0254, "foot": 0.3048, "meter": 1.0},
 }
-"""[m] Units of the specification, and trimesh's word where a file tells none."""
+"""[m] Units of the specification, and trimesh's word for a file without a unit."""
 
 
 def read_3mf(data: bytes, name: str, maximum: int) -> MeshReading:
     """Return the triangles of all items of the build. Raises InputError if there are none.
 
-    most: [bytes] that the files of the archive have together.
+    ``maximum`` [bytes] limits the total size of the files of the archive.
     """
     _check_archive(data, name, maximum)
     builder = MeshBuilder(name)
@@ -52,7 +53,7 @@ def read_3mf(data: bytes, name: str, maximum: int) -> MeshReading:
                 builder.add(surfaces[item["geometry"]].moved(np.asarray(item["matrix"])))
         unit = found["metadata"]["units"]
     if unit not in UNITS:
-        raise InputError(f"{name} is broken: {str(unit)[:20]!r} is no unit of 3MF.")
+        raise InputError(f"{name} is corrupt: {str(unit)[:20]!r} is not a unit of 3MF.")
     return MeshReading(builder.surface(), _left_out(data), unit=UNITS[unit], up="z")
 
 
@@ -61,16 +62,15 @@ def _check_archive(data: bytes, name: str, maximum: int) -> None:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             files = archive.infolist()
     except (zipfile.BadZipFile, zipfile.LargeZipFile, ValueError, OSError) as error:
-        raise InputError(f"{name} is no 3MF file: it is no .zip that can be read.") from error
-    # A .zip unpacks to no more than is declared here.
+        raise InputError(f"{name} is not a 3MF file: it cannot be read as a .zip.") from error
+    # zipfile never unpacks more than the size that is declared here.
     if len(files) > MAX_FILES or sum(file.file_size for file in files) > maximum:
         raise InputError(
-            f"{name} holds more than {MAX_FILES} files, or more than {maximum // 1_000_000} MB "
-            f"when "
-            "unpacked; save it coarser."
+            f"{name} has more than {MAX_FILES} files, or more than {maximum // 1_000_000} MB when "
+            "unpacked. Save it coarser."
         )
     if all(MODEL not in file.filename.lower() for file in files):
-        raise InputError(f"{name} is no 3MF file: there is no 3D/3dmodel.model in it.")
+        raise InputError(f"{name} is not a 3MF file: it has no 3D/3dmodel.model.")
 
 
 def _surface(mesh: dict[str, Any], name: str) -> MeshSurface:
@@ -79,7 +79,7 @@ def _surface(mesh: dict[str, Any], name: str) -> MeshSurface:
 
 
 def _left_out(data: bytes) -> tuple[str, ...]:
-    """Return in words what trimesh does not read."""
+    """Return the names of the parts that trimesh does not read."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         model = next(file for file in archive.infolist() if MODEL in file.filename.lower())
         text = archive.read(model)

@@ -1,4 +1,4 @@
-"""Files over HTTP: meshes and scenes, read off the thread that everybody is served by."""
+"""HTTP uploads of meshes and scenes, read outside of the server's thread."""
 
 from __future__ import annotations
 
@@ -34,26 +34,30 @@ from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.token_bucket import TokenBucket
 
 RATE, UPLOAD_BURST = 0.5, 10.0
-"""Files a second, and at once, of everybody together."""
+"""Uploads per second, and maximum burst, of all clients together."""
 
 WAITING, WAITING_EACH = 4, 2
-"""Files that are read or wait for it, of everybody together and of one identity."""
+"""Maximum number of uploads in progress or waiting: of all clients, and of one identity."""
 
 UPLOAD_TIMEOUT = 60.0
-"""[s] Until a file is here and read, whoever sends it slowly."""
+"""[s] Timeout of receiving and reading a file."""
 
 NOT_ALLOWED = 403
+"""HTTP status of a refusal for lack of rights."""
 
 T = TypeVar("T")
 
 
 class Uploads:
-    """The routes. What comes is kept for a while, and used by a request that names its key."""
+    """The HTTP routes for files. An upload is stored for a while, under a key."""
 
     def __init__(
         self, hub: Hub, authenticator: Authenticator, identity: Callable[[Request], Identity]
     ) -> None:
-        """``visitor``: who asks, or the HTTPException that turns them away."""
+        """Prepare the routes.
+
+        ``identity`` returns the identity of a request, or raises HTTPException to refuse it.
+        """
         self._hub = hub
         self._authenticator = authenticator
         self._identity = identity
@@ -62,7 +66,7 @@ class Uploads:
         self._places = ConnectionLimit(WAITING, WAITING_EACH)
 
     def routes(self) -> list[BaseRoute]:
-        """All of them."""
+        """Return all routes."""
         return [
             Route(f"{ROOT}/mesh", self._mesh, methods=["POST"]),
             Route(f"{ROOT}/scene", self._load, methods=["POST"]),
@@ -79,7 +83,7 @@ class Uploads:
             if len(name) > 4 * LONGEST_NAME:
                 raise InputError("The name of the file is too long.")
             data = await body_of(request, MAX_FILE_BYTES, UPLOAD_TIMEOUT)
-            mesh = await self._off(lambda: read_mesh(data, name, unit or None))
+            mesh = await self._in_thread(lambda: read_mesh(data, name, unit or None))
             return keep_mesh(self._hub, mesh)
 
         return await self._answered(request, keep)
@@ -90,7 +94,7 @@ class Uploads:
             data = await body_of(request, MAX_ZIP_BYTES, UPLOAD_TIMEOUT)
             hand = arm.environment.hand
             T_palm_tool = None if hand is None else hand.T_palm_tool
-            stored = await self._off(lambda: read_scene_zip(data, T_palm_tool))
+            stored = await self._in_thread(lambda: read_scene_zip(data, T_palm_tool))
             return keep_scene(self._hub, data, stored, arm)
 
         return await self._answered(request, keep)
@@ -108,9 +112,9 @@ class Uploads:
     async def _answered(
         self, request: Request, keep: Callable[[], Awaitable[answers.Answer]]
     ) -> Response:
-        """What ``keep`` answers, for somebody who may drive, and not too often."""
+        """Return the answer of ``keep`` as a response, if role and limits allow the upload."""
         if not self._identity(request).role.may_drive:
-            raise HTTPException(NOT_ALLOWED, "You may watch, not bring anything.")
+            raise HTTPException(NOT_ALLOWED, "Your role may watch, but not upload files.")
         with self._places.taken(identity(self._authenticator, request) or "") as free:
             if not free or not self._often.take(self._hub.clock()):
                 why = "Too many files at once. Wait a moment."
@@ -119,14 +123,17 @@ class Uploads:
                 async with asyncio.timeout(UPLOAD_TIMEOUT):
                     return as_json(await keep())
             except TimeoutError:
-                why = f"That took more than {UPLOAD_TIMEOUT:g} s."
+                why = f"The upload took more than {UPLOAD_TIMEOUT:g} s."
                 return as_json(answers.Refused(why=why), TOO_SLOW)
             except InputError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
             except LeaseError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
-    async def _off(self, read: Callable[[], T]) -> T:
-        """What ``read`` makes, one at a time: each may take a process and a gigabyte."""
+    async def _in_thread(self, read: Callable[[], T]) -> T:
+        """Return the result of ``read``, run in a thread.
+
+        One at a time: each may take a process and a gigabyte.
+        """
         async with self._reading:
             return await asyncio.to_thread(read)

@@ -1,7 +1,8 @@
 """VRML97 worlds of other programs, flattened to one surface.
 
-Source: ISO/IEC 14772-1:1997. More forgiving than what reads our own files back: nodes that are not
-of the standard are left out and named. No other file is opened, and nothing of a script is run.
+Source: ISO/IEC 14772-1:1997. This reader is more tolerant than the one for our own files: nodes
+that are not of the standard are left out and reported. No other file is opened, and no script is
+executed.
 """
 
 from __future__ import annotations
@@ -29,27 +30,30 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
 GZIP = b"\x1f\x8b"
+"""First bytes of a gzip file."""
 
 CLOSERS = {"{": "}", "[": "]"}
+"""The closing token of each opening token."""
 
 TEXTURES = ("ImageTexture", "PixelTexture", "MovieTexture")
+"""Kinds of nodes that are textures."""
 
 
 def read_wrl(data: bytes, name: str, maximum: int) -> MeshReading:
-    """Everything that is shown at first, in the world's frame: y up.
+    """Return all surfaces that are shown at first, in the world frame with y up.
 
-    `most` [bytes] bounds what a compressed file becomes. Raises InputError, with the line, for what
-    is no VRML97.
+    ``maximum`` [bytes] limits the unpacked size of a compressed file. Raises InputError with the
+    line of an error.
     """
     if data.startswith(GZIP):
         data = _unpacked(data, name, maximum)
     text = data.decode("utf-8", "replace").removeprefix("\ufeff")
     if re.match("#VRML V1.0", text):
         raise InputError(
-            f"{name} is VRML 1.0, which is not read; save it as VRML97 (also called VRML 2.0)."
+            f"{name} is VRML 1.0, which is not supported. Save it as VRML97 (VRML 2.0)."
         )
     if not re.match(f"{re.escape(HEADER)}(?![^ \r\n])", text):
-        raise InputError(f"{name} does not begin with {HEADER!r}, so it is not VRML97.")
+        raise InputError(f"{name} is not VRML97: it must begin with {HEADER!r}.")
     reader = ForeignReader(text, name)
     world = reader.world()
     return _Flattening(name, reader.left_out).reading(world.nodes)
@@ -60,25 +64,26 @@ def _unpacked(data: bytes, name: str, maximum: int) -> bytes:
     try:
         found = unpacker.decompress(data, maximum + 1)
     except zlib.error as error:
-        raise InputError(f"{name} is broken: {error}.") from error
+        raise InputError(f"{name} is corrupt: {error}.") from error
     if len(found) > maximum:
-        raise InputError(f"{name} holds more than {maximum // 1_000_000} MB when unpacked.")
+        raise InputError(f"{name} has more than {maximum // 1_000_000} MB when unpacked.")
     if not unpacker.eof:
-        raise InputError(f"{name} is broken: it ends too early.")
+        raise InputError(f"{name} is corrupt: it ends too early.")
     return found
 
 
 class ForeignReader(Reader):
-    """Knows the standard's nodes, leaves out others, and puts what is used again in its place."""
+    """A reader that knows the standard nodes, omits others, and puts reused nodes in place."""
 
     fields = STANDARD
 
     def __init__(self, text: str, name: str) -> None:
+        """Read ``text`` of the file ``name``."""
         super().__init__(text, name)
         self.left_out: Counter[str] = Counter()
 
     def _define(self, name: str) -> None:
-        # The standard lets a name be given anew.
+        # The standard allows a name to be defined again.
         self._named[name] = None
 
     def _used(self, node: Node, _name: str) -> Node:
@@ -86,7 +91,7 @@ class ForeignReader(Reader):
 
     def _unknown(self, kind: str, name: str | None) -> Node:
         if kind in ("PROTO", "EXTERNPROTO"):
-            raise self._error(f"{kind} {self._ahead[:40]}: prototypes are not read")
+            raise self._error(f"{kind} {self._ahead[:40]}: prototypes are not supported")
         if kind != "NULL":
             self._skip_braces()
         if kind in TEXTURES:
@@ -95,7 +100,7 @@ class ForeignReader(Reader):
 
     def _skip_braces(self) -> None:
         if self._ahead != "{":
-            raise self._error(f"'{{' is wanted, not {self._ahead[:40]!r}")
+            raise self._error(f"expected '{{', not {self._ahead[:40]!r}")
         closers: list[str] = []
         while True:
             token = self._take()
@@ -122,24 +127,24 @@ class ForeignReader(Reader):
         return self._ends()
 
     def _ends(self) -> Route:
-        """Of a route, behind the word; where it goes is of no matter here."""
+        """Return the rest of a ROUTE after its first word; its target does not matter here."""
         source = self._take()
         self._expect("TO")
         return Route(source, "", self._take(), "")
 
 
 class _Flattening:
-    """Walks what is shown, with the place where each node stands."""
+    """A traversal of the visible nodes, with the pose of each."""
 
     def __init__(self, name: str, left_out: Counter[str]) -> None:
         self._name, self._left_out = name, left_out
-        self._pile = MeshBuilder(name)
+        self._builder = MeshBuilder(name)
         self._surfaces: dict[int, MeshSurface | None] = {}
         self._visits = 0
 
     def reading(self, nodes: tuple[Node, ...]) -> MeshReading:
-        """Of all nodes of a file."""
-        # By hand and not by recursion: nodes that use others can be deeper than their text is.
+        """Return the surface of all nodes of a file."""
+        # Without recursion, because reused nodes can be nested deeper than the text.
         waiting = [(node, np.eye(4)) for node in reversed(nodes)]
         while waiting:
             node, T = waiting.pop()
@@ -152,10 +157,10 @@ class _Flattening:
             if node.kind == "Shape":
                 self._shape(node, T)
             waiting += [(child, T_child) for child, T_child in reversed(self._shown(node, T))]
-        return MeshReading(self._pile.surface(), tuple(self._left_out))
+        return MeshReading(self._builder.surface(), tuple(self._left_out))
 
     def _shown(self, node: Node, T: FloatArray) -> list[tuple[Node, FloatArray]]:
-        """What stands in a node, and where."""
+        """Return the visible children of a node with their poses."""
         match node.kind:
             case "Group" | "Anchor" | "Billboard" | "Collision":
                 return [(child, T) for child in _nodes(node.get("children"))]
@@ -185,7 +190,7 @@ class _Flattening:
             self._surfaces[id(geometry)] = surface_of(geometry, self._name)
         surface = self._surfaces[id(geometry)]
         if surface is not None:
-            self._pile.add(surface.painted(_colour(node)).moved(T))
+            self._builder.add(surface.painted(_colour(node)).moved(T))
         elif geometry.kind != "NULL":
             self._left_out[geometry.kind] += 1
 
@@ -196,7 +201,7 @@ def _nodes(value: Value | None) -> list[Node]:
 
 
 def _placed(node: Node) -> FloatArray:
-    """(4, 4) of a Transform, 6.52: P' = T C R SR S -SR -C P."""
+    """Return the pose (4, 4) of a Transform, 6.52: P' = T C R SR S -SR -C P."""
     moved, center = (numbers(node, key, (0.0,) * 3)[:, 0] for key in ("translation", "center"))
     scale = numbers(node, "scale", (1.0,) * 3)[:, 0]
     R, SR = (_rotation(node, key) for key in ("rotation", "scaleOrientation"))
@@ -208,12 +213,12 @@ def _placed(node: Node) -> FloatArray:
 
 def _rotation(node: Node, field: str) -> FloatArray:
     x, y, z, angle = numbers(node, field, (0.0, 0.0, 1.0, 0.0))[:, 0]
-    # A number that large is no angle, and its sine is noise.
+    # Reduced to one turn, because the sine of a very large angle is noise.
     return so3.exp(unit(np.array((x, y, z))) * float(np.remainder(angle, 2.0 * np.pi)))
 
 
 def _colour(shape: Node) -> tuple[float, ...] | None:
-    """(4,) 0..1 of its material; None without."""
+    """Return the colour (4,) 0..1 of its material; None without a material."""
     appearance = part(shape, "appearance")
     material = None if appearance is None else part(appearance, "material")
     if material is None or material.kind != "Material":

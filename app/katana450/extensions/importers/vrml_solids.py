@@ -1,4 +1,4 @@
-"""The surfaces that VRML97's geometry nodes stand for, in their own frames.
+"""Surfaces of VRML97 geometry nodes, in their own frames.
 
 Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGrid, 6.18 Extrusion,
 6.23 IndexedFaceSet, 6.42 Sphere.
@@ -17,38 +17,38 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 ROUND = 32
-"""Sides of what is round."""
+"""Number of sides that approximate a circle."""
 
 
 def surface_of(node: Node, name: str) -> MeshSurface | None:
-    """Of a geometry node; None where it has none, as of lines.
+    """Return the surface of a geometry node; None for a kind without one, such as lines.
 
-    `name` is the file's. Raises InputError for a node that contradicts itself.
+    ``name`` is the name of the file. Raises InputError for a node that contradicts itself.
     """
     make = MAKERS.get(node.kind)
     return None if make is None else make(node, name)
 
 
 def numbers(node: Node, field: str, default: Sequence[float], width: int = 1) -> FloatArray:
-    """(k, width) of a field of numbers."""
+    """Return a field of numbers as (k, width)."""
     value = node.get(field)
     return np.array(default if value is None else value, dtype=np.float64).reshape(-1, width)
 
 
 def number(node: Node, field: str, default: float) -> float:
-    """Of a field of one number."""
+    """Return a field of one number."""
     value = node.get(field)
     return default if value is None else float(value)  # type: ignore[arg-type]
 
 
 def flag(node: Node, field: str, default: bool = True) -> bool:
-    """Of a field that is true or false."""
+    """Return a Boolean field."""
     value = node.get(field)
     return default if value is None else bool(value)
 
 
 def part(node: Node, field: str) -> Node | None:
-    """The node in a field."""
+    """Return the node in a field; None if there is none."""
     value = node.get(field)
     return value if isinstance(value, Node) else None
 
@@ -56,14 +56,14 @@ def part(node: Node, field: str) -> Node | None:
 def _positive(node: Node, name: str, **fields: float) -> list[float]:
     values = [number(node, field, default) for field, default in fields.items()]
     if min(values) <= 0.0:
-        raise InputError(f"{name} has a {node.kind} of no size.")
+        raise InputError(f"{name} has a {node.kind} whose size is not positive.")
     return values
 
 
 def _box(node: Node, name: str) -> MeshSurface:
     half = numbers(node, "size", (2.0, 2.0, 2.0))[:, 0] / 2.0
     if half.min() <= 0.0:
-        raise InputError(f"{name} has a Box of no size.")
+        raise InputError(f"{name} has a Box whose size is not positive.")
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     sides = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
     return of_polygons(signs * half, np.array(sides), np.full(6, 4), name)
@@ -96,7 +96,7 @@ def _turned(
     top: bool,
     name: str,
 ) -> MeshSurface:
-    """A profile (k, 2) of radius and y, from the bottom up, turned about y."""
+    """Return the surface of a profile (k, 2) of radius and y, bottom to top, turned about y."""
     rows = np.asarray(profile, dtype=np.float64)
     turn = np.arange(ROUND) * (2.0 * np.pi / ROUND)
     ring = np.column_stack((np.sin(turn), np.zeros(ROUND), np.cos(turn)))
@@ -144,7 +144,7 @@ def _face_set(node: Node, name: str) -> MeshSurface:
 
 
 def _split(index: IntArray) -> tuple[IntArray, IntArray]:
-    """Corners (k,), and how many (p,) each polygon has, of a list with -1 between polygons."""
+    """Return corners (k,) and sizes (p,) of the polygons in a list with -1 between them."""
     ends = np.flatnonzero(np.append(index, -1) < 0)
     sizes = np.diff(ends, prepend=-1) - 1
     # The last polygon needs no -1.
@@ -152,9 +152,9 @@ def _split(index: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _chosen(paint: FloatArray, places: IntArray, fits: bool, name: str) -> FloatArray:
-    """(k, 4) of the colours (c, 3) at those places."""
+    """Return the colours (k, 4) at ``places`` of the table ``paint`` (c, 3)."""
     if not fits or (places < 0).any() or (places >= len(paint)).any():
-        raise InputError(f"{name} has an IndexedFaceSet whose colours do not go with its faces.")
+        raise InputError(f"{name} has an IndexedFaceSet whose colours do not match its faces.")
     return np.column_stack((paint[places], np.ones(len(places))))
 
 
@@ -168,7 +168,9 @@ def _grid(node: Node, name: str) -> MeshSurface:
     columns, rows = (int(number(node, f"{axis}Dimension", 0.0)) for axis in "xz")
     height = numbers(node, "height", ())[:, 0]
     if min(columns, rows) < 0 or columns * rows != len(height):
-        raise InputError(f"{name} has an ElevationGrid whose heights are not as many as it says.")
+        raise InputError(
+            f"{name} has an ElevationGrid with another number of heights than declared."
+        )
     if min(columns, rows) < 2:
         return of_polygons(np.zeros((0, 3)), np.arange(0), np.arange(0), name)
     x = np.arange(columns) * number(node, "xSpacing", 1.0)
@@ -197,7 +199,7 @@ def _extrusion(node: Node, name: str) -> MeshSurface:
     turns = numbers(node, "orientation", (0.0, 0.0, 1.0, 0.0), 4)
     count, rows = len(section), len(spine)
     if count < 2 or rows < 2 or not len(scale) or not len(turns):
-        raise InputError(f"{name} has an Extrusion that is too short.")
+        raise InputError(f"{name} has an Extrusion with too few points.")
     check_triangles(2 * (count - 1) * (rows - 1), name)
     frames = _frames(spine)
     points = np.empty((rows, count, 3))
@@ -210,7 +212,7 @@ def _extrusion(node: Node, name: str) -> MeshSurface:
     first = (np.arange(rows - 1)[:, None] * count + np.arange(count - 1)).ravel()
     quads = np.column_stack((first, first + 1, first + count + 1, first + count))
     corners, sizes = [quads.ravel()], [np.full(len(first), 4)]
-    # The last corner of a section that is closed is the first once more.
+    # The last corner of a closed section repeats the first.
     closed = bool((section[0] == section[-1]).all())
     cap = np.arange(count - closed)
     for wanted, polygon in (
@@ -227,8 +229,10 @@ def _extrusion(node: Node, name: str) -> MeshSurface:
 
 
 def _frames(spine: FloatArray) -> list[FloatArray]:
-    """(3, 3) of the section's plane at each point of a spine, as 6.18 has it: y along the spine,
-    z out of its bend; where there is none, as at the point before.
+    """Return the section's frame (3, 3) at each point of a spine, as in 6.18.
+
+    y is along the spine and z out of its bend. A point without a bend has the frame of the point
+    before.
     """
     closed = bool((spine[0] == spine[-1]).all())
     ahead, behind = np.roll(spine, -1, axis=0), np.roll(spine, 1, axis=0)
@@ -248,7 +252,7 @@ def _frames(spine: FloatArray) -> list[FloatArray]:
     for direction, bend in zip(along, bends, strict=True):
         y = direction if direction.any() else y
         z = bend if bend.any() else z
-        # Bends that go the other way would turn the section over.
+        # A bend in the opposite direction would flip the section.
         if frames and float(z @ frames[-1][:, 2]) < 0.0:
             z = -z
         x = unit(np.cross(y, z))
@@ -257,15 +261,15 @@ def _frames(spine: FloatArray) -> list[FloatArray]:
 
 
 def _least_turn(y: FloatArray) -> FloatArray:
-    """(3, 3) the rotation by the least angle that takes the y axis to the unit vector `y`."""
+    """Return the smallest rotation (3, 3) that takes the y axis to the unit vector ``y``."""
     axis = np.cross((0.0, 1.0, 0.0), y)
     sine, cosine = float(np.linalg.norm(axis)), float(y[1])
-    way = axis / sine if sine > 0.0 else np.array((0.0, 0.0, 1.0))
-    return so3.exp(way * float(np.arctan2(sine, cosine)))
+    direction = axis / sine if sine > 0.0 else np.array((0.0, 0.0, 1.0))
+    return so3.exp(direction * float(np.arctan2(sine, cosine)))
 
 
 def unit(v: FloatArray) -> FloatArray:
-    """Of length 1; 0 stays 0."""
+    """Return ``v`` scaled to length 1; a zero vector stays 0."""
     size = float(np.abs(v).max())
     if not size > 0.0:
         return np.zeros_like(v)
@@ -282,4 +286,4 @@ MAKERS: dict[str, Callable[[Node, str], MeshSurface]] = {
     "ElevationGrid": _grid,
     "Extrusion": _extrusion,
 }
-"""By the kind of a node."""
+"""The function that builds the surface, by the kind of a node."""

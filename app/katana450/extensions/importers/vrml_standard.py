@@ -1,4 +1,4 @@
-"""The nodes of VRML97 that have to do with surfaces, and those that have not.
+"""Nodes of VRML97 that concern surfaces, and nodes that can be ignored.
 
 Fields, types and defaults are those of ISO/IEC 14772-1:1997, chapter 6.
 """
@@ -114,7 +114,7 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
         "TextureCoordinate": {"point": Type.PAIR_LIST},
     }
 )
-"""With the types of their fields, as far as a file can set them."""
+"""Types of the fields of each node, as far as a file can set them."""
 
 IGNORED_NODES = frozenset(
     [
@@ -127,4 +127,4 @@ IGNORED_NODES = frozenset(
         *("PositionInterpolator", "ScalarInterpolator"),
     ]
 )
-"""Nodes without a surface of their own, of which nobody misses one."""
+"""Nodes without a surface of their own, which are not reported as left out."""

@@ -1,1 +1,1 @@
-"""Pictures, films and reports of runs, without a browser; the same bytes on every run."""
+"""Pictures, films and reports of runs, without a browser; the same input gives the same bytes."""

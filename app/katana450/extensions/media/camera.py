@@ -1,4 +1,4 @@
-"""A camera without a lens: the rays through the pixels of a picture."""
+"""A pinhole camera: the rays through the pixels of a picture."""
 
 from __future__ import annotations
 
@@ -15,9 +15,15 @@ from katana450.maths.geometry.arrays import finite_array
 
 @dataclass(frozen=True)
 class Camera:
-    """position, target: [m] in the base frame, z up. fov: between top and bottom [rad].
+    """A pinhole camera.
 
-    size: width and height of its picture in pixels.
+    Attributes:
+        position: [m] in the base frame, z up.
+        target: point that it looks at [m].
+        fov: vertical field of view [rad].
+        size: width and height of its picture [px].
+
+    Raises InputError for invalid values.
     """
 
     position: tuple[float, float, float]
@@ -29,26 +35,32 @@ class Camera:
         eye = finite_array(self.position, (3,), "The position of the camera")
         to = finite_array(self.target, (3,), "The target of the camera") - eye
         if math.hypot(to[0], to[1]) < MIN_SLOPE_SINE * float(np.linalg.norm(to)) or not to.any():
-            raise InputError("The camera would look straight up or down, or at itself.")
+            raise InputError(
+                "The camera must not look straight up or down, or at its own position."
+            )
         if not 0.0 < self.fov < math.pi:
-            raise InputError(f"The camera's field of view is {self.fov} rad; give 0 to pi.")
+            raise InputError(
+                f"The camera's field of view is {self.fov} rad; it must be between 0 and pi."
+            )
         if not all(1 <= side <= MAX_PIXELS for side in self.size):
-            raise InputError(f"A picture has 1 to {MAX_PIXELS} pixels a side, not {self.size}.")
+            raise InputError(
+                f"A picture must have 1 to {MAX_PIXELS} pixels per side, not {self.size}."
+            )
 
     @cached_property
     def frame(self) -> Floats:
-        """(3, 3) whose rows are its right, its up and where it looks."""
+        """The rows (3, 3) of its axes in the base frame: right, up and ahead."""
         ahead = unit(np.subtract(self.target, self.position))
         right = unit(np.cross(ahead, (0.0, 0.0, 1.0)))
         return np.stack((right, np.cross(right, ahead), ahead)).astype(np.float32)
 
     @property
     def pixel(self) -> float:
-        """What a pixel in the middle is across, as a fraction of the distance."""
+        """The width of the central pixel, as a fraction of the distance."""
         return 2.0 * math.tan(0.5 * self.fov) / self.size[1]
 
     def directions(self, x: Floats, y: Floats) -> Floats:
-        """(n, 3) through the spots x, y (n,) of the picture: pixels from its top left corner."""
+        """Return unit directions (n, 3) through x, y (n,) [px] from the top left corner."""
         width, height = self.size
         across = (x - 0.5 * width) * self.pixel
         up = (0.5 * height - y) * self.pixel
@@ -56,6 +68,7 @@ class Camera:
 
 
 MIN_SLOPE_SINE = 1e-3
-"""Sine of the least angle from straight up or down."""
+"""Sine of the minimum angle between view direction and vertical."""
 
 MAX_PIXELS = 8192
+"""Maximum width and height of a picture."""

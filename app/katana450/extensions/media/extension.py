@@ -1,4 +1,4 @@
-"""The extension ``media``: the command that takes pictures and films of the arm."""
+"""The extension ``media``: the command that renders pictures and films of the arm."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from katana450.extensions.export.extension import joint_values
 from katana450.resources import URDF_PATH
 
 CAMERAS = ("free", "front", "side", "top", "tool")
-"""As the buttons of the page have them; the first is its 3D view."""
+"""Camera presets, as on the page; the first is its 3D view."""
 
 THEMES = ("light", "dark")
+"""Themes of the page."""
 
 
 def add_render_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``render`` to ``parser``."""
+    """Add the options of ``katana450 render`` to ``parser``."""
     parser.add_argument(
         "--out",
         type=Path,
@@ -30,26 +31,26 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         type=joint_values,
         default=(),
         metavar="Q",
-        help="values of the driven joints in rad with commas between, gripper last, such as "
+        help="comma-separated values of the driven joints in rad, gripper last, such as "
         "--pose=0,-1.2,1.4,0.1,0,0.2 (default: the home posture)",
     )
     shown.add_argument(
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help="a motion; .csv with the columns t,theta1,...,theta5,gripper or .json with lists of "
+        help="motion: .csv with the columns t,theta1,...,theta5,gripper or .json with lists of "
         "these names",
     )
     shown.add_argument(
         "--run",
         metavar="SCRIPT",
-        help="circle, pour or the file of a script, whose run is the motion",
+        help="run that is shown: circle, pour or the file of a script",
     )
     parser.add_argument(
         "--at",
         type=float,
         metavar="SECONDS",
-        help="for a picture of a motion: at what time (default: at its end)",
+        help="time of a picture of a motion (default: its end)",
     )
     parser.add_argument(
         "--camera", choices=CAMERAS, default=CAMERAS[0], help="view (default: %(default)s)"
@@ -62,7 +63,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         help="pixels (default: 1280x720)",
     )
     parser.add_argument(
-        "--fps", type=float, default=25.0, help="pictures a second (default: %(default)g)"
+        "--fps", type=float, default=25.0, help="pictures per second (default: %(default)g)"
     )
     parser.add_argument("--theme", choices=THEMES, default=THEMES[0])
     parser.add_argument(
@@ -80,7 +81,9 @@ def _size(text: str) -> tuple[int, int]:
     except ValueError:
         width = height = 0
     if not (16 <= width <= 4096 and 16 <= height <= 4096):
-        raise argparse.ArgumentTypeError(f"two numbers from 16 to 4096, as 1280x720, not {text!r}")
+        raise argparse.ArgumentTypeError(
+            f"expected two numbers from 16 to 4096, such as 1280x720, not {text!r}"
+        )
     return width, height
 
 
@@ -95,7 +98,7 @@ EXTENSION = Extension(
     (
         CliCommand(
             "render",
-            "a picture or a film of the arm, without a browser",
+            "render a picture or a film of the arm, without a browser",
             add_render_options,
             _render,
         ),

@@ -1,4 +1,4 @@
-"""The figures of a report, drawn for a printed page; matplotlib is loaded when one is drawn."""
+"""Figures of a report for print. matplotlib is imported only when one is drawn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import tool_speed
 
 INK, FAINT, DESIRED, ERROR = "#1f2933", "#cbd2d9", "#9aa5b1", "#c2410c"
+"""Colours of text, grid, desired paths and errors."""
 AXES = ("#0b6e99", "#c2410c", "#2f855a", "#7c3aed", "#a16207")
+"""Colours of the joints."""
 
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -40,18 +42,20 @@ STYLE = {
     "savefig.dpi": 200,
     "svg.hashsalt": "katana450",
 }
+"""matplotlib settings of all figures."""
 
-SPREADINGS = 30
-"""Until names that would lie on each other lie beside each other."""
+LABEL_ITERATIONS = 30
+"""Number of iterations that separate overlapping labels."""
 
 PARTS = 200
-"""Of a path, of each of which the largest error is drawn."""
+"""Number of parts of a path; the largest error of each is drawn."""
 
 TIME = "time (s)"
+"""Label of a time axis."""
 
 
 def path_figure(paths: Sequence[PathTrace]) -> bytes:
-    """PNG: desired and traced path in 3D, and the error along it (as the paper's Fig. 7)."""
+    """Return a PNG of desired and traced path in 3D, and the error along it (paper's Fig. 7)."""
     plt = _plt()
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(7.2, 3.9))
@@ -87,15 +91,15 @@ def path_figure(paths: Sequence[PathTrace]) -> bytes:
         top = worst / 10.0**power
         panel.set_ylim(0.0, 1.25 * top or 1.0)
         panel.axhline(top, color=INK, linewidth=0.7, linestyle=(0, (4, 3)))
-        said = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
-        panel.annotate(said, (99.0, 1.03 * top), ha="right", va="bottom")
+        caption = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
+        panel.annotate(caption, (99.0, 1.03 * top), ha="right", va="bottom")
         return _png(plt, figure)
 
 
 def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
-    """Sigma (m,) in the middle of PARTS parts of every path, and the largest error there [m].
+    """Return sigma (m,) in the middle of PARTS parts of all paths, and the largest error [m] there.
 
-    Rounding errors jump from place to place: all of them on each other would be a block of colour.
+    Rounding errors jump from place to place, so a plot of all of them would be a block of colour.
     """
     edges = np.linspace(0.0, 1.0, PARTS + 1)
     maximum = np.zeros(PARTS)
@@ -106,7 +110,7 @@ def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
 
 
 def joints_figure(arm: ArmModel, trace: Trace) -> bytes:
-    """PNG: the joint variables over time (as the paper's Fig. 8)."""
+    """Return a PNG of the joint variables over time (the paper's Fig. 8)."""
     plt = _plt()
     with plt.rc_context(STYLE):
         figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
@@ -122,7 +126,7 @@ def joints_figure(arm: ArmModel, trace: Trace) -> bytes:
 
 
 def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
-    """PNG: joint speeds as shares of their limits, and the speed of the tool."""
+    """Return a PNG of joint speeds as fractions of their limits, and of the speed of the tool."""
     plt = _plt()
     with plt.rc_context(STYLE):
         figure, (upper, lower) = plt.subplots(
@@ -137,7 +141,7 @@ def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
         for limit in (-100.0, 100.0):
             upper.axhline(limit, color=ERROR, linewidth=0.8, linestyle=(0, (4, 3)))
         upper.set_ylim(-115.0, 115.0)
-        upper.set_title("Joint speeds, of their limits")
+        upper.set_title("Joint speeds as fractions of their limits")
         upper.set_ylabel("speed (% of limit)")
         above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
         upper.legend(**above, ncols=fractions.shape[1], fontsize=8.0)
@@ -155,7 +159,7 @@ def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
 
 
 def equal_axes(space: Any, points: FloatArray) -> None:
-    """The same millimetre on all three axes, with room around."""
+    """Set the same scale on all three axes, with a margin around ``points`` (n, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = 0.5 * (low + high), 0.55 * float((high - low).max())
     for number, set_limits in enumerate((space.set_xlim, space.set_ylim, space.set_zlim)):
@@ -164,11 +168,11 @@ def equal_axes(space: Any, points: FloatArray) -> None:
 
 
 def _name_lines(panel: Any, t: FloatArray, values: FloatArray, names: Sequence[str]) -> None:
-    """Each line's name at its end, moved apart where ends meet."""
+    """Write the name of each line at its end, separated if ends are close."""
     apart = 0.055 * max(float(values.max() - values.min()), 1.0)
     at = values[-1].copy()
     order = np.argsort(at, kind="stable").tolist()
-    for _ in range(SPREADINGS):
+    for _ in range(LABEL_ITERATIONS):
         for low, high in pairwise(order):
             short = 0.5 * max(apart - float(at[high] - at[low]), 0.0)
             at[low], at[high] = at[low] - short, at[high] + short

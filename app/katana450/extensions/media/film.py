@@ -1,4 +1,4 @@
-"""Films: pictures one after another as H.264 in an MP4 file, by the ffmpeg of imageio-ffmpeg."""
+"""Films: pictures as H.264 in an MP4 file, written by the ffmpeg of imageio-ffmpeg."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ import numpy.typing as npt
 from katana450.errors import InputError
 
 QUALITY = 8
-"""Of 10."""
+"""Quality of the encoding, from 0 to 10."""
 
 SLOWEST, FASTEST = 1.0, 120.0
-"""Pictures a second."""
+"""Range of pictures per second."""
 
 
 def check_filmable(size: tuple[int, int], fps: float) -> None:
-    """Raise InputError unless a film can have ``size`` [px] and ``fps`` pictures a second."""
+    """Raise InputError unless a film can have ``size`` [px] and ``fps`` pictures per second."""
     if any(side % 2 for side in size):
-        raise InputError(f"A film has an even number of pixels a side, not {size[0]}x{size[1]}.")
+        raise InputError(f"The width and height of a film must be even, not {size[0]}x{size[1]}.")
     if not SLOWEST <= fps <= FASTEST:
-        raise InputError(f"A film has {SLOWEST:g} to {FASTEST:g} pictures a second, not {fps:g}.")
+        raise InputError(
+            f"A film must have {SLOWEST:g} to {FASTEST:g} pictures per second, not {fps:g}."
+        )
 
 
 def write_film(
@@ -35,14 +37,13 @@ def write_film(
     size: tuple[int, int],
     fps: float,
 ) -> int:
-    """Write ``pictures``, each (height, width, 3) sRGB; returns how many.
+    """Write ``pictures``, each (height, width, 3) sRGB; return their number.
 
-    The file is there whole or not at all, whatever ends the writing. Raises InputError where it
-    cannot be written.
+    The file is written completely or not at all. Raises InputError if it cannot be written.
     """
     check_filmable(size, fps)
     ffmpeg: Any = importlib.import_module("imageio_ffmpeg")
-    # ffmpeg tells the kind of file by its ending.
+    # ffmpeg determines the format from the suffix.
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.mp4")
     writer = ffmpeg.write_frames(
         str(temporary),
@@ -62,7 +63,7 @@ def write_film(
             count += 1
         writer.close()
         if not count:
-            raise InputError("A film of no picture is none.")
+            raise InputError("A film must have at least one picture.")
         temporary.replace(path)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error

@@ -1,4 +1,4 @@
-"""What rays from the camera meet: a surface of an item, the floor, or nothing."""
+"""The first intersection of camera rays: with a surface of an item, the floor, or nothing."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ from katana450.extensions.media.scene import Bools, Floats, Ints, RenderScene
 from katana450.extensions.media.tracer import NOTHING, Meeting, Tracer
 
 FLOOR, NOWHERE = -1, -2
-"""In place of the number of an item."""
+"""Values in place of the number of an item."""
 
 BACKGROUND_DISTANCE = 1e4
-"""[m] How far off what meets nothing is said to be."""
+"""[m] Distance that is assigned to rays that hit nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Of n rays.
+    """The first intersections of n rays.
 
     Attributes:
         directions: (n, 3) of the rays.
         distance: (n,) [m].
-        points: (n, 3) where each ends, in the base frame [m].
-        normals, flat: (n, 3) unit normals towards the camera, as shaded and as they are.
+        points: (n, 3) end points in the base frame [m].
+        normals: (n, 3) unit normals for shading, towards the camera.
+        flat: (n, 3) unit normals of the triangles, towards the camera.
         item: (n,) numbers of items, FLOOR or NOWHERE.
     """
 
@@ -37,11 +38,11 @@ class Hits:
 
     @property
     def solid(self) -> Bools:
-        """(n,) whether each meets an item."""
+        """(n,) True for rays that hit an item."""
         return np.asarray(self.item >= 0)
 
     def some(self, which: Bools) -> Hits:
-        """Of the rays alone that ``which`` (n,) says."""
+        """Return the hits of the rays for which ``which`` (n,) is True."""
         return Hits(
             self.directions[which],
             self.distance[which],
@@ -55,7 +56,10 @@ class Hits:
 def first_hits(
     scene: RenderScene, tracer: Tracer, eye: Floats, directions: Floats, floor: float
 ) -> Hits:
-    """From ``eye`` (3,) along ``directions`` (n, 3). floor: its height [m]."""
+    """Return the hits of rays from ``eye`` (3,) along ``directions`` (n, 3).
+
+    ``floor`` is the height of the floor [m].
+    """
     met = tracer.first(_from(eye, directions), directions)
     down = directions[:, 2]
     to_floor = np.full(len(directions), BACKGROUND_DISTANCE, dtype=np.float32)
@@ -77,7 +81,7 @@ def first_hits(
 def hits_behind(
     scene: RenderScene, tracer: Tracer, eye: Floats, before: Hits
 ) -> tuple[np.typing.NDArray[np.intp], Hits]:
-    """What rays meet in another scene ``before`` they end: numbers (m,) of those that do."""
+    """Return the numbers (m,) of rays that hit another scene ``before`` they end, and the hits."""
     met = tracer.first(_from(eye, before.directions), before.directions)
     hit = np.flatnonzero(met.distance < before.distance)
     directions, distance = before.directions[hit], met.distance[hit]
@@ -97,14 +101,14 @@ def _ends(eye: Floats, distance: Floats, directions: Floats) -> Floats:
 def _normals(
     scene: RenderScene, met: Meeting, directions: Floats, hit: np.typing.NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
-    """Unit normals (m, 3) where the rays ``hit`` end: as shaded, and of the triangles."""
+    """Return unit normals (m, 3) at the ends of the rays ``hit``: for shading, of triangles."""
     face = met.face[hit]
     a, b, c = (scene.normals[scene.faces[face, corner]] for corner in range(3))
     second, third = met.second[hit, None], met.third[hit, None]
     smooth = a + second * (b - a) + third * (c - a)
     size = np.sqrt(np.einsum("ni,ni->n", smooth, smooth))[:, None]
     plane = scene.flat[face]
-    # An open surface is seen from either side.
+    # An open surface can be seen from both sides.
     inside = np.einsum("ni,ni->n", plane, directions[hit]) > 0.0
     side = np.where(inside, np.float32(-1.0), np.float32(1.0))[:, None]
     shaded = np.where(size > MIN_DENOMINATOR, smooth / np.maximum(size, MIN_DENOMINATOR), plane)
@@ -112,6 +116,7 @@ def _normals(
 
 
 STEEPNESS = 1e-6
-"""Sine below which a ray is level."""
+"""Sine of the inclination below which a ray counts as level."""
 
 MIN_DENOMINATOR = np.float32(1e-6)
+"""Minimum length of a vector that can be normalized."""

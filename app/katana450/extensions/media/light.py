@@ -1,7 +1,8 @@
-"""How much of the key light and of the sky reaches what is seen.
+"""The fractions of the key light and of the sky light that reach each visible point.
 
-A few rays a pixel, others in each of the sixteen pixels of a tile, and the mean over as many pixels
-of one surface (Keller and Heidrich, Interleaved Sampling, 2001): so a few rays look like many.
+Each pixel traces a few rays, with other directions in each of the sixteen pixels of a tile. The
+mean over as many pixels of one surface (Keller and Heidrich, Interleaved Sampling, 2001) gives the
+quality of many rays.
 """
 
 from __future__ import annotations
@@ -15,29 +16,29 @@ from katana450.extensions.media.scene import Floats, unit
 from katana450.extensions.media.tracer import Tracer
 
 TILE = np.array(((0, 8, 2, 10), (12, 4, 14, 6), (3, 11, 1, 9), (15, 7, 13, 5)))
-"""Which of sixteen each pixel of a tile takes: neighbours take what is far apart."""
+"""Number of the sample set of each pixel in a tile; neighbours have distant numbers."""
 
 KEY_SIZE = 0.045
-"""[rad] Radius of the key light as it is seen: how soft its shadows are."""
+"""[rad] Apparent radius of the key light, which determines the softness of shadows."""
 
 MAX_SHADOW_LENGTH = 2.5
-"""[m] No shadow is longer."""
+"""[m] Maximum length of a shadow."""
 
 SKY_RANGE = 0.3
-"""[m] What is farther off hides no sky: the room is bright all round."""
+"""[m] Maximum distance of surfaces that hide the sky, because the whole room is bright."""
 
 RAY_OFFSET = 2e-4
-"""[m] Off the surface that rays to the light start, so that it does not meet them itself."""
+"""[m] Distance of the start of a ray from its surface, to avoid hits of the surface itself."""
 
 PLANE_TOLERANCE = 2e-3
-"""[m] By which two pixels may be off one plane and still be of one surface."""
+"""[m] Maximum distance from one plane of two pixels of one surface."""
 
 SAME_NORMAL_COSINE = 0.9
-"""Cosine between normals of one surface."""
+"""Minimum cosine between normals of two pixels of one surface."""
 
 
 class Light(NamedTuple):
-    """key, sky: (n,) shares from 0 to 1 that reach each point."""
+    """Fractions (n,) of key light and sky light that reach each point, from 0 to 1."""
 
     key: Floats
     sky: Floats
@@ -46,9 +47,10 @@ class Light(NamedTuple):
 def reaching(
     hits: Hits, tracer: Tracer, towards: Floats, size: tuple[int, int], rays: int
 ) -> Light:
-    """For each pixel of a picture of width and height ``size``, row by row.
+    """Return the light at each pixel of a picture of width and height ``size``, row by row.
 
-    towards: (3,) unit direction to the key light. rays: of each kind for a pixel.
+    ``towards`` (3,) is the unit direction to the key light. ``rays`` is the number of rays per
+    pixel and kind of light.
     """
     width, height = size
     rows, columns = np.divmod(np.arange(width * height), width)
@@ -68,15 +70,15 @@ def reaching(
             unit(towards + spot[:, :1] * aside + spot[:, 1:] * above),
             MAX_SHADOW_LENGTH,
         )
-        way = dome[number[seen]]
-        out = way[:, :1] * side + way[:, 1:2] * upright + way[:, 2:] * hits.normals[seen]
+        local = dome[number[seen]]
+        out = local[:, :1] * side + local[:, 1:2] * upright + local[:, 2:] * hits.normals[seen]
         sky[seen] += ~tracer.blocked(_start(hits, seen), out.astype(np.float32), SKY_RANGE)
     found = np.stack((key, sky), axis=-1).reshape(height, width, 2) / np.float32(rays)
     points = hits.points.reshape(height, width, 3)
     normals = hits.normals.reshape(height, width, 3)
     for axis in (0, 1):
         found = _spread(found, points, normals, axis, 1)
-    # The sky's shade has no edges, so it bears a wider mean.
+    # The shade of the sky has no edges, so a wider mean is possible.
     soft = found[..., 1:]
     for axis in (0, 1):
         soft = _spread(soft, points, normals, axis, 3)
@@ -88,9 +90,9 @@ def _start(hits: Hits, which: np.typing.NDArray[np.intp]) -> Floats:
 
 
 def _spread(values: Floats, points: Floats, normals: Floats, axis: int, stride: int) -> Floats:
-    """Means over four pixels along one axis, ``stride`` apart, of those on the same surface.
+    """Return means over four pixels along one axis, ``stride`` apart, on the same surface.
 
-    Every place of a tile counts once: with five pixels, the outer two by half.
+    Every place of a tile counts once: of five pixels, the outer two have half weight.
     """
     total, weights = values.copy(), np.ones(values.shape[:2], dtype=np.float32)
     for step, weight in ((stride, 1.0), (2 * stride, 0.5)):
@@ -110,10 +112,10 @@ def _spread(values: Floats, points: Floats, normals: Floats, axis: int, stride: 
 
 
 def _spots(rays: int) -> Floats:
-    """(16 rays, 2) evenly in the unit square; sixteen for the first ray of each place, and so on.
+    """Return points (16 rays, 2), evenly in the unit square; the first 16 are for the first ray.
 
-    Those of one place are far apart too: in the first number by strata, in the second by the golden
-    section from Van der Corput's.
+    The points of one place are far apart too: the first coordinate by strata, the second by the
+    golden section, starting from Van der Corput's sequence.
     """
     place = np.arange(16)
     mirrored = ((place & 1) * 8 + (place & 2) * 2 + (place & 4) // 2 + (place & 8) // 8) / 16.0
@@ -124,17 +126,18 @@ def _spots(rays: int) -> Floats:
 
 
 GOLDEN = 0.618034
+"""The golden section."""
 
 
 def _disc(rays: int) -> Floats:
-    """(16 rays, 2) evenly on the key light's disc."""
+    """Return points (16 rays, 2), evenly on the disc of the key light."""
     spots = _spots(rays)
     r, turn = KEY_SIZE * np.sqrt(spots[:, 0]), 2.0 * np.pi * spots[:, 1]
     return np.stack((r * np.cos(turn), r * np.sin(turn)), axis=1).astype(np.float32)
 
 
 def _dome(rays: int) -> Floats:
-    """(16 rays, 3) over the half sphere about z, as thick as what they bring (Lambert's cosine)."""
+    """Return directions (16 rays, 3) over the half sphere about z, weighted by Lambert's cosine."""
     spots = _spots(rays)
     r, turn = np.sqrt(spots[:, 0]), 2.0 * np.pi * spots[:, 1]
     up = np.sqrt(1.0 - spots[:, 0])
@@ -142,9 +145,9 @@ def _dome(rays: int) -> Floats:
 
 
 def _across(n: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (n, 3) each, square to unit vectors (n, 3) and to each other.
+    """Return two sets of unit vectors (n, 3), orthogonal to ``n`` (n, 3) and to each other.
 
-    Duff et al., Building an Orthonormal Basis, Revisited, 2017.
+    Source: Duff et al., Building an Orthonormal Basis, Revisited, 2017.
     """
     x, y, z = n.T
     sign = np.where(z < 0.0, np.float32(-1.0), np.float32(1.0))

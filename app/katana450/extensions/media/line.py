@@ -1,4 +1,4 @@
-"""A line in space, as a thin tube."""
+"""A line in space as a thin tube."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ from katana450.extensions.media.scene import Item, unit
 from katana450.maths.geometry.arrays import FloatArray
 
 SIDES = 8
+"""Number of sides of a tube."""
 
 MIN_POINT_DISTANCE = 1e-5
-"""[m] Points nearer to each other are one."""
+"""[m] Minimum distance of distinct points."""
 
 
 def tube(name: str, points: FloatArray, radius: float, rgb: tuple[int, int, int]) -> Item | None:
-    """Along ``points`` (n, 3) [m] in the base frame; None where these are one. rgb: of 255."""
+    """Return a tube along ``points`` (n, 3) [m] in the base frame; None if all are equal.
+
+    ``rgb`` is the colour, 0 to 255.
+    """
     far = np.linalg.norm(np.diff(points, axis=0), axis=1) > MIN_POINT_DISTANCE
     points = points[np.concatenate(([True], far))]
     if len(points) < 2:
@@ -25,9 +29,9 @@ def tube(name: str, points: FloatArray, radius: float, rgb: tuple[int, int, int]
     ahead = unit(np.gradient(points, axis=0)).astype(float)
     aside = np.empty_like(points)
     last = np.eye(3)[int(np.abs(ahead[0]).argmin())]
-    for number, way in enumerate(ahead):
-        # What was aside before, without what of it leads ahead: so the tube does not twist.
-        last = last - (last @ way) * way
+    for number, direction in enumerate(ahead):
+        # The vector aside is projected from point to point, so that the tube does not twist.
+        last = last - (last @ direction) * direction
         last /= float(np.linalg.norm(last))
         aside[number] = last
     upright = np.cross(ahead, aside)

@@ -1,7 +1,8 @@
-"""What is measured of a run, and whether it is as its script expects.
+"""Measures of a run, and comparison with the bounds that its script expects.
 
-Two errors are kept apart: that of the kinematics, forward of the planned joints from the path that
-was wished for, and that of the motion, where the arm was told to be at each tick and between two.
+Two errors are distinguished. The kinematic error is the distance of the planned joints' forward
+kinematics from the desired path. The motion error is the distance of the moving arm from the path,
+at each tick and between two ticks.
 """
 
 from __future__ import annotations
@@ -30,14 +31,19 @@ from katana450.maths.planning.tool_path import ToolPath
 from katana450.maths.water.score import score
 
 PATH_SAMPLES = 2000
-"""Of each path at which the kinematics are held against it."""
+"""Number of intervals of each path at whose ends the kinematics are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class PathTrace:
-    """One path of the tool: sigma (N,), desired and traced points (N, 3) in {S} [m].
+    """One path of the tool.
 
-    turned: (N,) how far off pitch and roll are [rad].
+    Attributes:
+        name: name of the task.
+        sigma: (N,) places on the path.
+        desired: (N, 3) desired points in {S} [m].
+        traced: (N, 3) points of the planned joints in {S} [m].
+        turned: (N,) error of pitch or roll, the larger one [rad].
     """
 
     name: str
@@ -48,13 +54,13 @@ class PathTrace:
 
     @property
     def error(self) -> FloatArray:
-        """(N,) [m]."""
+        """The position error (N,) [m]."""
         return np.asarray(np.linalg.norm(self.traced - self.desired, axis=1))
 
 
 @dataclass(frozen=True)
 class Bound:
-    """What a script expects of a measure, and what it was."""
+    """The bound that a script expects of a measure, and its value."""
 
     name: str
     low: float
@@ -63,7 +69,7 @@ class Bound:
 
     @property
     def held(self) -> bool:
-        """Whether it is so."""
+        """True if the value is within the bound."""
         return self.value is not None and self.low <= self.value <= self.high
 
     @property
@@ -79,7 +85,7 @@ class Bound:
 
 
 def alongs(program: Program) -> tuple[PathTrace, ...]:
-    """The paths of the tool, repetitions once."""
+    """Return the paths of the tool, each repeated path once."""
     found: dict[int, PathTrace] = {}
     for task in program.tasks:
         if not isinstance(task.order, FollowPlan):
@@ -91,7 +97,7 @@ def alongs(program: Program) -> tuple[PathTrace, ...]:
 
 
 def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, float | None]:
-    """Each of MEASURES by its name; None where there is nothing to measure it on."""
+    """Return each of MEASURES by its name; None if it does not apply."""
     paths = alongs(program)
     errors = np.concatenate([path.error for path in paths]) if paths else np.empty(0)
     turned = np.concatenate([path.turned for path in paths]) if paths else np.empty(0)
@@ -110,7 +116,7 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
         for task in program.tasks
         if isinstance(task.order, FollowPlan)
         and task.order.plan.nearest is not None
-        # What is lifted touches the table before.
+        # An object to be lifted touches the table at first.
         and task.order.plan.nearest.contact.distance >= STOP
     ]
     return {
@@ -133,10 +139,11 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
 
 
 def executed(program: Program, trace: Trace) -> tuple[FloatArray, FloatArray]:
-    """How far the arm was from its tool paths [m]: at the ticks, and half-way between two.
+    """Return the distances of the arm from its tool paths [m]: at the ticks, and midway between.
 
-    At a tick from where the path has the tool at that moment, so no less than from the path; half
-    way, with the joints on straight lines as a drive has them, across the path.
+    At a tick it is the distance from the point of the path at that time, so at least the distance
+    from the path. Midway, it is the distance across the path, with the joints interpolated linearly
+    as by a drive.
     """
     at_ticks: list[float] = []
     between: list[float] = []
@@ -157,7 +164,7 @@ def executed(program: Program, trace: Trace) -> tuple[FloatArray, FloatArray]:
 
 
 def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]:
-    """What ``script`` expects, beside what was."""
+    """Return the bounds that ``script`` expects, with the measured values."""
     return tuple(
         Bound(name, low, high, values[name]) for name, (low, high) in script.expected.items()
     )
@@ -192,7 +199,7 @@ def _point(path: ToolPath, q: FloatArray) -> FloatArray:
 
 
 def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
-    """Point (3,) [m] and unit tangent (3,) at ``sigma``; no tangent where the tool only turns."""
+    """Return point (3,) [m] and unit tangent (3,) at ``sigma``; no motion gives a zero tangent."""
     tool: ToolCoordinates = path.curve.at(Jet.variable(sigma))
     p, rate = (
         np.array([each.derivatives()[order] for each in tool[:3]], dtype=float) for order in (0, 1)
@@ -202,7 +209,7 @@ def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _fraction(trace: Trace, maximum: FloatArray, order: int) -> float:
-    """The greatest derivative of the setpoints of that order, of the most a joint has."""
+    """Return the maximum derivative of that order of the setpoints as a fraction of ``maximum``."""
     period = float(trace.t[-1]) / (len(trace.t) - 1)
     return float(
         (np.abs(np.diff(trace.q, order, axis=0)) / period**order / maximum).max(initial=0.0)
@@ -214,7 +221,7 @@ def _length(points: FloatArray) -> float:
 
 
 def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
-    """What is measured of the water, where there was any."""
+    """Return the measures of the water; none without water."""
     end = trace.water[-1]
     if end is None:
         return {}

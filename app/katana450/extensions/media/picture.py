@@ -1,4 +1,4 @@
-"""A picture: every pixel seen once, lit, and where surfaces end four times more."""
+"""Rendering of a picture: one sample per pixel with light, and four more at edges."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from katana450.extensions.media.tracer import Tracer
 from katana450.server.viser_bridge.themes import Theme
 
 STILL, MOVING = 4, 1
-"""Rays of each kind for a pixel: of a picture, of one in a film."""
+"""Rays per pixel and kind of light: of a picture, and of a frame of a film."""
 
 CORNERS = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
-"""Of a pixel, where it is looked at where surfaces end."""
+"""Places of the samples in a pixel at an edge."""
 
 EDGE_COSINE = 0.94
-"""Cosine between normals of neighbours that counts as an edge."""
+"""Cosine between normals of neighbours below which there is an edge."""
 
 EDGE_STEP = 4e-3
-"""[m] Off a neighbour's plane that counts as one."""
+"""[m] Distance from a neighbour's plane above which there is an edge."""
 
 
 class Translucent(NamedTuple):
-    """Something to be seen through. opacity: the fraction of what is behind it that it hides."""
+    """A translucent item. ``opacity`` is the fraction of the background that it hides."""
 
     item: Item
     opacity: float
@@ -42,8 +42,12 @@ class Translucent(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """pixels: (height, width, 3) sRGB of 255. item: (height, width) the item that the middle of
-    each pixel shows, FLOOR or NOWHERE. names: of the items, those that are seen through last.
+    """A rendered picture.
+
+    Attributes:
+        pixels: (height, width, 3) sRGB, 0 to 255.
+        item: (height, width) item at the middle of each pixel, FLOOR or NOWHERE.
+        names: names of the items, translucent ones last.
     """
 
     pixels: npt.NDArray[np.uint8]
@@ -58,9 +62,9 @@ class Picture:
         return file.getvalue()
 
     def shows(self, *names: str) -> Bools:
-        """(height, width) where the middle of a pixel shows one of the items of these ``names``."""
-        wanted = [number for number, name in enumerate(self.names) if name in names]
-        return np.isin(self.item, wanted)
+        """Return (height, width) whether the middle of a pixel shows one of the items ``names``."""
+        numbers = [number for number, name in enumerate(self.names) if name in names]
+        return np.isin(self.item, numbers)
 
 
 def picture(
@@ -70,12 +74,15 @@ def picture(
     theme: Theme,
     rays: int = STILL,
 ) -> Picture:
-    """What ``camera`` sees of them. Raises ConfigurationError without embreex."""
+    """Return the picture of the items as ``camera`` sees them.
+
+    Raises ConfigurationError without embreex.
+    """
     return _Renderer(items, translucents, camera, theme, rays).picture
 
 
 class _Renderer:
-    """One picture on its way."""
+    """The rendering of one picture."""
 
     def __init__(
         self,
@@ -108,7 +115,7 @@ class _Renderer:
         rough = np.flatnonzero(self._ends(hits, shown))
         if len(rough):
             colours[rough] = self._finer(rough, rows, columns, hits, light)
-        # The background has so little contrast that its steps would show.
+        # Dithering, because the low contrast of the background would show steps.
         plain = hits.item == NOWHERE
         finer = (TILE[rows[plain] % 4, columns[plain] % 4] - 7.5) / (16.0 * 255.0)
         colours[plain] = np.clip(colours[plain] + finer[:, None], 0.0, 1.0)
@@ -119,14 +126,14 @@ class _Renderer:
         )
 
     def _hits(self, x: Floats, y: Floats) -> Hits:
-        """What is met through spots x, y (n,)."""
-        ways = self._camera.directions(x, y)
-        return first_hits(self._solid, self._tracer, self._eye, ways, room.HEIGHT)
+        """Return the hits of the rays through x, y (n,) [px]."""
+        directions = self._camera.directions(x, y)
+        return first_hits(self._solid, self._tracer, self._eye, directions, room.HEIGHT)
 
     def _light(self, hits: Hits, light: Light, y: Floats) -> tuple[Floats, Ints]:
-        """(n, 3) what comes to the camera from points of which ``light`` is known.
+        """Return the light (n, 3) from points with the illumination ``light`` to the camera.
 
-        And (n,) which veil is before each, NOWHERE without.
+        The second value (n,) is the translucent item before each point, NOWHERE without one.
         """
         found = room.background(self._theme, self._camera, y)
         on_floor = hits.item == FLOOR
@@ -142,14 +149,14 @@ class _Renderer:
         translucent = np.full(len(found), NOWHERE, dtype=np.int32)
         if self._thin.names:
             at, seen = hits_behind(self._thin, self._behind, self._eye, hits)
-            # Water is lit as what is behind it is.
+            # Water has the same illumination as the point behind it.
             shown = _surface(self._thin, seen, Light(light.key[at], light.sky[at]))
             found[at] += self._opacity[seen.item][:, None] * (shown - found[at])
             translucent[at] = seen.item
         return found, translucent
 
     def _ends(self, hits: Hits, shown: Ints) -> Bools:
-        """(n,) which pixels have a neighbour on another surface. shown: (n,) items, veils first."""
+        """Return (n,) the pixels with a neighbour on another surface; ``shown`` (n,) are items."""
         width, height = self._camera.size
         item = shown.reshape(height, width)
         points = hits.points.reshape(height, width, 3)
@@ -171,7 +178,7 @@ class _Renderer:
     def _finer(
         self, which: npt.NDArray[np.intp], rows: Ints, columns: Ints, hits: Hits, light: Light
     ) -> Floats:
-        """(k, 3) colours of pixels, each looked at four times; lit as the likest spot near by."""
+        """Return colours (k, 3) of pixels, four samples each, lit as the most similar pixel."""
         total = np.zeros((len(which), 3), dtype=np.float32)
         for right, down in CORNERS:
             x, y = _spots(columns[which], right), _spots(rows[which], down)
@@ -181,7 +188,7 @@ class _Renderer:
         return total / np.float32(len(CORNERS))
 
     def _near(self, which: npt.NDArray[np.intp], seen: Hits, hits: Hits, light: Light) -> Light:
-        """The light of the pixel round each whose surface is most like what is seen."""
+        """Return the light of the neighbouring pixel with the most similar surface."""
         width, height = self._camera.size
         row, column = np.divmod(which, width)
         best = which
@@ -203,10 +210,10 @@ class _Renderer:
 
 
 PERPENDICULAR_PENALTY = 0.02
-"""[m] That two surfaces square to each other seem to be apart."""
+"""[m] Distance that counts for two perpendicular surfaces."""
 
 OTHER_ITEM_PENALTY = 1.0
-"""[m] The same of two items."""
+"""[m] Distance that counts for two different items."""
 
 
 def _spots(pixels: Ints, within: float) -> Floats:

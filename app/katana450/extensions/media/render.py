@@ -40,18 +40,20 @@ Pixels = npt.NDArray[np.uint8]
 
 
 def render(options: argparse.Namespace) -> int:
-    """Write the one file; tell its name and size."""
+    """Write the file; print its name and size. Raises InputError."""
     path: Path = options.out
     kind = path.suffix.lower()
     moves = options.run is not None or options.trajectory is not None
     if kind not in (".png", ".mp4"):
         raise InputError(f"{path} must end in .png for a picture or in .mp4 for a film.")
     if kind == ".mp4" and not moves:
-        raise InputError("A film wants a motion: give --run or --trajectory.")
+        raise InputError("A film needs a motion. Use --run or --trajectory.")
     if options.at is not None and (kind == ".mp4" or not moves):
-        raise InputError("--at chooses a moment of a motion for a picture; here is none to choose.")
+        raise InputError(
+            "--at needs a picture of a motion. Use a .png file with --run or --trajectory."
+        )
     if options.at is not None and not 0.0 <= options.at < math.inf:
-        raise InputError(f"--at is a time of 0 or more seconds, not {options.at:g}.")
+        raise InputError(f"--at must be a time of at least 0 s, not {options.at:g}.")
     check_traceable()
     check_writable(path)
     if kind == ".mp4":
@@ -70,15 +72,15 @@ def render(options: argparse.Namespace) -> int:
 
 
 class _Shot(NamedTuple):
-    """How a picture is taken."""
+    """The view and size of a picture."""
 
     preset: Preset
     size: tuple[int, int]
     theme: str
 
     def taken(self, stage: RenderStage, robot: Robot, state: State, rays: int) -> Picture:
-        look = camera_pose(self.preset, robot.require_arm(), state)
-        camera = Camera(look.position, look.target, float(FOV), self.size)
+        view = camera_pose(self.preset, robot.require_arm(), state)
+        camera = Camera(view.position, view.target, float(FOV), self.size)
         theme: Theme = THEMES[self.theme]
         return picture(stage.items(state), stage.water(state), camera, theme, rays)
 
@@ -86,7 +88,7 @@ class _Shot(NamedTuple):
 def _film(path: Path, shown: Playback, shot: _Shot, fps: float, urdf: Path) -> None:
     count = int(shown.duration * fps) + 1
     states = [_bare(shown.at(number / fps)) for number in range(count)]
-    # Each picture takes one core, and knows nothing of the others.
+    # Pictures are independent, so each is rendered on one core.
     pool = ProcessPoolExecutor(
         min(os.cpu_count() or 1, count),
         multiprocessing.get_context("spawn"),
@@ -101,22 +103,24 @@ def _film(path: Path, shown: Playback, shot: _Shot, fps: float, urdf: Path) -> N
 
 
 def _bare(state: State) -> State:
-    """What of a state can be seen, so that little goes over to another process."""
+    """Return ``state`` without invisible parts, to transfer less to other processes."""
     return replace(state, mode=IDLE, findings=())
 
 
 class _Studio(NamedTuple):
+    """The data of a process that renders pictures of a film."""
+
     shot: _Shot
     robot: Robot
     stage: RenderStage
 
 
 _studios: list[_Studio] = []
-"""Of this process: one, in those that take the pictures of a film."""
+"""The only entry is set in processes that render pictures of a film."""
 
 
 def _begin(shot: _Shot, urdf: Path, bare: bool) -> None:
-    # Ctrl-C is for the process that writes the file.
+    # Ctrl-C is handled by the process that writes the file.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     session: Session
     robot, session, _ = describe_robot(replace(Settings(), bare=bare), urdf, None)

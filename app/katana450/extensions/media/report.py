@@ -1,4 +1,4 @@
-"""The files of a report: figures, a table of the run, its measures for programs and for people."""
+"""The files of a report: figures, a table of the run, and its measures as JSON and HTML."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from katana450.extensions.programs.simulation import Trace
 from katana450.maths.kinematics.forward import forward
 
 NONE: Mapping[str, bytes] = {}
+"""The pictures of a report without pictures."""
 
 UNITS = {
     "_m_s3": "m/s³",
@@ -37,14 +38,22 @@ UNITS = {
     "_deg": "deg",
     "_s": "s",
 }
-"""Of a measure, by how its name ends; the longer ends first."""
+"""Unit of a measure by the suffix of its name; longer suffixes first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Of one run.
+    """The report of one run.
 
-    values: of each measure by its name. facts: what was run, and how, by name. notes: for people.
+    Attributes:
+        script: the script.
+        program: the compiled script.
+        arm: the arm model.
+        trace: the record of the run.
+        values: each measure by its name.
+        bounds: the bounds that the script expects.
+        facts: conditions of the run, by name.
+        notes: notes for people.
     """
 
     script: Script
@@ -65,24 +74,24 @@ class Report:
         facts: dict[str, Any],
         notes: tuple[str, ...] = (),
     ) -> Report:
-        """With everything measured."""
+        """Return the report with all measures."""
         values = measurements(program, arm, trace)
         return Report(script, program, arm, trace, values, bounds(script, values), facts, notes)
 
     @property
     def held(self) -> bool:
-        """Whether every bound is."""
+        """True if every bound is met."""
         return all(bound.held for bound in self.bounds)
 
     @property
     def lines(self) -> list[str]:
-        """The measures as a person reads them."""
+        """The measures as text lines."""
         return [
             f"{_title(name):<32} {_with_unit(name, value)}" for name, value in self.values.items()
         ]
 
     def json(self, written: datetime) -> str:
-        """Everything measured, units in the names, and what was expected of it."""
+        """Return all measures, with units in the names, and their bounds as JSON."""
         expected = [
             {
                 "name": bound.name,
@@ -105,7 +114,7 @@ class Report:
         return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
 
     def csv(self) -> str:
-        """One row a tick: time, step, line, task, joints and speeds, fingers, tool, path."""
+        """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path."""
         n = self.arm.chain.n
         file = io.StringIO()
         rows = csv.writer(file, lineterminator="\n")
@@ -140,14 +149,16 @@ class Report:
     def write(
         self, directory: Path, written: datetime, pictures: Mapping[str, bytes] = NONE
     ) -> tuple[Path, ...]:
-        """All its files into ``directory``, made if need be. Raises InputError where it cannot.
+        """Write all files into ``directory``, which is created if needed. Raises InputError.
 
-        ``pictures``: PNG files by their names, of those in CAPTIONS, shown before the figures.
+        ``pictures`` are PNG files by names of CAPTIONS, shown before the figures.
         """
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{directory} cannot be made: {error.strerror or error}.") from error
+            raise InputError(
+                f"{directory} cannot be created: {error.strerror or error}."
+            ) from error
         paths = alongs(self.program)
         images = dict(pictures)
         if paths:
@@ -181,9 +192,9 @@ class Report:
             f"{_with_unit(bound.name, bound.value)}; {bound.wanted}</li>"
             for bound in self.bounds
         )
-        said = {
-            True: "Every bound is held." if self.bounds else "Nothing was expected of it.",
-            False: "A bound is missed.",
+        verdict = {
+            True: "Every bound is met." if self.bounds else "The script expects no bounds.",
+            False: "A bound is not met.",
         }[self.held]
         notes = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
         facts = " · ".join(
@@ -193,7 +204,7 @@ class Report:
         return PAGE.format(
             name=html.escape(self.script.name),
             about=f"<p>{html.escape(self.script.about)}</p>" if self.script.about else "",
-            verdict=said,
+            verdict=verdict,
             mood="held" if self.held else "missed",
             figures=shown,
             rows=rows,
@@ -211,23 +222,23 @@ CAPTIONS = {
     "emptying.png": ("Water running from the cup into the basin", "Emptying the cup."),
     "tracing.png": (
         "The arm on its path",
-        "On the path; grey: what is wished for, in colour: what the tool has traced of it.",
+        "The arm on the path. Grey: the desired path. In colour: the part traced by the tool.",
     ),
     "path.png": (
         "Desired and traced path in 3D, and the error along it",
         (
-            "Left: the path wished for and that of forward kinematics on the planned joints, in "
-            "the shoulder frame; dots are where paths start. Right: how far apart they are, the "
-            "most in each half of a percent of all paths."
+            "Left: the desired path and that of forward kinematics on the planned joints, in "
+            "the shoulder frame; dots are the starts of paths. Right: the distance between them, "
+            "the maximum in each half percent of all paths."
         ),
     ),
-    "joints.png": ("Joint angles over time", "What the arm was told, a hundred times a second."),
+    "joints.png": ("Joint angles over time", "The setpoints of the arm, a hundred per second."),
     "speeds.png": (
         "Joint speeds against their limits, and speed of the tool",
-        "Above: each joint's speed as a fraction of its most; dashed: the limits. Below: the tool.",
+        "Above: joint speeds as fractions of their limits; dashed: the limits. Below: the tool.",
     ),
 }
-"""Of each figure what it shows, for who cannot see it and for who can."""
+"""Alternative text and caption of each figure."""
 
 PAGE = """\
 <!doctype html>
@@ -275,6 +286,7 @@ footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 <footer>katana450 · {facts} · {written}</footer>
 </html>
 """
+"""Template of the HTML page."""
 
 
 def _unit(name: str) -> str:
@@ -287,7 +299,7 @@ def _title(name: str) -> str:
 
 
 def _with_unit(name: str, value: float | None) -> str:
-    """A measure as a person reads it."""
+    """Return a measure with its unit as text."""
     return "none" if value is None else f"{_shown(value)} {_unit(name)}".rstrip()
 
 

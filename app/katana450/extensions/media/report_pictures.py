@@ -1,5 +1,7 @@
-"""Pictures of a run at the moments a paper would show: its Figs. 9 to 12 for an object that is
-carried and poured, and for a path the arm on it with what it has traced.
+"""Pictures of a run at characteristic moments, as in the paper.
+
+For an object that is carried and poured they correspond to the paper's Figs. 9 to 12. For a path
+they show the arm on it, with the part that it has traced.
 """
 
 from __future__ import annotations
@@ -29,29 +31,32 @@ from katana450.server.view.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.server.viser_bridge.themes import LIGHT
 
 SIZE = 880, 550
+"""Width and height of a picture [px]."""
 
 RAYS = 2
+"""Rays per pixel and kind of light."""
 
 FOV = float(np.deg2rad(36.0))
+"""Vertical field of view [rad]."""
 
 ON_TABLE = (1.06, 0.66, 0.70), (0.19, 0.04, 0.21)
-"""[m] From where cup, basin and hand are seen, and what is looked at."""
+"""[m] Position and target of the camera for cup, basin and hand."""
 
 ON_PATH = (0.88, -0.95, 0.66), (0.13, -0.02, 0.185)
-"""[m] The same for a path before the arm."""
+"""[m] Position and target of the camera for a path in front of the arm."""
 
 CLOSING = ": close"
-"""How the task ends its name that takes an object."""
+"""Suffix of the name of the task that closes the fingers on an object."""
 
 EMPTYING = 0.45
-"""Of the time that the cup is turned over: by then it pours."""
+"""[1] Fraction of the pouring motion at which the cup pours."""
 
 DESIRED_RADIUS, TRACED_RADIUS = 1.2e-3, 2e-3
-"""[m]"""
+"""[m] Radii of the tubes of the desired and the traced path."""
 
 
 def moments(program: Program, trace: Trace) -> dict[str, int]:
-    """The tick of each picture by its name; only what the run has of them."""
+    """Return the tick of each picture by its name, for the moments that the run has."""
     names = [task.name for task in program.tasks]
     takes = [number for number, name in enumerate(names) if name.endswith(CLOSING)]
     pours = [number for number, name in enumerate(names) if name == POURING]
@@ -73,7 +78,7 @@ def moments(program: Program, trace: Trace) -> dict[str, int]:
 
 
 DONE = 0.7
-"""Of a path, when the arm is shown on it."""
+"""[1] Fraction of a path at which the arm is shown."""
 
 
 def stage_pictures(
@@ -84,7 +89,7 @@ def stage_pictures(
     states: Sequence[State],
     trace: Trace,
 ) -> Mapping[str, bytes]:
-    """PNG files by their names."""
+    """Return the PNG files by their names."""
     stage = RenderStage(robot, session, props)
     found: dict[str, bytes] = {}
     for name, tick in moments(program, trace).items():
@@ -99,7 +104,7 @@ def stage_pictures(
 
 
 def _same(program: Program, one: int, other: int) -> bool:
-    """Whether two tasks belong to one step."""
+    """Return whether two tasks belong to one step."""
     return program.tasks[one].number == program.tasks[other].number
 
 
@@ -116,7 +121,7 @@ def _path(program: Program, trace: Trace, tick: int) -> ToolPath | None:
 
 
 def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item]:
-    """The path that the arm is on, and what it has traced of it, coloured as on the page."""
+    """Return tubes of the present path and of its traced part, coloured as on the page."""
     path = _path(program, trace, tick)
     assert path is not None
     T = robot.require_arm().T_base_shoulder

@@ -1,4 +1,4 @@
-"""The room of a picture: that of the page, floor with its lines, background and lamps."""
+"""The room of a picture, the same as on the page: floor with lines, background and lamps."""
 
 from __future__ import annotations
 
@@ -17,26 +17,27 @@ LAMPS: tuple[Lamp, ...] = (
     lamp(RIM, (226, 238, 255), 0.42),
     lamp(FILL, (255, 255, 255), 0.16),
 )
-"""The first is the one with shadows."""
+"""The lamps; the first casts shadows."""
 
 HEIGHT = FLOOR_AT
+"""Height of the floor [m]."""
 
 CELLS = ((0.05, 0.6), (0.25, 1.0))
-"""[m] Between the lines of the floor, and pixels that they are wide: the fine ones, the others."""
+"""Distance [m] and width [px] of the lines on the floor: fine lines, and main lines."""
 
 FADE_DISTANCE = 5.0
-"""[m] At which the floor has become background."""
+"""[m] Distance at which the floor has faded to the background."""
 
 
 def background(theme: Theme, camera: Camera, y: Floats) -> Floats:
-    """(n, 3) light behind everything, at heights ``y`` (n,) of the picture in pixels."""
+    """Return the light (n, 3) of the background at rows ``y`` (n,) [px] of the picture."""
     fraction = np.clip(y / camera.size[1], 0.0, 1.0)[:, None]
     top, bottom = (np.array(c, dtype=np.float32) / 255.0 for c in (theme.sky, theme.floor))
     return light_of(top + fraction * (bottom - top))
 
 
 def floor(theme: Theme, camera: Camera, hits: Hits, light: Light, behind: Floats) -> Floats:
-    """(n, 3) light of points on the floor. behind: (n, 3) the background there."""
+    """Return the light (n, 3) of points on the floor, faded to the background ``behind`` (n, 3)."""
     colour = np.tile(np.array(theme.floor, dtype=np.float32) / 255.0, (len(hits.points), 1))
     for (apart, wide), line in zip(CELLS, (theme.cell, theme.section), strict=True):
         fraction = _lines(camera, hits, apart, wide)[:, None]
@@ -49,23 +50,23 @@ def floor(theme: Theme, camera: Camera, hits: Hits, light: Light, behind: Floats
 
 
 CORNERS = 0.45
-"""How much darker the floor is where no sky reaches it."""
+"""[1] Fraction by which the floor is darker without sky light."""
 
 
 def _lines(camera: Camera, hits: Hits, apart: float, wide: float) -> Floats:
-    """(n,) how much of each pixel lines ``apart`` [m] and ``wide`` [pixels] cover."""
+    """Return the fraction (n,) of each pixel covered by lines ``apart`` [m] and ``wide`` [px]."""
     right, up, _ = camera.frame
     step = camera.pixel * hits.distance
     down = hits.directions[:, 2]
     covered = np.zeros(len(down), dtype=np.float32)
     for axis in (0, 1):
-        # How far the spot on the floor moves along the axis, to the next pixel aside and above.
+        # Distance on the floor along the axis between neighbouring pixels.
         slope = hits.directions[:, axis] / down
         moved = step * np.hypot(right[axis] - slope * right[2], up[axis] - slope * up[2])
         at = hits.points[:, axis] / apart
         off = np.abs(at - np.round(at)) * apart / moved
         line = np.clip(0.5 * wide + 0.5 - off, 0.0, min(wide, 1.0))
-        # Lines nearer together than pixels are a tone.
+        # Lines closer than pixels merge to a uniform tone.
         tone = np.minimum(wide * moved / apart, 1.0)
         blend = np.clip(2.0 * moved / apart - 0.5, 0.0, 1.0)
         covered = np.maximum(covered, line + blend * (tone - line))

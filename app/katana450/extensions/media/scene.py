@@ -1,4 +1,4 @@
-"""What there is to be seen: triangles in one place, and what each of them is of."""
+"""The triangles of a picture in one frame, with their items and materials."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ Bools = npt.NDArray[np.bool_]
 
 
 class Item(NamedTuple):
-    """name: of the link or object. T: (4, 4) of the frame of its shape in the base frame [m]."""
+    """A shape in the scene.
+
+    Attributes:
+        name: name of the link or object.
+        shape: the mesh.
+        T: (4, 4) pose of the mesh in the base frame [m].
+    """
 
     name: str
     shape: VisualMesh
@@ -28,14 +34,17 @@ class Item(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RenderScene:
-    """Every triangle.
+    """All triangles of a scene.
 
     Attributes:
-        names: of each item.
-        vertices, normals: (v, 3) in the base frame [m], normals of unit length.
+        names: name of each item.
+        vertices: (v, 3) in the base frame [m].
+        normals: (v, 3) unit normals.
         faces: (f, 3) corners, counter-clockwise seen from outside.
-        item: (f,) the item that each is of.
-        colour: (i, 3) of light, not of sRGB, for each item; metallic, rough: (i,) glTF's factors.
+        item: (f,) item of each triangle.
+        colour: (i, 3) linear colour of each item.
+        metallic: (i,) glTF metallic factor.
+        rough: (i,) glTF roughness factor.
     """
 
     names: tuple[str, ...]
@@ -49,7 +58,7 @@ class RenderScene:
 
     @classmethod
     def of(cls, items: Sequence[Item]) -> RenderScene:
-        """All of ``items``."""
+        """Return the scene of ``items``."""
         shapes = [item.shape for item in items]
         starts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])
         turned = [(item.shape, item.T[:3, :3].T, item.T[:3, 3]) for item in items]
@@ -67,31 +76,31 @@ class RenderScene:
 
     @cached_property
     def flat(self) -> Floats:
-        """(f, 3) unit normals of the triangles themselves; 0 of one without area."""
+        """The unit normals (f, 3) of the triangles; 0 for a triangle without area."""
         a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
         return unit(np.cross(b - a, c - a))
 
 
 def linear(material: Material) -> Floats:
-    """(3,) its colour as light: IEC 61966-2-1."""
+    """Return the linear colour (3,) of ``material``: IEC 61966-2-1."""
     return light_of(np.array(material.colour, dtype=np.float32))
 
 
 def light_of(srgb: npt.NDArray[Any]) -> Floats:
-    """Of sRGB 0..1, whatever the shape: IEC 61966-2-1."""
+    """Return sRGB values 0..1 of any shape as linear light: IEC 61966-2-1."""
     low = srgb / 12.92
     return np.where(srgb <= 0.04045, low, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def unit(v: npt.NDArray[Any]) -> Floats:
-    """Vectors (..., 3) of length 1; 0 stays 0."""
+    """Return vectors (..., 3) scaled to length 1; zero vectors stay 0."""
     length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
     found = np.divide(v, length, out=np.zeros_like(v), where=length > 0.0)
     return np.asarray(found, dtype=np.float32)
 
 
 def smooth(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> FloatArray:
-    """Normals (n, 3) of the corners of a surface (n, 3), (m, 3): the mean of its faces by area."""
+    """Return normals (n, 3) of vertices (n, 3): means over the faces (m, 3), weighted by area."""
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     across = np.cross(b - a, c - a)
     found = np.zeros(vertices.shape)

@@ -1,9 +1,9 @@
-"""What a surface sends to the camera: glTF's metallic-roughness model under the room's lights.
+"""Light from a surface to the camera: glTF's metallic-roughness model under the room's lights.
 
-Diffuse by Lambert; mirrored by the microfacets of Trowbridge and Reitz (GGX), with Schlick's
-Fresnel and the joint shadowing of Hammon, PBR Diffuse Lighting for GGX+Smith Microsurfaces, 2017.
-What the room mirrors is a sky and two soft boxes as spherical Gaussians, which widen with
-roughness; how much of it, is Karis's fit, Physically Based Shading on Mobile, 2014.
+Diffuse reflection follows Lambert. Specular reflection uses the microfacets of Trowbridge and Reitz
+(GGX), with Schlick's Fresnel term and the joint shadowing of Hammon, PBR Diffuse Lighting for
+GGX+Smith Microsurfaces, 2017. The mirrored room is a sky and two soft boxes as spherical Gaussians,
+which widen with roughness. Its intensity follows Karis, Physically Based Shading on Mobile, 2014.
 """
 
 from __future__ import annotations
@@ -17,19 +17,24 @@ from katana450.extensions.media.scene import Floats, light_of, unit
 
 
 class Lamp(NamedTuple):
-    """A light far off. towards: (3,) unit. colour: (3,) what a white surface square to it sends."""
+    """A distant light.
+
+    Attributes:
+        towards: (3,) unit direction to it.
+        colour: (3,) light from a white surface perpendicular to it.
+    """
 
     towards: Floats
     colour: Floats
 
 
 def lamp(position: tuple[float, float, float], rgb: tuple[int, int, int], power: float) -> Lamp:
-    """Shining from ``position`` towards the base; rgb: of 255."""
+    """Return a lamp at ``position``, directed to the base. ``rgb`` is its colour, 0 to 255."""
     return Lamp(unit(np.array(position)), power * light_of(np.array(rgb, dtype=np.float32) / 255.0))
 
 
 class SurfaceMaterial(NamedTuple):
-    """Of n points: colour (n, 3) of light, metallic and rough (n,), glTF's factors."""
+    """The material of n points: linear colour (n, 3), metallic and rough (n,), glTF's factors."""
 
     colour: Floats
     metallic: Floats
@@ -37,19 +42,19 @@ class SurfaceMaterial(NamedTuple):
 
 
 DIELECTRIC = 0.04
-"""What anything but metal mirrors, looked at straight."""
+"""Reflectance of non-metals at perpendicular incidence."""
 
 ZENITH, HORIZON = 1.35, 1.05
-"""How bright the sky is that surfaces mirror, as a white surface."""
+"""Brightness of the mirrored sky, relative to a white surface."""
 
 BOUNCED = 0.35
-"""Of the sky, from below and from what hides it."""
+"""[1] Fraction of the sky's light from below and from surfaces that hide it."""
 
 BOXES = (
     ((0.5, -0.75, 0.8), 1.5, 9.0),
     ((-0.7, 0.75, 0.65), 0.9, 6.0),
 )
-"""Towards it, how bright, and how sharp its edge, of each soft box that surfaces mirror."""
+"""Direction, brightness and sharpness of the edge of each mirrored soft box."""
 
 
 def shaded(
@@ -59,7 +64,7 @@ def shaded(
     light: Light,
     lamps: tuple[Lamp, ...],
 ) -> Floats:
-    """(n, 3) light. directions: (n, 3) of the rays that see it. The first lamp has shadows."""
+    """Return the light (n, 3). ``directions`` (n, 3) are of the camera rays; lamp 0 has shadows."""
     view = -directions
     facing = np.maximum(_dot(normals, view), 1e-3)
     metal = material.metallic[:, None]
@@ -86,11 +91,11 @@ def shaded(
 
 
 SKY = 1.0
-"""How much the sky gives beside the lamps."""
+"""Intensity of the sky relative to the lamps."""
 
 
 def _microfacets(half: Floats, facing: Floats, towards: Floats, alpha: Floats) -> Floats:
-    """(n,) pi times what is mirrored of a lamp with Fresnel's share left out."""
+    """Return (n,) pi times the specular reflection of a lamp, without the Fresnel factor."""
     square = alpha * alpha
     spread = square / (half * half * (square - 1.0) + 1.0) ** 2
     hidden = (1.0 - alpha) * 2.0 * towards * facing + alpha * (towards + facing)
@@ -99,11 +104,11 @@ def _microfacets(half: Floats, facing: Floats, towards: Floats, alpha: Floats) -
 
 
 MAX_GLINT = 6.0
-"""Of a glint: more would only make edges rough."""
+"""Maximum of a highlight; larger values would only make edges rough."""
 
 
 def _room(r: Floats, rough: Floats) -> Floats:
-    """(n,) how bright the room is in directions (n, 3), blurred as rough surfaces do."""
+    """Return the brightness (n,) of the room in directions (n, 3), blurred by roughness."""
     edge = 6.0 / (0.15 + rough)
     up = 1.0 / (1.0 + np.exp(-np.clip(edge * r[:, 2], -30.0, 30.0)))
     sky = HORIZON + (ZENITH - HORIZON) * np.maximum(r[:, 2], 0.0)
@@ -116,6 +121,7 @@ def _room(r: Floats, rough: Floats) -> Floats:
 
 
 def _karis(rough: Floats, facing: Floats) -> tuple[Floats, Floats]:
+    """Return factor and offset (n,) of the environment reflection."""
     r = 1.0 - rough
     steep = np.minimum(r * r, np.exp2(-9.28 * facing)) * r + (0.0425 - 0.0275 * rough)
     return -1.04 * steep + (1.04 - 0.572 * rough), 1.04 * steep + (0.022 * rough - 0.04)
@@ -126,7 +132,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def developed(light: Floats) -> Floats:
-    """SRGB 0..1 of light: as it is up to the shoulder, then softly up to white."""
+    """Return light as sRGB 0..1: unchanged up to the shoulder, then softly up to white."""
     over = np.maximum(light - SHOULDER, 0.0) / (1.0 - SHOULDER)
     soft = SHOULDER + (1.0 - SHOULDER) * (1.0 - np.exp(-over))
     x = np.clip(np.where(light > SHOULDER, soft, light), 0.0, 1.0)
@@ -134,3 +140,4 @@ def developed(light: Floats) -> Floats:
 
 
 SHOULDER = 0.75
+"""Linear value above which highlights are compressed."""

@@ -1,4 +1,4 @@
-"""The arm, what stands around it and its water in one state, as shapes for a picture."""
+"""The arm, the scene objects and the water in one state, as shapes for a picture."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from katana450.server.view.conduit import PITCH, poses, ring
 from katana450.server.view.scene_objects import COLOUR, form
 
 CONDUIT, TABLE = "conduit", "table"
-"""Names of their items; those of links and objects are their own."""
+"""Names of these items; links and objects have their own names."""
 
 
 class RenderStage:
-    """Shapes that are read once, and put where a state has them."""
+    """Shapes that are read once, and placed for each state."""
 
     def __init__(self, robot: Robot, session: Session, props: Props) -> None:
-        """``session``: knows where objects and water are."""
+        """Read the shapes. ``session`` gives the poses of objects and water."""
         self._robot, arm = robot, robot.require_arm()
         self._session = session
         self._links = {link.name: link.shapes for link in robot.links}
         self._table = _in_file(props.table.mesh)
         self._known = {"cup": _in_file(props.cup.mesh), "basin": _in_file(props.basin.mesh)}
-        self._hung = [_Hung(stretch) for stretch in arm.stretches]
+        self._stretches = [_BendableStretch(stretch) for stretch in arm.stretches]
 
     def items(self, state: State) -> list[Item]:
-        """All that hides what is behind it."""
+        """Return all opaque items."""
         return [*self.arm(state), *self.conduit(state), *self.surrounding_items(state)]
 
     def arm(self, state: State) -> list[Item]:
-        """Its links."""
+        """Return the items of the links."""
         frames = self._frames(state)
         return [
             Item(name, shape, frames[name])
@@ -54,19 +54,19 @@ class RenderStage:
         ]
 
     def conduit(self, state: State) -> list[Item]:
-        """Its cables."""
+        """Return the items of the conduit."""
         frames, angles = self._frames(state), self._angles(state)
         return [
             Item(
                 CONDUIT,
-                hung.bent(angles[hung.stretch.hinge.joint]),
-                frames[hung.stretch.start.link],
+                bendable.bent(angles[bendable.stretch.hinge.joint]),
+                frames[bendable.stretch.start.link],
             )
-            for hung in self._hung
+            for bendable in self._stretches
         ]
 
     def surrounding_items(self, state: State) -> list[Item]:
-        """The table, and the objects."""
+        """Return the items of the table and the scene objects."""
         x = state.x
         found = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
         for scene_object in state.objects:
@@ -78,7 +78,7 @@ class RenderStage:
         return found
 
     def water(self, state: State) -> list[Translucent]:
-        """The water, if there is any."""
+        """Return the items of the water; none without water."""
         pouring = self._session.pouring
         if pouring is None or state.poured is None:
             return []
@@ -88,12 +88,12 @@ class RenderStage:
         return self._robot.joint_values(state.q, state.gripper)
 
     def _frames(self, state: State) -> Mapping[str, FloatArray]:
-        """(4, 4) of each link in the base frame."""
+        """Return the pose (4, 4) of each link in the base frame."""
         return self._robot.frames(self._angles(state))
 
 
-class _Hung:
-    """A stretch of conduit: its rings, as the page has them."""
+class _BendableStretch:
+    """The rings of a stretch of conduit, as on the page."""
 
     def __init__(self, stretch: ConduitStretch) -> None:
         self.stretch = stretch
@@ -102,11 +102,11 @@ class _Hung:
 
     @cached_property
     def _poses(self) -> FloatArray:
-        """(A, count, 7) wxyz and position [m] of the rings."""
+        """The poses (A, count, 7) of the rings: quaternion wxyz and position [m]."""
         return np.asarray(poses(self.stretch, round(self.stretch.length / PITCH)), dtype=float)
 
     def bent(self, angle: float) -> VisualMesh:
-        """With its joint at ``angle`` [rad], in the frame of the link it starts from."""
+        """Return its mesh for the joint at ``angle`` [rad], in the frame of its first link."""
         low, fraction = self.stretch.between(angle)
         rings = self._poses[low] + fraction * (self._poses[low + 1] - self._poses[low])
         R = np.array([so3.from_quaternion(pose) for pose in rings[:, :4]])
@@ -122,6 +122,7 @@ class _Hung:
 
 
 HOSE = Material("rubber", (0.035, 0.035, 0.04), rough=0.6)
+"""Material of the conduit."""
 
 
 def _in_file(path: Path) -> Sequence[VisualMesh]:

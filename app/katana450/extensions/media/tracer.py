@@ -1,4 +1,4 @@
-"""Rays against triangles, by Embree."""
+"""Intersection of rays and triangles, by Embree."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from katana450.errors import ConfigurationError
 from katana450.extensions.media.scene import Bools, Floats, Ints, RenderScene
 
 NOTHING = -1
-"""Number of the triangle of a ray that meets none."""
+"""Triangle number of a ray that hits nothing."""
 
 
 def check_traceable() -> None:
-    """Raise ConfigurationError where embreex is missing, so that it is reported before a long run.
+    """Raise ConfigurationError if embreex is missing, to report this before a long run.
 
-    It is a dependency on all machines but Linux on arm64.
+    It is a dependency on all platforms except Linux on arm64.
     """
     if importlib.util.find_spec("embreex") is None:
         raise ConfigurationError(
@@ -28,8 +28,13 @@ def check_traceable() -> None:
 
 
 class Meeting(NamedTuple):
-    """The first triangle each of n rays meets: its number or NOTHING, how far off (n,) [m], and
-    the shares (n,) of its second and third corner where it is met.
+    """The first triangles that n rays hit.
+
+    Attributes:
+        face: (n,) number of the triangle, or NOTHING.
+        distance: (n,) [m], infinite without a hit.
+        second: (n,) barycentric coordinate of its second corner.
+        third: (n,) barycentric coordinate of its third corner.
     """
 
     face: Ints
@@ -39,9 +44,10 @@ class Meeting(NamedTuple):
 
 
 class Tracer:
-    """A scene made ready for rays."""
+    """A scene prepared for ray queries."""
 
     def __init__(self, scene: RenderScene) -> None:
+        """Build the acceleration structure. Raises ConfigurationError without embreex."""
         check_traceable()
         rtcore: Any = importlib.import_module("embreex.rtcore_scene")
         meshes: Any = importlib.import_module("embreex.mesh_construction")
@@ -51,7 +57,7 @@ class Tracer:
             meshes.TriangleMesh(self._scene, scene.vertices, scene.faces)
 
     def first(self, origins: Floats, directions: Floats) -> Meeting:
-        """Of rays (n, 3) [m] in unit directions (n, 3)."""
+        """Return the first hits of rays from ``origins`` (n, 3) [m] along ``directions`` (n, 3)."""
         count = len(origins)
         if self._empty or not count:
             nowhere = np.full(count, np.inf, dtype=np.float32)
@@ -63,7 +69,7 @@ class Tracer:
         return Meeting(face, distance, found["u"], found["v"])
 
     def blocked(self, origins: Floats, directions: Floats, reach: float) -> Bools:
-        """(n,) whether each meets anything within ``reach`` [m]."""
+        """Return (n,) whether each ray hits anything within ``reach`` [m]."""
         if self._empty or not len(origins):
             return np.zeros(len(origins), dtype=bool)
         reached = np.full(len(origins), reach, dtype=np.float32)

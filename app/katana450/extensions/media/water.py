@@ -1,4 +1,4 @@
-"""Water as a picture shows it: the page's shapes, in one colour, to be seen through."""
+"""Water in a picture: the shapes of the page, in one translucent colour."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from katana450.server.view.water import (
 )
 
 WATER = Material("water", (COLOUR[0] / 255.0, COLOUR[1] / 255.0, COLOUR[2] / 255.0), 0.0, ROUGH)
+"""Material of water."""
 
 CUP, STREAM, BASIN, PUDDLE = (
     "water in cup",
@@ -35,11 +36,11 @@ CUP, STREAM, BASIN, PUDDLE = (
     "water in basin",
     "water on table",
 )
-"""Names of its items."""
+"""Names of the items of water."""
 
 
 def translucents_of(water: Water, water_environment: WaterEnvironment) -> list[Translucent]:
-    """All of it that can be seen."""
+    """Return all visible parts of the water."""
     found: list[Translucent] = []
     basin, level = water_environment.basin, water_environment.basin.level(water.basin * FEMTOLITRE)
     if water.cup >= WORTH_SHOWING:

@@ -1,1 +1,1 @@
-"""Scripts for people, the programs they become, and how those are run. Pure."""
+"""Scripts, their compilation to programs, and the execution of programs. Pure: no I/O."""

@@ -1,4 +1,4 @@
-"""What a program has the arm do, one thing at a time: how it is asked for, and when it is done."""
+"""Actions of a program: the commands that start each one, and the test for its end."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from katana450.errors import InputError
 from katana450.maths.planning.plan import Plan
 
 ACTION_TIMEOUT = 10.0
-"""[s] That fingers may take, and an arm may wait for what stands in its way."""
+"""[s] Timeout of a finger motion, and of an arm that is blocked."""
 
 
 class Action(Protocol):
-    """One of them. Its methods are pure."""
+    """One action of a program. All methods are pure."""
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:
-        """What asks for it; ``speed`` is the fraction of the whole program."""
+        """Return the commands that start the action; ``speed`` is the program's fraction."""
         ...
 
     def done(self, state: State, waited: float) -> bool:
-        """Whether it is, ``waited`` [s] after it was asked for. Raises InputError if it fails."""
+        """Return whether it is done, ``waited`` [s] after its start.
+
+        Raises InputError if the action failed.
+        """
         ...
 
     def fraction(self, state: State, waited: float) -> float:
-        """How much of it is, from 0 to 1."""
+        """Return the completed fraction, from 0 to 1."""
         ...
 
 
@@ -41,17 +44,20 @@ class FollowPlan:
     plan: Plan
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        """Return the command to follow the plan."""
         return (cmd.Follow(self.plan),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        """Return whether the end is reached. Raises InputError if the arm has left the plan."""
         following = state.mode
         if not isinstance(following, Following) or not np.array_equal(state.goal, self.plan.end):
             if any(finding.reason is Reason.NOT_AT_START for finding in state.findings):
-                raise InputError("The arm does not stand where the step begins; run it again.")
-            raise InputError("The arm was told to go elsewhere.")
+                raise InputError("The arm is not at the start of the step. Run the program again.")
+            raise InputError("The arm was given another target.")
         return following.there
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the completed fraction of the plan; 0 while the arm follows no plan."""
         return 0.0 if state.following is None else state.following.fraction
 
 
@@ -62,14 +68,17 @@ class MoveFingers:
     angle: float
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        """Return the command that sets the finger angle."""
         return (cmd.SetGripper(self.angle),)
 
     def done(self, state: State, waited: float) -> bool:
+        """Return whether the fingers are at their goal. Raises InputError after ACTION_TIMEOUT."""
         if waited > ACTION_TIMEOUT:
-            raise InputError("The fingers do not get where they are to go.")
+            raise InputError(f"The fingers did not reach their goal within {ACTION_TIMEOUT:g} s.")
         return state.gripper_setpoint == state.gripper_goal
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return 1 when the fingers are at their goal, else 0."""
         return float(state.gripper_setpoint == state.gripper_goal)
 
 
@@ -80,87 +89,105 @@ class FillCup:
     volume: float
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        """Return the command that fills the cup."""
         return (cmd.Fill(self.volume),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        """Return True. Raises InputError if there is no cup."""
         if state.poured is None:
             raise InputError("There is no cup to fill.")
         return True
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return 1: filling takes no time."""
         return 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class PutObject:
-    """Have ``scene_object`` stand where it says."""
+    """Place ``scene_object`` at its pose."""
 
     scene_object: SceneObject
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        """Return the command that places the object."""
         return (cmd.PlaceObject(self.scene_object),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        """Return whether an object has the requested pose."""
         return any(np.array_equal(each.T, self.scene_object.T) for each in state.objects)
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return 1: placing takes no time."""
         return 1.0
 
 
 @dataclass(frozen=True)
 class Wait:
-    """Stand still for a time [s]."""
+    """Wait for ``seconds`` [s] at rest."""
 
     seconds: float
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        """Return no command."""
         return ()
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        """Return whether the time has passed."""
         return waited >= self.seconds
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the fraction of the time that has passed."""
         return min(waited / self.seconds, 1.0)
 
 
 @dataclass(frozen=True)
 class UseTool:
-    """Have the tool frame ``name`` from now on."""
+    """Use the tool frame ``name`` from now on."""
 
     name: str
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        """Return the command that selects the tool frame."""
         return (cmd.SetTool(self.name),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        """Return whether the tool frame is selected."""
         return state.tool == self.name
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return 1 when the tool frame is selected, else 0."""
         return float(state.tool == self.name)
 
 
 @dataclass(frozen=True)
 class SetSpeed:
-    """Be no faster than this fraction of the program's speed."""
+    """Limit the speed to the fraction ``value`` of the program's speed."""
 
     value: float
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:
+        """Return the command that sets the speed, at least MIN_SPEED."""
         return (cmd.SpeedScale(max(self.value * speed, cmd.MIN_SPEED)),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        """Return True: the speed applies at once."""
         return True
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return 1: the speed applies at once."""
         return 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """One order of a program.
+    """One action of a program, with its place in the script.
 
-    number: of the step it belongs to, from 0, repetitions counted. line: of the script.
-    name: what a person calls it.
+    Attributes:
+        number: index of its step, from 0; repetitions count separately.
+        line: line of the script, from 1.
+        name: name that is shown to people.
+        order: the action.
     """
 
     number: int

@@ -1,4 +1,4 @@
-"""How a hand comes up to an object, and takes what it holds elsewhere."""
+"""Approach of the hand to an object, and transport of the object that it holds."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.maths.planning.plan import JOIN_TOLERANCE
 
 APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
-"""[m] From how far the open fingers come, and how far they draw back, the farthest first."""
+"""[m] Distances of approach and retreat of the open fingers, tried from the farthest."""
 
 UP = frozen((0.0, 0.0, 1.0))
 
 
 def before(middle: FloatArray, pitch: float, back: float) -> ToolTarget:
-    """The tool ``back`` [m] before ``middle`` (3,), coming along its own axis."""
+    """Return the tool ``back`` [m] before ``middle`` (3,) [m] on its own axis; in {S}, roll 0."""
     out = np.array((middle[0], middle[1], 0.0)) / math.hypot(middle[0], middle[1])
     along = math.cos(pitch) * out - math.sin(pitch) * UP
     return ToolTarget(middle - back * along, pitch, 0.0)
 
 
 def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:
-    """To ``to``: up or down and round axis 1 as the tool is turned now, then out or in.
+    """Move the tool to ``to``: vertically, then about axis 1, then radially.
 
-    So what is held upright stays so, unless ``to`` has it otherwise.
+    The tool keeps its present orientation up to the last part. An object that is held upright stays
+    upright unless ``to`` has another orientation.
     """
     at = builder.at
     here = math.atan2(at.position[1], at.position[0])

@@ -1,4 +1,4 @@
-"""A script planned and run on a clock of its own, without a server."""
+"""Planning and simulation of a script on a simulated clock, without a server."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from katana450.settings import Settings
 
 
 class Planned(NamedTuple):
-    """A script with everything planned, and the arm it is for."""
+    """A compiled script, and the arm that it is for."""
 
     script: Script
     program: Program
@@ -30,10 +30,10 @@ class Planned(NamedTuple):
 
 
 def plan_script(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Planned:
-    """Return ``script`` with everything planned for the arm of ``urdf``, at its ready posture.
+    """Return ``script`` planned for the arm of ``urdf``, from its ready posture.
 
-    ``seed``: of the paths round obstacles. ``speed``: fraction of the script's own speed, up to 1.
-    Raises ScriptError.
+    ``seed`` is the seed of the planner's random search for paths round obstacles. ``speed`` is the
+    fraction of the script's own speed, up to 1. Raises ScriptError.
     """
     settings = replace(Settings(), bare=script.bare)
     robot, session, _ = describe_robot(settings, urdf, None)
@@ -44,7 +44,7 @@ def plan_script(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -
 
 
 def run_by_clock(plan: Planned) -> Simulation:
-    """Run ``plan`` to its end, with a progress bar. Raises KatanaError if it does not get there."""
+    """Run ``plan`` to its end with a progress bar. Raises KatanaError if it ends early."""
     session = plan.session
     driver = SimulatedDriver(plan.robot.require_arm(), session.ready, gripper=0.0)
     simulation = Simulation(plan.program, session, driver, Settings().rate)

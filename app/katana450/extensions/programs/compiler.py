@@ -1,4 +1,4 @@
-"""Laying out a script step by step: from where each leads the next is planned."""
+"""Compilation of a script: each step is planned from the state in which the one before it ends."""
 
 from __future__ import annotations
 
@@ -17,17 +17,23 @@ from katana450.extensions.programs.situation import Situation
 from katana450.extensions.programs.source import Problem, ScriptError
 
 Orders = list[tuple[str, Action]]
-"""Of a step, each with its name."""
+"""The actions of one step, each with its name."""
 
 FINDING, TIMING = "finding paths", "timing paths"
 """The two phases of planning."""
 
 TIMING_FRACTION = 0.8
-"""[1] The part of the whole time that timing takes, roughly."""
+"""[1] Approximate fraction of the planning time that the timing takes."""
 
 
 class PlanningStage(NamedTuple):
-    """How far planning is. phase: FINDING or TIMING. step: under work, from 1, of ``steps``."""
+    """The progress of planning.
+
+    Attributes:
+        phase: FINDING or TIMING.
+        step: step in progress, from 1.
+        steps: number of steps.
+    """
 
     phase: str
     step: int
@@ -35,7 +41,7 @@ class PlanningStage(NamedTuple):
 
     @property
     def fraction(self) -> float:
-        """The fraction of the whole work that is done, from 0 to 1, as an estimate."""
+        """The estimated fraction of the work that is done, from 0 to 1."""
         done = (self.step - 1) / self.steps
         return (
             (1.0 - TIMING_FRACTION) * done
@@ -45,11 +51,11 @@ class PlanningStage(NamedTuple):
 
 
 Report = Callable[[PlanningStage], None]
-"""Is given each stage as it begins."""
+"""A function that is called with each stage as it begins."""
 
 
-class CompiledScript(NamedTuple):
-    """A step's orders as they are before its ways are timed, and what they lead to."""
+class CompiledStep(NamedTuple):
+    """The actions of a step before its paths are timed, and the state at its end."""
 
     orders: list[tuple[str, Action | UntimedPath]]
     state: State
@@ -57,29 +63,32 @@ class CompiledScript(NamedTuple):
 
 
 class Compiler:
-    """Every step in its turn; and back to where an object was taken, when that was no good.
+    """The compiler of a script, with backtracking to the last grasp when a later step fails.
 
-    What is in the hand keeps the pitch it was taken with, so what comes later may need another:
-    the next of them is tried then, each once, before the script is refused.
+    An object in the hand keeps the pitch at which it was grasped, and a later step may need
+    another. The compiler then tries the remaining pitches, each once, before it refuses the script.
     """
 
     def __init__(
         self, script: Script, builder: PlanBuilder, report: Report = lambda _: None
     ) -> None:
-        """``report``: given every stage; what it raises ends the planning."""
+        """Prepare to compile. ``report`` is called with every stage.
+
+        An error that ``report`` raises ends the planning.
+        """
         self._script = script
         self._builder = builder
         self._report = report
-        self._compiled_steps: list[CompiledScript] = []
-        # A repetition from where it began is planned already.
-        self._known: dict[tuple[object, ...], CompiledScript] = {}
+        self._compiled_steps: list[CompiledStep] = []
+        # A step repeated in the same situation is planned only once.
+        self._known: dict[tuple[object, ...], CompiledStep] = {}
         self._plans: dict[int, FollowPlan] = {}
-        # The number of the step that took what is held, with the arm as it was before.
+        # The number of the step that grasped the held object, and the state before that step.
         self._grasp: tuple[int, State] | None = None
         self._refused: Problem | None = None
 
     def all(self) -> list[Orders]:
-        """Those of each step. Raises ScriptError with the line of the one that cannot be."""
+        """Return the actions of each step. Raises ScriptError with the line of a failed step."""
         steps = self._script.steps
         while len(self._compiled_steps) < len(steps):
             number = len(self._compiled_steps)
@@ -91,19 +100,19 @@ class Compiler:
             except ScriptError as error:
                 self._refused = self._refused or error.problems[0]
                 if not self._go_back():
-                    raise self._told() from error
+                    raise self._error() from error
                 continue
             self._compiled_steps.append(compiled_step)
             _, self._builder.state, self._builder.taken = compiled_step
             self._note_grasp(taken, (number, before))
-        # What can be done is known now, so that the time it takes is sought for nothing else.
+        # Paths are timed last, so that no time is spent on a script that is refused.
         found: list[Orders] = []
         for number, compiled_step in enumerate(self._compiled_steps, 1):
             self._report(PlanningStage(TIMING, number, len(steps)))
             found.append(self._timed(compiled_step))
         return found
 
-    def _step(self, placed: LocatedStep) -> CompiledScript:
+    def _step(self, placed: LocatedStep) -> CompiledStep:
         builder = self._builder
         key = id(placed.step), *_situation(builder)
         if key in self._known:
@@ -113,12 +122,12 @@ class Compiler:
             placed.step.build(builder)
         except InputError as error:
             raise _at(placed, error) from error
-        compiled_step = CompiledScript(builder.orders, builder.state, builder.taken)
+        compiled_step = CompiledStep(builder.orders, builder.state, builder.taken)
         if any(isinstance(order, UntimedPath) for _, order in compiled_step.orders):
             self._known[key] = compiled_step
         return compiled_step
 
-    def _timed(self, compiled_step: CompiledScript) -> Orders:
+    def _timed(self, compiled_step: CompiledStep) -> Orders:
         found: Orders = []
         for name, order in compiled_step.orders:
             if isinstance(order, UntimedPath):
@@ -130,7 +139,7 @@ class Compiler:
         return found
 
     def _note_grasp(self, before: GraspInfo | None, place: tuple[int, State]) -> None:
-        """Remember where an object was taken at a pitch of choice, until it is set down."""
+        """Record the step that grasped an object at a freely chosen pitch, until it is set down."""
         builder = self._builder
         if builder.taken is None:
             self._grasp, self._refused, builder.given_up = None, None, ()
@@ -138,7 +147,7 @@ class Compiler:
             self._grasp = None if builder.taken.chosen is None else place
 
     def _go_back(self) -> bool:
-        """To where what is held was taken, for the next pitch; False where there is no choice."""
+        """Return to the grasp to try the next pitch; return False if there is no alternative."""
         builder = self._builder
         if self._grasp is None or builder.taken is None or builder.taken.chosen is None:
             return False
@@ -148,14 +157,14 @@ class Compiler:
         del self._compiled_steps[number:]
         return True
 
-    def _told(self) -> ScriptError:
+    def _error(self) -> ScriptError:
         assert self._refused is not None
-        said = self._refused.text
+        text = self._refused.text
         tried = [f"{angle:.0f}" for angle in np.degrees(self._builder.given_up)]
         if len(tried) > 1:
             pitches = ", ".join(tried[:-1]) + f" and {tried[-1]}"
-            said += f" It is no better at another pitch it can be taken at: tried {pitches} deg."
-        return ScriptError((replace(self._refused, text=said),))
+            text += f" No other pitch of the grasp helps: tried {pitches} deg."
+        return ScriptError((replace(self._refused, text=text),))
 
 
 def _at(placed: LocatedStep, error: InputError) -> ScriptError:
@@ -163,6 +172,6 @@ def _at(placed: LocatedStep, error: InputError) -> ScriptError:
 
 
 def _situation(builder: PlanBuilder) -> tuple[object, ...]:
-    """What a step's plans depend on."""
+    """Return a hashable key of everything on which the plans of a step depend."""
     taken = None if builder.taken is None else builder.taken.at.position.tobytes()
     return Situation.of(builder.state).key, taken, builder.given_up

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
 
 OWNER_SILENCE, LONGEST_OWNER_SILENCE = 1.0, 10.0
-"""[s] Heartbeat timeout of a program's owner, after which the program ends; its longest value."""
+"""[s] Default and longest heartbeat timeout of a program's owner, after which the program ends."""
 
 
 def add_serve_options(parser: ArgumentParser) -> None:
-    """Add to ``katana450 serve`` the options of programs."""
+    """Add the options for programs to ``katana450 serve``."""
     parser.add_argument(
         "--owner-silence",
         type=_owner_silence,
@@ -31,7 +31,7 @@ def add_serve_options(parser: ArgumentParser) -> None:
         "--programs",
         type=Path,
         metavar="DIR",
-        help="a folder of scripts for the panel, where taught ones are saved too",
+        help="folder of scripts for the panel; taught scripts are saved there too",
     )
 
 
@@ -53,7 +53,7 @@ def _folder(context: FolderContext) -> PanelFolder | None:
 
     runner = context.hub.runner
     if not isinstance(runner, ProgramRunner):
-        # Another extension provides the one runner of this server.
+        # Another extension provides the only runner of this server.
         return None
     return ProgramsPanel(
         context.server,

@@ -1,4 +1,4 @@
-"""Reading a value's fields: each asked for by name and kind, everything left over refused."""
+"""Reading of the fields of a YAML mapping by name and type; unknown fields are refused."""
 
 from __future__ import annotations
 
@@ -17,44 +17,46 @@ T = TypeVar("T")
 D = TypeVar("D")
 
 MAX_COORDINATE = 2000.0
-"""[mm] No coordinate is larger."""
+"""[mm] Maximum magnitude of a coordinate."""
 
 MAX_ANGLE = 3600.0
-"""[deg] Nor angle."""
+"""[deg] Maximum magnitude of an angle."""
 
 XYZ = ("x", "y", "z")
 
 
 class Fields:
-    """The fields of one value. What is wrong is gathered, so that all of it is told at once."""
+    """The fields of one mapping. Problems are collected, so that all are reported at once."""
 
     def __init__(self, value: YamlValue, what: str) -> None:
-        """``what``: how a person calls it, as in "a circle"."""
+        """Take a mapping. ``what`` names it in messages, as in "a circle". Raises ScriptError."""
         self.value = value
         self.what = what
         self.problems: list[Problem] = []
-        self._asked: list[str] = []
+        self._known: list[str] = []
         self._held: dict[str, YamlValue] = {}
         if value.kind != "mapping":
-            raise value.wrong(f"{what.capitalize()} is names with values, not {value}.")
+            raise value.wrong(
+                f"{what.capitalize()} must be a mapping of names to values, not {value}."
+            )
         for name, held in value.fields:
             if not isinstance(name.held, str):
-                self.problems += name.wrong(f"A name is a text, not {name}.").problems
+                self.problems += name.wrong(f"A name must be a text, not {name}.").problems
             elif name.held in self._held:
-                said = f"{name.held!r} is given twice in {what}."
-                self.problems += name.wrong(said).problems
+                problem = f"{name.held!r} is given twice in {what}."
+                self.problems += name.wrong(problem).problems
             else:
                 self._held[name.held] = held
         self._names = {str(name.held): name for name, _ in value.fields}
 
     def has(self, name: str) -> bool:
-        """Whether it is given."""
-        self._asked.append(name)
+        """Return whether the field is given."""
+        self._known.append(name)
         return name in self._held
 
     def take(self, name: str, read: Callable[[YamlValue], T], default: D) -> T | D:
-        """What ``read`` makes of the field, or the default where it is not given."""
-        self._asked.append(name)
+        """Return the field as ``read`` converts it, or ``default`` if it is absent or wrong."""
+        self._known.append(name)
         if name not in self._held:
             return default
         try:
@@ -66,37 +68,38 @@ class Fields:
         return default
 
     def need(self, name: str, read: Callable[[YamlValue], T], instead: D) -> T | D:
-        """The same of one that has to be there; ``instead`` goes on where it is not."""
+        """Return a required field as ``read`` converts it; ``instead`` if it is absent or wrong."""
         if name not in self._held:
-            said = f"{self.what.capitalize()} needs {name!r}."
-            self.problems += self.value.wrong(said).problems
+            problem = f"{self.what.capitalize()} needs {name!r}."
+            self.problems += self.value.wrong(problem).problems
         return self.take(name, read, instead)
 
     def done(self) -> None:
-        """Refuse what nobody asked for, with all else that is wrong. Raises ScriptError."""
+        """Refuse unknown fields, together with all other problems. Raises ScriptError."""
         for name in self._held:
-            if name not in self._asked:
-                said = f"{self.what.capitalize()} has no {name!r}{or_known(name, self._asked)}"
-                self.problems += self._names[name].wrong(said).problems
+            if name not in self._known:
+                problem = f"{self.what.capitalize()} has no {name!r}{or_known(name, self._known)}"
+                self.problems += self._names[name].wrong(problem).problems
         if self.problems:
             raise ScriptError(tuple(self.problems))
 
 
 def or_known(name: str, known: Sequence[str]) -> str:
+    """Return the end of a message on an unknown ``name``: the nearest known name, or all names."""
     near = difflib.get_close_matches(name, known, 1)
     if near:
         return f"; did you mean {near[0]!r}?"
-    return f"; it may have {', '.join(known)}." if known else "; it has nothing."
+    return f"; it may have {', '.join(known)}." if known else "; it has no fields."
 
 
 def number(low: float, high: float, unit: str = "") -> Callable[[YamlValue], float]:
-    """Reads a finite number from ``low`` to ``high``."""
+    """Return a reader of a finite number from ``low`` to ``high``."""
     of = f" {unit}" if unit else ""
 
     def read(value: YamlValue) -> float:
         found = value.number if value.kind in ("whole", "number") else _plain(value)
         if found is None or not math.isfinite(found):
-            raise value.wrong(f"A number from {low:g} to {high:g}{of} goes here, not {value}.")
+            raise value.wrong(f"Expected a number from {low:g} to {high:g}{of}, not {value}.")
         if not low <= found <= high:
             raise value.wrong(f"{found:g} is not between {low:g} and {high:g}{of}.")
         return found
@@ -105,37 +108,37 @@ def number(low: float, high: float, unit: str = "") -> Callable[[YamlValue], flo
 
 
 def whole(low: int, high: int) -> Callable[[YamlValue], int]:
-    """Reads a whole number from ``low`` to ``high``."""
+    """Return a reader of a whole number from ``low`` to ``high``."""
 
     def read(value: YamlValue) -> int:
         found = number(low, high)(value)
         if found != int(found):
-            raise value.wrong(f"A whole number from {low} to {high} goes here, not {value}.")
+            raise value.wrong(f"Expected a whole number from {low} to {high}, not {value}.")
         return int(found)
 
     return read
 
 
 def text(value: YamlValue) -> str:
-    """A text; a number is none."""
+    """Read a text that is not blank; a number is not a text. Raises ScriptError."""
     if value.kind != "text" or not isinstance(value.held, str) or not value.held.strip():
-        raise value.wrong(f"A text goes here, not {value}.")
+        raise value.wrong(f"Expected a text, not {value}.")
     return value.held
 
 
 def choice(*names: str) -> Callable[[YamlValue], str]:
-    """Reads one of ``names``."""
+    """Return a reader of one of ``names``."""
 
     def read(value: YamlValue) -> str:
         if value.held not in names:
-            raise value.wrong(f"One of {', '.join(names)} goes here, not {value}.")
+            raise value.wrong(f"Expected one of {', '.join(names)}, not {value}.")
         return str(value.held)
 
     return read
 
 
 def degrees(low: float = -MAX_ANGLE, high: float = MAX_ANGLE) -> Callable[[YamlValue], float]:
-    """Reads an angle that is given in degrees, as [rad]."""
+    """Return a reader of an angle in degrees; it returns [rad]."""
     read = number(low, high, "deg")
     return lambda value: math.radians(read(value))
 
@@ -143,7 +146,7 @@ def degrees(low: float = -MAX_ANGLE, high: float = MAX_ANGLE) -> Callable[[YamlV
 def millimetres(
     low: float = -MAX_COORDINATE, high: float = MAX_COORDINATE
 ) -> Callable[[YamlValue], float]:
-    """Reads a length that is given in mm, as [m]."""
+    """Return a reader of a length in mm; it returns [m]."""
     read = number(low, high, "mm")
     return lambda value: 1e-3 * read(value)
 
@@ -151,14 +154,14 @@ def millimetres(
 def listed(
     read: Callable[[YamlValue], T], low: int, high: int
 ) -> Callable[[YamlValue], tuple[T, ...]]:
-    """Reads a list of ``low`` to ``high`` such values."""
+    """Return a reader of a list of ``low`` to ``high`` values, each of which ``read`` converts."""
 
     def all_of(value: YamlValue) -> tuple[T, ...]:
         if value.kind != "list":
-            raise value.wrong(f"A list goes here, not {value}.")
+            raise value.wrong(f"Expected a list, not {value}.")
         if not low <= len(value.items) <= high:
             many = f"{low}" if low == high else f"{low} to {high}"
-            raise value.wrong(f"A list of {many} goes here, not of {len(value.items)}.")
+            raise value.wrong(f"Expected a list of {many} values, not of {len(value.items)}.")
         found: list[T] = []
         problems: list[Problem] = []
         for item in value.items:
@@ -176,7 +179,7 @@ def listed(
 def vector(
     each: Callable[[YamlValue], float], *, partly: bool = False
 ) -> Callable[[YamlValue], Any]:
-    """Reads {x, y, z} or [x, y, z]; (3,). ``partly``: what is not named is 0."""
+    """Return a reader of {x, y, z} or [x, y, z] as (3,). ``partly``: absent components are 0."""
 
     def read(value: YamlValue) -> FloatArray:
         if value.kind == "list":
@@ -191,19 +194,19 @@ def vector(
 
 
 def direction(value: YamlValue) -> FloatArray:
-    """A unit vector (3,); x, y or z alone is that axis, with a sign where it points back."""
+    """Read a unit vector (3,); x, -x, y, -y, z or -z stand for the axes. Raises ScriptError."""
     if isinstance(value.held, str):
         sign, name = (-1.0, value.held[1:]) if value.held[:1] == "-" else (1.0, value.held)
         if name not in XYZ:
-            raise value.wrong(f"A direction is x, y, z, -x, -y, -z or three numbers, not {value}.")
+            raise value.wrong(f"Expected x, y, z, -x, -y, -z or three numbers, not {value}.")
         return frozen(sign * np.eye(3)[XYZ.index(name)])
     found: FloatArray = vector(number(-MAX_COORDINATE, MAX_COORDINATE), partly=True)(value)
     length = math.hypot(*found)
     if length < 1e-9:
-        raise value.wrong("A direction is not zero.")
+        raise value.wrong("A direction must not be zero.")
     return frozen(found / length)
 
 
 def _plain(value: YamlValue) -> float | None:
-    """Of what YAML takes for a text though people write it for a number, as 1e-3."""
+    """Return a number that YAML takes for a text, such as 1e-3; None for any other text."""
     return value.number if value.kind == "text" else None

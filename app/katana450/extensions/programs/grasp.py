@@ -1,4 +1,4 @@
-"""The step that takes an object between the fingers, planned from where it stands."""
+"""The step ``grasp``: take an object between the fingers, planned from its place."""
 
 from __future__ import annotations
 
@@ -23,25 +23,28 @@ from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import JOIN_TOLERANCE, MARGIN
 
 PITCHES = tuple(np.radians((30.0, 35.0, 25.0, 40.0, 20.0, 45.0)).tolist())
-"""[rad] Tried in this order when an object is taken: flatter ones pour better, but the shoulder's
-limit keeps a level tool above 110 mm."""
+"""[rad] Pitches of a grasp, tried in this order. Flatter ones pour better, but the shoulder's limit
+keeps a level tool above 110 mm.
+"""
 
 GRASP_HEIGHT_FRACTION = 0.78
-"""Of an object's height: above the middle, where the palm has room over the table."""
+"""[1] Fraction of an object's height: above the middle, where the palm has room over the table."""
 
 SHORTEST, LONGEST_BACK, STEP = 0.0, 0.03, 0.002
-"""[m] How far before the object's axis the tool frame closes: as near as the palm has room."""
+"""[m] Range and step of the distance of the tool frame before the object's axis."""
 
 PALM_CLEARANCE = MARGIN + 5e-4
-"""[m] Between the palm and what the fingers close on."""
+"""[m] Minimum distance between the palm and the grasped object."""
 
 
 @dataclass(frozen=True)
 class Grasp:
-    """Take an object between the fingers: open, come from the front, close until both touch.
+    """Grasp an object: open the fingers, approach from the front, close until both fingers touch.
 
-    pitch: [rad], None for the first of PITCHES with which this and what follows can be done.
-    height: [m] over the table, None for TAKEN_AT.
+    Attributes:
+        name: name of the object.
+        pitch: [rad]; None for the first of PITCHES with which this and later steps succeed.
+        height: [m] above the object's foot; None for GRASP_HEIGHT_FRACTION of its height.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Grasp:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the name of an object, or {object, pitch, height}. Raises ScriptError."""
         if value.kind == "text":
             return cls(read.text(value), None, None)
         fields = Fields(value, "a grasp")
@@ -62,11 +66,12 @@ class Grasp:
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the grasp. Raises InputError if the object cannot be taken."""
         scene_object = builder.scene_object(self.name)
         if builder.state.grip is not None:
-            raise InputError("The hand holds something already: set it down first.")
+            raise InputError("The hand already holds an object: set it down first.")
         if not scene_object.can_be_held:
-            raise InputError(f"{self.name} is not for the fingers to take.")
+            raise InputError(f"{self.name} cannot be held by the fingers.")
         if builder.state.tool != "grasp":
             builder.plan_context.arm.chain_to("grasp")
             builder.note("tool grasp", UseTool("grasp"), replace(builder.state, tool="grasp"))
@@ -79,33 +84,33 @@ class Grasp:
                 lambda pitch: self._take(builder, scene_object, pitch),
             )
         except InputError as error:
-            raise InputError(f"{self.name} cannot be taken where it stands: {error}") from error
+            raise InputError(f"{self.name} cannot be grasped at its place: {error}") from error
 
     def _take(self, builder: PlanBuilder, scene_object: SceneObject, pitch: float) -> None:
         height = GRASP_HEIGHT_FRACTION * scene_object.height if self.height is None else self.height
         middle = builder.point(scene_object.T[:3, 3] + (0.0, 0.0, height), in_base=True)
         back, q = _nearest(builder, middle, pitch)
         start = builder.first(APPROACHES, lambda away: _there(builder, middle, pitch, back + away))
-        builder.move_to(start, f"grasp {self.name}: before it")
+        builder.move_to(start, f"grasp {self.name}: approach")
         builder.lead([ToolLine(builder.at, before(middle, pitch, back))], f"grasp {self.name}")
         if float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
-            raise InputError("the straight way there ends in another posture.")
+            raise InputError("the straight path to it ends in another posture.")
         closed = builder.plan_context.arm.gripper.lower
         held = builder.after(cmd.SetGripper(closed))
         if held.grip is None:
-            said = ", ".join(finding.reason.value for finding in held.findings)
-            raise InputError(f"the fingers do not hold it ({said or 'they pass it'}).")
+            reasons = ", ".join(finding.reason.value for finding in held.findings)
+            raise InputError(f"the fingers do not hold it ({reasons or 'they pass it'}).")
         builder.note(f"grasp {self.name}: close", MoveFingers(closed), held)
         builder.taken = GraspInfo(builder.at, pitch if self.pitch is None else None)
 
 
 def _there(builder: PlanBuilder, middle: FloatArray, pitch: float, back: float) -> FloatArray:
-    """(5,) the joints with the tool ``back`` [m] before ``middle`` (3,) [rad]."""
+    """Return the joints (5,) [rad] with the tool ``back`` [m] before ``middle`` (3,) [m]."""
     return builder.joints_of(before(middle, pitch, back))
 
 
 def _nearest(builder: PlanBuilder, middle: FloatArray, pitch: float) -> tuple[float, FloatArray]:
-    """The least way before ``middle`` with ROOM for the palm, and the joints there."""
+    """Return the smallest distance [m] before ``middle`` with room for the palm, and its joints."""
 
     def roomy(back: float) -> tuple[float, FloatArray]:
         q = _there(builder, middle, pitch, back)

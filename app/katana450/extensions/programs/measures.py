@@ -1,27 +1,27 @@
-"""What is measured of a run, by name; a script may say in which bounds it expects it."""
+"""Measures of a run by name; a script can give the bounds that it expects of them."""
 
 from __future__ import annotations
 
 from typing import Final
 
 MEASURES: Final = {
-    "max_position_error_mm": "forward kinematics of the planned joints, from the desired path",
+    "max_position_error_mm": "distance of the planned tool positions from the desired path",
     "rms_position_error_mm": "the same, root mean square",
-    "max_orientation_error_deg": "the tool's, from the desired pitch and roll",
-    "executed_position_error_mm": "where the arm was told to be, from the path, at each tick",
-    "between_ticks_error_mm": "the same half-way between ticks, joints on straight lines",
-    "path_length_mm": "of the tool on its paths",
-    "smallest_singular_value": "of the Jacobian, translations by the characteristic length",
-    "margin_to_limits_deg": "the least of any joint, on the whole run",
-    "nearest_clearance_mm": "between any two parts, on all plans but those that lift something off",
-    "greatest_speed_share": "of any joint, of its most",
-    "greatest_acceleration_share": "of any joint, over two ticks, of its most",
-    "greatest_jerk_share": "of any joint, over three ticks, of its most",
+    "max_orientation_error_deg": "deviation of the tool from the desired pitch and roll",
+    "executed_position_error_mm": "distance of the arm at each tick from the desired path",
+    "between_ticks_error_mm": "the same half-way between ticks, joints interpolated linearly",
+    "path_length_mm": "length of the tool's paths",
+    "smallest_singular_value": "of the Jacobian, translations divided by the characteristic length",
+    "margin_to_limits_deg": "minimum of all joints over the whole run",
+    "nearest_clearance_mm": "minimum of all pairs of parts; plans that lift an object are left out",
+    "greatest_speed_share": "maximum of all joints, as a fraction of the limit",
+    "greatest_acceleration_share": "the same of the acceleration, over two ticks",
+    "greatest_jerk_share": "the same of the jerk, over three ticks",
     "greatest_tool_speed_mm_s": "of the tool point",
     "duration_s": "of the run",
-    "emptied_percent": "of the water, what is in the basin at the end",
-    "spilled_ml": "what lies on table and floor at the end",
-    "carried_margin_to_rim_mm": "the least of the lip over the water, until it is poured",
-    "cup_peak_jerk_m_s3": "of the middle of the cup, over a tick",
+    "emptied_percent": "fraction of the water that is in the basin at the end",
+    "spilled_ml": "water on table and floor at the end",
+    "carried_margin_to_rim_mm": "minimum height of the lip above the water, until it is poured",
+    "cup_peak_jerk_m_s3": "maximum of the cup's middle, over one tick",
 }
-"""The name, its unit at its end, and what it is."""
+"""Name of each measure, with its unit at the end, and its definition."""

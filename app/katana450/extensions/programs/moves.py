@@ -1,4 +1,4 @@
-"""Steps that move the joints, whatever way the tool takes meanwhile."""
+"""Steps that move the joints freely, without a prescribed path of the tool."""
 
 from __future__ import annotations
 
@@ -19,45 +19,51 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.joint_path import JointPath
 
 MAX_VIAS = 50
+"""Maximum number of places of one step."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """Go there freely, round what is in the way."""
+    """Move to a place on a free path round obstacles."""
 
     place: StepTarget
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read a place. Raises ScriptError."""
         return cls(places.place(value, setting))
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the motion. Raises InputError if the place cannot be reached."""
         builder.move_to(builder.joints_at(self.place), "move")
 
 
 @dataclass(frozen=True)
 class Joints:
-    """The same to joint angles."""
+    """Move to the joint angles ``q`` (5,) [rad] on a free path round obstacles."""
 
     q: FloatArray
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read five joint angles. Raises ScriptError."""
         return cls(places.joints(value))
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the motion. Raises InputError if the angles are outside the limits."""
         builder.move_to(builder.joints_at(StepTarget(joints=self.q)), "joints")
 
 
 @dataclass(frozen=True)
 class Nudge:
-    """Drive one joint on by a relative angle."""
+    """Move the joint ``axis`` (from 0) by the relative angle ``by`` [rad]."""
 
     axis: int
     by: float
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {axis, by}. Raises ScriptError."""
         fields = Fields(value, "a nudge")
         axis = fields.need("axis", read.whole(1, 5), 1)
         found = cls(axis - 1, fields.need("by", read.degrees(-720.0, 720.0), 0.0))
@@ -65,38 +71,43 @@ class Nudge:
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the motion. Raises InputError if the angle is outside the limits."""
         q = cmd.Nudge(self.axis, self.by).targets(builder.q)
         builder.move_to(builder.joints_at(StepTarget(joints=q)), "nudge")
 
 
 @dataclass(frozen=True)
 class Home:
-    """The same to the ready posture."""
+    """Move to the ready posture on a free path round obstacles."""
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the step, which takes no value. Raises ScriptError."""
         nothing(value, "home")
         return cls()
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the motion."""
         builder.move_to(builder.plan_context.ready, "home")
 
 
 @dataclass(frozen=True)
 class Via:
-    """Through places one after another without a rest, their corners rounded."""
+    """Move through places without a rest, with rounded corners."""
 
     through: tuple[StepTarget, ...]
     blend: float
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {through, blend}. Raises ScriptError."""
         fields = Fields(value, "a via")
         found = cls(*through(fields, setting))
         fields.done()
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the motion. Raises InputError if a place cannot be reached."""
         vias = [builder.q]
         at = builder.state
         for each in self.through:
@@ -108,7 +119,7 @@ class Via:
 
 
 def through(fields: Fields, setting: ScriptContext) -> tuple[tuple[StepTarget, ...], float]:
-    """The places on the way, and how much of half a leg a corner cuts off."""
+    """Return the places, and the fraction of half a leg that a rounded corner cuts off."""
     each = read.listed(lambda item: places.place(item, setting), 2, MAX_VIAS)
     found: tuple[StepTarget, ...] = fields.need("through", each, ())
     return found, fields.take("blend", read.number(0.01, 1.0), 0.5)

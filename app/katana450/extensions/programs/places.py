@@ -1,4 +1,4 @@
-"""Reading where the arm is to be: places, joint angles, pitch and roll, branches."""
+"""Reading of targets in a script: places, joint angles, pitch and roll, branches."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 
 ROOMIEST = "roomiest"
-"""The pitch that leaves the joints the most room along an arc."""
+"""The word for the pitch that keeps the joints farthest from their limits along an arc."""
 
 
 def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
-    """The name of a pose, {joints: [...]}, or {x, y, z, pitch, roll, branch}."""
+    """Read the name of a pose, {joints: [...]}, or {x, y, z, pitch, roll, branch}.
+
+    Raises ScriptError.
+    """
     if value.kind == "text":
         if value.held not in setting.poses:
             known = ", ".join(setting.poses) or "none; give it under `poses:`"
@@ -37,12 +40,12 @@ def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
 
 
 def joints(value: YamlValue) -> FloatArray:
-    """Five angles (5,) [rad]."""
+    """Read five angles (5,) in degrees; returns [rad]. Raises ScriptError."""
     return np.array(read.listed(read.degrees(-720.0, 720.0), 5, 5)(value))
 
 
 def pitch(value: YamlValue) -> float | str | None:
-    """[rad], ROOMIEST, or None to keep it."""
+    """Read a pitch: an angle [rad], ROOMIEST, or None for ``keep``. Raises ScriptError."""
     if value.number is not None:
         return read.degrees(-360.0, 360.0)(value)
     named = read.choice("keep", ROOMIEST)(value)
@@ -50,13 +53,13 @@ def pitch(value: YamlValue) -> float | str | None:
 
 
 def angles(fields: Fields) -> tuple[float | None, float | None]:
-    """Pitch and roll [rad], None where they are not given."""
+    """Read pitch and roll [rad]; None where they are absent."""
     each: Callable[[YamlValue], float | None] = read.degrees(-360.0, 360.0)
     return fields.take("pitch", each, None), fields.take("roll", each, None)
 
 
 def branch(fields: Fields) -> Branch | None:
-    """None where it is not given."""
+    """Read a branch; None if it is absent."""
     names = [str(each) for each in BRANCHES]
     named = fields.take("branch", read.choice(*names), "")
     return Branch.parse(named) if named else None

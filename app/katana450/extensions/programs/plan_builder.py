@@ -1,4 +1,4 @@
-"""Where a script is laid out: the arm as it will stand, and the plans made for it so far."""
+"""The state in which a script is planned: the arm as predicted, and the plans made so far."""
 
 from __future__ import annotations
 
@@ -36,27 +36,29 @@ W = TypeVar("W")
 L = TypeVar("L")
 
 EXACT = 1e-9
-"""[m or rad] A pose that is missed by no more is reached."""
+"""[m or rad] Maximum error of a pose that counts as reached."""
 
 ALONG = np.linspace(0.0, 1.0, 5)
-"""Places of a path at which is seen whether it moves anything."""
+"""Places of a path (sigma) at which the joints are checked for motion."""
 
 CARRY = 1.0
-"""[m/s^2] The most of the tool while it carries something."""
+"""[m/s^2] Maximum acceleration of the tool while it carries an object."""
 
 MAX_CLOSING_TICKS = 500
-"""Ticks that fingers may take."""
+"""Maximum duration of a finger motion in ticks."""
 
 TICK = 0.01
-"""[s]"""
+"""[s] Period of the simulated control cycle."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlanContext:
-    """What a script is for.
+    """The arm and environment that a script is planned for.
 
-    session: the rules of the arm, and what stands around it. T_base_shoulder: (4, 4) the frame {S}
-    in the base. seed: of the ways round.
+    Attributes:
+        session: the rules of the arm, and its environment.
+        T_base_shoulder: (4, 4) pose of the shoulder frame {S} in the base frame [m].
+        seed: seed of the random search for paths round obstacles.
     """
 
     session: Session
@@ -65,21 +67,26 @@ class PlanContext:
 
     @property
     def arm(self) -> ArmModel:
-        """The arm."""
+        """The arm model of the session."""
         return self.session.require_arm()
 
     @property
     def ready(self) -> FloatArray:
-        """(5,) [rad] where `home` leads."""
+        """The ready posture (5,) [rad], the target of ``home``."""
         return self.session.ready
 
 
 @dataclass(frozen=True, eq=False)
 class StepTarget:
-    """Where the arm is to be: its joints, or the tool.
+    """The target of a step, by joints or by the pose of the tool.
 
-    joints: (5,) [rad]. position: (3,) [m], in {S} unless ``in_base``. pitch, roll: [rad], None to
-    keep. branch: None for any, the present one first.
+    Attributes:
+        joints: (5,) [rad]; None if the target is a pose.
+        position: (3,) [m], in {S} or, with ``in_base``, in the base frame; None to keep it.
+        pitch: [rad]; None to keep it.
+        roll: [rad]; None to keep it.
+        branch: None for any, the present one first.
+        in_base: whether ``position`` is in the base frame.
     """
 
     joints: FloatArray | None = None
@@ -92,7 +99,7 @@ class StepTarget:
 
 @dataclass(frozen=True)
 class GraspInfo:
-    """Where the tool took what it holds; at what pitch [rad], where it was free to choose."""
+    """The tool pose of a grasp, and its pitch [rad] if that was chosen by the compiler."""
 
     at: ToolTarget
     chosen: float | None
@@ -100,9 +107,13 @@ class GraspInfo:
 
 @dataclass(frozen=True, eq=False)
 class UntimedPath:
-    """Paths that are known to be clear and not yet timed, which takes longest.
+    """Paths that are checked for contacts but not yet timed, because timing takes longest.
 
-    world: what they are clear of. state: the arm where they begin.
+    Attributes:
+        arm: the arm model.
+        world: the collision world that they were checked against; None without collision checks.
+        state: the state at their start.
+        paths: the paths, one after another.
     """
 
     arm: ArmModel
@@ -111,7 +122,7 @@ class UntimedPath:
     paths: tuple[Path, ...]
 
     def timed(self) -> FollowPlan:
-        """The plan along them; a gentle one when something is held."""
+        """Return the timed plan, with limited tool acceleration if an object is held."""
         gentle = None if self.state.grip is None else CARRY
         paths = list(self.paths)
         return FollowPlan(
@@ -120,56 +131,56 @@ class UntimedPath:
 
 
 class PlanBuilder:
-    """Takes the arm from step to step as it will go, and notes the orders."""
+    """The builder of a program: predicts the arm from step to step and records the actions."""
 
     def __init__(self, plan_context: PlanContext, state: State) -> None:
-        """``state``: where the arm stands at first, at rest."""
+        """Start from ``state``, in which the arm is at rest."""
         self.plan_context = plan_context
         self.state = state
         self.orders: list[tuple[str, Action | UntimedPath]] = []
         self.taken: GraspInfo | None = None
-        """Where the tool took what it holds."""
+        """The grasp of the held object; None with an empty hand."""
         self.given_up: tuple[float, ...] = ()
-        """[rad] Pitches to take an object with that led nowhere."""
+        """[rad] Pitches of the grasp with which a later step failed."""
         self.ahead: Sequence[object] = ()
-        """The steps that come after this one."""
+        """The steps after the present one."""
 
     @property
     def world(self) -> CollisionWorld | None:
-        """What must not be touched now, if it is looked at."""
+        """The present collision world; None without collision checks."""
         return self.plan_context.session.world_at(self.state)
 
     @property
     def chain(self) -> Chain:
-        """With the tool there is now."""
+        """The kinematic chain to the present tool frame."""
         return self.plan_context.arm.chain_to(self.state.tool)
 
     @property
     def q(self) -> FloatArray:
-        """(5,) where the joints are now [rad]."""
+        """The present joints (5,) [rad]."""
         return self.state.setpoint
 
     @property
     def at(self) -> ToolTarget:
-        """Where the tool is now."""
+        """The present tool pose."""
         return ToolTarget.at(self.chain, self.q)
 
     def point(self, p: FloatArray, *, in_base: bool) -> FloatArray:
-        """The point ``p`` (3,) [m] in {S}."""
+        """Return the point ``p`` (3,) [m] in {S}; ``in_base``: it is given in the base frame."""
         T = se3.inverse(self.plan_context.T_base_shoulder) if in_base else np.eye(4)
         return frozen(T[:3, :3] @ p + T[:3, 3])
 
     def direction(self, v: FloatArray, *, in_base: bool) -> FloatArray:
-        """The direction ``v`` (3,) in {S}."""
+        """Return the direction ``v`` (3,) in {S}; ``in_base``: it is given in the base frame."""
         return frozen(self.plan_context.T_base_shoulder[:3, :3].T @ v if in_base else v)
 
     def note(self, name: str, order: Action | UntimedPath, state: State) -> None:
-        """Have ``order`` done, which leads to ``state``."""
+        """Append ``order``, which leads to ``state``."""
         self.orders.append((name, order))
         self.state = state
 
     def move_to(self, q: FloatArray, name: str) -> None:
-        """Go to ``q`` (5,) [rad], round what is in the way; nothing where the arm is there."""
+        """Append a free motion to ``q`` (5,) [rad] round obstacles; nothing if the arm is there."""
         if float(np.abs(self.q - q).max()) <= JOIN_TOLERANCE:
             return
         self.follow(
@@ -178,7 +189,7 @@ class PlanBuilder:
         )
 
     def lead(self, curves: Sequence[Curve], name: str) -> None:
-        """Lead the tool along ``curves`` one after another, from where it is, on its branch."""
+        """Append the tool's motion along ``curves``, from its present pose, on the same branch."""
         paths: list[Path] = []
         made: dict[int, Path] = {}
         q = self.q
@@ -192,7 +203,7 @@ class PlanBuilder:
         self.follow(paths, name)
 
     def follow(self, paths: Sequence[Path], name: str) -> None:
-        """Go along ``paths``, the first of which begins here.
+        """Append the motion along ``paths``, the first of which begins at the present posture.
 
         Raises BlockedError, and InputError for a path on which nothing moves.
         """
@@ -200,8 +211,8 @@ class PlanBuilder:
         for path in {id(path): path for path in paths}.values():
             if float(np.abs(joint_derivatives(path, ALONG)[1]).max()) <= EXACT:
                 raise InputError(
-                    f"This {name} moves nothing: it ends where it begins. Say where it goes, or "
-                    "take it out."
+                    f"This {name} moves nothing: it ends where it begins. Change its "
+                    "target or remove it."
                 )
             if world is not None:
                 check_clear(path, world, fingers)
@@ -211,17 +222,18 @@ class PlanBuilder:
             self.standing(paths[-1].end),
         )
 
-    def first(self, ways: Iterable[W], build: Callable[[W], L]) -> L:
-        """What ``lay`` makes of the first of ``ways`` that can be, as if no other had been tried.
+    def first(self, options: Iterable[W], build: Callable[[W], L]) -> L:
+        """Return ``build(option)`` of the first option that succeeds, and undo all failed attempts.
 
-        Raises InputError with the reason of the first of all, which is the one a person expects.
+        Raises InputError with the reason of the first option, which is the one that a person
+        expects.
         """
-        refused = InputError("no way is left.")
+        refused = InputError("no alternative is left.")
         state, orders = self.state, tuple(self.orders)
-        for number, way in enumerate(ways):
+        for number, option in enumerate(options):
             checkpoint()
             try:
-                return build(way)
+                return build(option)
             except InputError as error:
                 self.state, self.orders = state, list(orders)
                 if number == 0:
@@ -229,7 +241,7 @@ class PlanBuilder:
         raise refused
 
     def after(self, command: Command, ticks: int = MAX_CLOSING_TICKS) -> State:
-        """The arm at rest after ``command``, as it will be: by the rules themselves."""
+        """Return the state at rest after ``command``, as the session itself computes it."""
         session, state = self.plan_context.session, self.state
         given: tuple[Command, ...] = (command,)
         for _ in range(ticks):
@@ -242,28 +254,28 @@ class PlanBuilder:
         return state
 
     def scene_object(self, name: str) -> SceneObject:
-        """The object of that name. Raises InputError with those there are."""
+        """Return the object ``name``. Raises InputError with the known names."""
         found = named(self.state.objects, name)
         if found is None:
-            known = ", ".join(each.name for each in self.state.objects) or "nothing"
-            raise InputError(f"There is no {name!r} here; there is {known}.")
+            known = ", ".join(each.name for each in self.state.objects) or "none"
+            raise InputError(f"There is no object {name!r}. Known objects: {known}.")
         return found
 
     def standing(self, q: FloatArray) -> State:
-        """The arm at rest at ``q`` (5,) [rad]."""
+        """Return the state of the arm at rest at ``q`` (5,) [rad]."""
         q, branch = frozen(q), branch_of(self.plan_context.arm.chain, q)
         return replace(
             self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE
         )
 
     def joints_at(self, place: StepTarget) -> FloatArray:
-        """(5,) the joints that have the arm at ``place`` [rad]; InputError why none do."""
+        """Return the joints (5,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
             return self.plan_context.arm.chain.check_q(place.joints)
         return self.joints_of(self.target_at(place), place.branch)
 
     def target_at(self, place: StepTarget, now: ToolTarget | None = None) -> ToolTarget:
-        """The tool at ``place``, which is not given by joints; the rest as it is ``now``."""
+        """Return the tool pose at ``place``, which has no joints; ``now`` gives absent values."""
         now = self.at if now is None else now
         p = now.position
         if place.position is not None:
@@ -272,28 +284,31 @@ class PlanBuilder:
         return ToolTarget(p, pitch, now.roll if place.roll is None else place.roll)
 
     def joints_of(self, target: ToolTarget, branch: Branch | None = None) -> FloatArray:
-        """(5,) the joints with the tool there, on the present branch if that will do [rad]."""
+        """Return the joints (5,) [rad] for ``target``, on the present branch if possible.
+
+        Raises InputError with the smallest error found.
+        """
         here = branch_of(self.chain, self.q)
-        said = ""
+        nearest = ""
         for tried in self.branches(branch):
-            # On the other shoulder the same tool has other numbers.
+            # With the other shoulder posture the same tool pose has other pitch and roll values.
             turned = branch is None and tried.shoulder != here.shoulder
-            wanted = target.turned_round() if turned else target
-            best = leap(self.chain, self.q, wanted, tried, Priority.POSE)
+            pose = target.turned_round() if turned else target
+            best = leap(self.chain, self.q, pose, tried, Priority.POSE)
             if max(best.position_error, best.rotation_error) <= EXACT:
                 return best.q
-            if not said:
+            if not nearest:
                 millimetres, angle = 1e3 * best.position_error, np.degrees(best.rotation_error)
-                said = f"{millimetres:.3g} mm and {angle:.3g} deg off on the branch {tried}"
+                nearest = f"{millimetres:.3g} mm and {angle:.3g} deg off on the branch {tried}"
         x, y, z = (1e3 * target.position).tolist()
         raise InputError(
             f"The tool {self.state.tool} cannot be at ({x:.1f}, {y:.1f}, {z:.1f}) mm in the "
             f"shoulder frame with a pitch of {np.degrees(target.pitch):.1f} deg: the nearest is "
-            f"{said}."
+            f"{nearest}."
         )
 
     def branches(self, wanted: Branch | None) -> tuple[Branch, ...]:
-        """Those to be tried, in their order."""
+        """Return the branches to try, in their order; only ``wanted`` if it is given."""
         if wanted is not None:
             return (wanted,)
         here = branch_of(self.chain, self.q)

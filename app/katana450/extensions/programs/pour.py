@@ -5,12 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 Spot = tuple[float, float]
+"""A place on the table: x, y [mm] in the base frame."""
 
 
 @dataclass(frozen=True)
 class PourDemo:
-    """water: [ml]. cup, basin: where they stand on the table [mm], None where they are. shake: how
-    often the cup is shaken out.
+    """The pouring demo with its parameters.
+
+    Attributes:
+        water: [ml].
+        cup: its place on the table [mm]; None to leave it.
+        basin: its place on the table [mm]; None to leave it.
+        shake: number of shakes of the cup.
     """
 
     water: float = 200.0
@@ -20,7 +26,7 @@ class PourDemo:
 
     @property
     def text(self) -> str:
-        """The script."""
+        """The YAML text of the script."""
         puts = "".join(
             f"  - put: {{object: {name}, x: {spot[0]:g}, y: {spot[1]:g}}}\n"
             for name, spot in (("cup", self.cup), ("basin", self.basin))

@@ -1,4 +1,4 @@
-"""The step that empties the cup into something, planned from where that stands."""
+"""The step ``pour``: empty the cup into an object, planned from its place."""
 
 from __future__ import annotations
 
@@ -24,28 +24,29 @@ from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import ToolLine
 
 POUR_TURN = math.radians(165.0)
-"""About the tool's axis: with the tool tilted at all the cup is past its side then."""
+"""[rad] Roll of a pour: with any tilt of the tool, the cup then lies past its side."""
 
 POUR_PACE = 0.3
-"""Of the speed, while it is poured: a thin stream keeps together."""
+"""[1] Fraction of the speed while pouring: slow enough for a thin, coherent stream."""
 
 ABOVE_RIM = 0.13
-"""[m] The tool over the basin's rim: the cup turns over between them."""
+"""[m] Height of the tool above the basin's rim: the cup turns over between them."""
 
 SHAKE_ANGLE = math.radians(25.0)
+"""[rad] Amplitude of a shake."""
 
 DRAIN_TIME = 1.5
-"""[s] Until the last of it has run out."""
+"""[s] Time for the last water to run out."""
 
 POURING = "pour"
-"""What the task is called that turns the cup over."""
+"""Name of the task that turns the cup over."""
 
 
 @dataclass(frozen=True)
 class Pour:
     """Carry the cup over an object, turn it over by the wrist, shake it, and turn it back.
 
-    The cup stays upright until then: the tool keeps the pitch it was taken with.
+    The cup stays upright until then: the tool keeps the pitch of the grasp.
     """
 
     into: str
@@ -53,6 +54,7 @@ class Pour:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the name of an object, or {into, shake}. Raises ScriptError."""
         if value.kind == "text":
             return cls(read.text(value), 3)
         fields = Fields(value, "a pour")
@@ -61,6 +63,7 @@ class Pour:
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the pour, turning either way. Raises InputError if it is not possible."""
         cup, basin = builder.scene_object(CUP), builder.scene_object(self.into)
         if not cup.held:
             raise InputError("The cup is not in the hand: `grasp: cup` first.")
@@ -76,17 +79,17 @@ class Pour:
         self, builder: PlanBuilder, basin: SceneObject, level: ToolTarget, turn: float
     ) -> None:
         chain = builder.chain
-        # To the nearest that the wrist can turn.
+        # The turn is limited to the range of the wrist.
         room = 0.995 * (chain.upper[4] if turn > 0.0 else -chain.lower[4])
         turn = math.copysign(min(abs(turn), room - abs(level.roll)), turn)
         over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height + ABOVE_RIM), in_base=True)
-        wanted = over
+        position = over
         for _ in range(3):
-            # So that the lip is over the middle while the cup lies on its side.
-            at = replace(level, position=wanted)
+            # Iterate until the lip is over the basin's middle when the cup lies on its side.
+            at = replace(level, position=position)
             side = builder.joints_of(replace(at, roll=level.roll + 0.5 * turn))
-            wanted = wanted + (over - _lip(builder, side)) * (1.0, 1.0, 0.0)
-        at = replace(level, position=wanted)
+            position = position + (over - _lip(builder, side)) * (1.0, 1.0, 0.0)
+        at = replace(level, position=position)
         carry(builder, at, f"over {self.into}")
         builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
         down = replace(at, roll=level.roll + turn)
@@ -95,12 +98,12 @@ class Pour:
         if self.shake:
             builder.lead([ToolLine(down, back), ToolLine(back, down)] * self.shake, "shake")
         builder.note("drain", Wait(DRAIN_TIME), builder.state)
-        builder.note("as fast as may be", SetSpeed(1.0), builder.state)
+        builder.note("full speed", SetSpeed(1.0), builder.state)
         builder.lead([ToolLine(down, at)], "turn back")
 
 
 def _lip(builder: PlanBuilder, q: FloatArray) -> FloatArray:
-    """(3,) in {S}: the lowest point of the cup's rim with the joints at ``q`` (5,)."""
+    """Return the lowest point (3,) [m] in {S} of the cup's rim, for the joints ``q`` (5,) [rad]."""
     session, cup = builder.plan_context.session, builder.scene_object(CUP)
     T = session.environment.pose(cup, np.append(q, builder.state.gripper_setpoint))
     up = T[:3, 2]

@@ -1,4 +1,4 @@
-"""A program: a script for one arm as it stands, everything planned before anything moves."""
+"""A program: a script that is planned completely, for one arm in one situation."""
 
 from __future__ import annotations
 
@@ -15,10 +15,14 @@ from katana450.maths.geometry.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """name: for people. speed: fraction of full speed. start: (5,) where the arm has to stand
-    [rad].
+    """A compiled script.
 
-    tasks: what is done, in its order. steps: how many steps they belong to.
+    Attributes:
+        name: name of the script.
+        speed: fraction of full speed.
+        start: (5,) posture [rad] in which the arm must stand.
+        tasks: the actions in their order.
+        steps: number of steps.
     """
 
     name: str
@@ -29,7 +33,7 @@ class Program:
 
     @property
     def duration(self) -> float:
-        """[s] of all motions at full speed."""
+        """Duration of all motions at full speed [s]."""
         return sum(
             task.order.plan.duration for task in self.tasks if isinstance(task.order, FollowPlan)
         )
@@ -42,21 +46,22 @@ def compiled(
     speed: float = 1.0,
     report: Report = lambda _: None,
 ) -> Program:
-    """``script`` for ``rig`` from where ``state`` has it, at ``speed`` of its own.
+    """Return the program of ``script`` from the situation of ``state``.
 
-    ``report``: given every stage of the planning as it begins. Raises ScriptError with the line of
-    the step that cannot be, and why; CancelledError where a checkpoint does.
+    ``speed`` is the fraction of the script's own speed. ``report`` is called with every stage of
+    the planning as it begins. Raises ScriptError with the line of a step that is not possible,
+    InputError for an arm with the wrong gripper, and CancelledError from a checkpoint.
     """
     if script.bare and plan_context.arm.gripper.moves:
         raise InputError(
-            f"{script.name} is for an arm without its gripper (`gripper: none`). Start the server "
+            f"{script.name} needs an arm without its gripper (`gripper: none`). Start the server "
             "with --bare."
         )
     builder = PlanBuilder(plan_context, state)
     builder.state = builder.standing(state.setpoint)
-    laid = Compiler(script, builder, report).all()
+    compiled_steps = Compiler(script, builder, report).all()
     tasks = [Task(0, 1, "speed", SetSpeed(1.0))]
-    for number, (placed, orders) in enumerate(zip(script.steps, laid, strict=True)):
+    for number, (placed, orders) in enumerate(zip(script.steps, compiled_steps, strict=True)):
         tasks += [Task(number, placed.line, name, order) for name, order in orders]
-    whole = script.speed * speed
-    return Program(script.name, whole, state.setpoint, tuple(tasks), len(script.steps))
+    total_speed = script.speed * speed
+    return Program(script.name, total_speed, state.setpoint, tuple(tasks), len(script.steps))

@@ -10,11 +10,11 @@ from msgspec import Meta
 from katana450.server.api.fields import COMMAND, MAX_REQUEST_BYTES, Request, RequestTraits
 
 SLOWEST_SPEED = 0.01
-"""Smallest fraction of its own speed that a program can be run at."""
+"""Minimum fraction of its own speed at which a program can run."""
 
 
 class ProgramOrder(Enum):
-    """What a program can be told."""
+    """An order to a program."""
 
     RUN = "run"
     STEP = "step"
@@ -22,17 +22,16 @@ class ProgramOrder(Enum):
     PAUSE = "pause"
     RESUME = "resume"
     END = "end"
-    """Come to rest and end it."""
+    """Bring the arm to rest and end the program."""
 
 
 class Program(Request, frozen=True, kw_only=True):
-    """A part of a script, of docs/programs.md; after the last one it is planned.
+    """Send a part of a script (see docs/programs.md); the script is planned after the last part.
 
-    All but the last say ``more``. ``speed``: fraction of the script's own. The state tells how far
-    the planning is, when it is done, or what is wrong with the script, line by line. The last plan
-    is
-    kept: the same script is ready at once while posture, gripper, tool, scene and water are the
-    same.
+    All parts except the last have ``more`` set. ``speed`` is the fraction of the script's own
+    speed. The state reports the progress of the planning, its end, or the errors of the script by
+    line. The last plan is kept: the same script is ready at once while posture, gripper, tool,
+    scene and water are the same.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -43,13 +42,13 @@ class Program(Request, frozen=True, kw_only=True):
 
 
 class Steer(Request, frozen=True, kw_only=True):
-    """Run, step, pause, resume or end the program that is planned.
+    """Run, step, pause, resume or end the planned program.
 
-    It drives by itself, under its own name; its owner has to stay connected. While it is being
-    planned, ``run`` and ``step`` take effect afterwards, unless the arm is told to move, hold or
-    stop in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program
-    that is to run from another posture or scene than it was planned for is planned anew first. An
-    arm that is paused when a program begins stays paused until ``resume``.
+    A program drives as a participant of its own; its owner must stay connected. During planning,
+    ``run`` and ``step`` take effect afterwards, unless the arm is commanded to move, hold or stop
+    in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program that is
+    to run from another posture or scene than it was planned for is planned again first. An arm that
+    is paused when a program begins stays paused until ``resume``.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND

@@ -1,4 +1,4 @@
-"""The run of a program: a fold over the states of the arm, the same on any clock."""
+"""Execution of a program as a pure fold over the states of the arm, on any clock."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from katana450.extensions.programs.program import Program
 
 
 class Phase(Enum):
-    """How a run stands; only one that runs goes on."""
+    """The phase of a run. Only RUNNING can change."""
 
     RUNNING = "running"
     DONE = "done"
@@ -23,14 +23,17 @@ class Phase(Enum):
 
 @dataclass(frozen=True)
 class Run:
-    """Attributes:
-    number: of the task under way, from 0.
-    begun: whether it has been asked for.
-    waited: since then, pauses left out [s].
-    blocked: for how long the arm has stood before something that is in its way [s].
-    t: when it was last looked at [s].
-    phase, why: how it stands; why it ended, if not well.
-    single: whether it rests after the step under way.
+    """The progress of a run.
+
+    Attributes:
+        t: time of the last step [s].
+        number: index of the current task, from 0.
+        started: whether the commands of the task were given.
+        waited: time since then, without pauses [s].
+        blocked: time for which the arm has been blocked at rest [s].
+        phase: phase of the run.
+        why: reason of an early end.
+        single: whether the run pauses after the current step.
     """
 
     t: float
@@ -45,7 +48,17 @@ class Run:
 
 @dataclass(frozen=True)
 class Progress:
-    """For people. step: from 1, of ``steps``; line: of the script; share: of the step, 0 to 1."""
+    """The progress of a run, for display.
+
+    Attributes:
+        step: current step, from 1.
+        steps: number of steps.
+        line: line of the script.
+        name: name of the task.
+        fraction: completed fraction of the task, from 0 to 1.
+        status: a phase, ``paused`` or ``blocked``.
+        why: reason of an early end.
+    """
 
     step: int
     steps: int
@@ -57,10 +70,10 @@ class Progress:
 
 
 def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple[cmd.Command, ...]]:
-    """The run after ``state``, which has all commands in it, and what the arm is told now.
+    """Return the run after ``state``, and the commands to give now.
 
-    t: now [s], on the clock of ``run.t``. An arm at rest tells nothing new, so that the time of its
-    newest state stands still.
+    ``state`` must include all earlier commands. ``t`` is the present time [s] on the clock of
+    ``run.t``: an arm at rest publishes no new states, so the time of its newest state stands still.
     """
     if run.phase is not Phase.RUNNING:
         return run, ()
@@ -68,7 +81,9 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     if state.stopped is not None:
         return replace(run, phase=Phase.STOPPED, why="STOP was pressed."), ()
     if any(finding.reason is Reason.INTERNAL for finding in state.findings):
-        return replace(run, phase=Phase.FAILED, why="The arm's controller met an error."), ()
+        return replace(
+            run, phase=Phase.FAILED, why="The arm's controller reported an internal error."
+        ), ()
     if state.paused:
         return run, ()
     task = program.tasks[run.number]
@@ -80,7 +95,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     run = replace(run, waited=run.waited + dt, blocked=run.blocked + dt if stands else 0.0)
     try:
         if run.blocked > ACTION_TIMEOUT:
-            raise InputError(f"The way stays blocked: {_met(state)} would meet.")
+            raise InputError(f"The path is still blocked: {_met(state)} would collide.")
         done = task.order.done(state, run.waited)
     except InputError as error:
         why = f"Line {task.line}, {task.name}: {error}"
@@ -96,30 +111,30 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
 
 
 def _met(state: State) -> str:
-    """What is in whose way."""
+    """Return the two parts that would collide."""
     met = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
     return " and ".join(met[0]) if met and met[0] else "something"
 
 
 def stopped(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:
-    """Ended by a person: the arm comes to rest where it is."""
+    """Return the run as ended by a person, and the commands that bring the arm to rest."""
     if run.phase is not Phase.RUNNING:
         return run, ()
     return replace(run, phase=Phase.STOPPED, why=why), (cmd.Hold(), cmd.Resume())
 
 
 def ended(run: Run, phase: Phase, why: str) -> Run:
-    """With ``phase`` and ``why``; one that has ended stays as it is."""
+    """Return the run with ``phase`` and ``why``; a run that has ended stays unchanged."""
     return run if run.phase is not Phase.RUNNING else replace(run, phase=phase, why=why)
 
 
 def stepping(run: Run) -> tuple[Run, tuple[cmd.Command, ...]]:
-    """On, to the end of the step."""
+    """Return the run that continues to the end of the step, and its commands."""
     return replace(run, single=True), (cmd.Resume(),)
 
 
 def progress(program: Program, run: Run, state: State) -> Progress:
-    """How far it is."""
+    """Return the progress of ``run``."""
     task = program.tasks[run.number]
     fraction = 1.0 if run.phase is Phase.DONE else 0.0
     if run.started and run.phase is Phase.RUNNING:

@@ -1,4 +1,4 @@
-"""A script: what it is called, what it is for, its poses and steps, each with its line."""
+"""A script: its name, description, poses and steps, each with its line."""
 
 from __future__ import annotations
 
@@ -20,18 +20,20 @@ from katana450.extensions.programs.step import Step
 from katana450.extensions.programs.steps import STEPS
 
 MAX_STEPS = 1000
-"""All repetitions counted."""
+"""Maximum number of steps, with all repetitions."""
 
 MAX_REPETITIONS = 1000
+"""Maximum count of a ``repeat``."""
 
 MAX_NAME_LENGTH = 40
+"""Maximum number of characters of a name."""
 
 NOTHING: dict[str, tuple[float, float]] = {}
-"""Is expected where a script does not say."""
+"""The expectations of a script that has none."""
 
 
 class LocatedStep(NamedTuple):
-    """A step, and where it stands."""
+    """A step and its place in the text, from 1."""
 
     step: Step
     line: int
@@ -40,10 +42,15 @@ class LocatedStep(NamedTuple):
 
 @dataclass(frozen=True)
 class Script:
-    """name, about: for people. bare: whether it is for an arm without its gripper.
+    """A parsed script.
 
-    speed: fraction of full speed. steps: in their order, all repetitions written out. expected: of
-    measures by name, the least and the most they may be.
+    Attributes:
+        name: name, for display.
+        about: description, for display.
+        bare: whether it needs an arm without its gripper.
+        speed: fraction of full speed.
+        steps: the steps in their order, all repetitions written out.
+        expected: minimum and maximum of measures, by name.
     """
 
     name: str
@@ -55,7 +62,7 @@ class Script:
 
 
 def parse(text: str) -> Script:
-    """The script that ``text`` is. Raises ScriptError with all that is wrong, line by line."""
+    """Return ``text`` as a script. Raises ScriptError with all problems, line by line."""
     top = Fields(read_text(text), "a script")
     name = top.take("name", _name, "Script")
     about = top.take("about", read.text, "")
@@ -85,24 +92,24 @@ def _steps(value: YamlValue, setting: ScriptContext) -> tuple[LocatedStep, ...]:
         except ScriptError as error:
             problems += error.problems
         if len(found) > MAX_STEPS:
-            said = f"A script has at most {MAX_STEPS} steps, repetitions counted."
-            problems += item.wrong(said).problems
+            text = f"A script has at most {MAX_STEPS} steps, repetitions counted."
+            problems += item.wrong(text).problems
             break
     if value.kind != "list" or not value.items:
         what = "an empty one" if value.kind == "list" else value
-        problems += value.wrong(f"A list of steps goes here, not {what}.").problems
+        problems += value.wrong(f"Expected a list of steps, not {what}.").problems
     if problems:
         raise ScriptError(tuple(problems))
     return tuple(found)
 
 
 def _step(item: YamlValue, setting: ScriptContext) -> tuple[LocatedStep, ...]:
-    """One step, or what a `repeat` comes to."""
+    """Return one step, or the steps of a ``repeat``."""
     name, value = item, YamlValue(item.line, item.column, None, "nothing")
     if item.kind == "mapping":
         if len(item.fields) != 1:
             names = ", ".join(str(name.held) for name, _ in item.fields)
-            raise item.wrong(f"A step is one name with what belongs to it, not {names or 'none'}.")
+            raise item.wrong(f"A step must be one name with its value, not {names or 'none'}.")
         ((name, value),) = item.fields
     known = (*STEPS, "repeat")
     if name.held not in known:
@@ -114,12 +121,12 @@ def _step(item: YamlValue, setting: ScriptContext) -> tuple[LocatedStep, ...]:
     steps = fields.need("steps", lambda inner: _steps(inner, setting), ())
     fields.done()
     if times * len(steps) > MAX_STEPS:
-        raise name.wrong(f"These are {times * len(steps)} steps; at most {MAX_STEPS} go.")
+        raise name.wrong(f"This gives {times * len(steps)} steps; the maximum is {MAX_STEPS}.")
     return steps * times
 
 
 def _poses(value: YamlValue, *, in_base: bool) -> dict[str, StepTarget]:
-    """By their names; each may be named by those after it."""
+    """Return the poses by name; each may refer to those before it."""
     fields = Fields(value, "the poses")
     found: dict[str, StepTarget] = {}
     for name in [str(key.held) for key, _ in value.fields]:

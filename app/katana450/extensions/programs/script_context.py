@@ -1,4 +1,4 @@
-"""What the steps of one script have in common."""
+"""The settings that all steps of one script share."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from katana450.extensions.programs.plan_builder import StepTarget
 
 @dataclass(frozen=True)
 class ScriptContext:
-    """What the steps of one script have in common.
+    """The settings that all steps of one script share.
 
-    in_base: whether its points are in the base frame. poses: its places by name.
+    Attributes:
+        in_base: whether its points are in the base frame, not in {S}.
+        poses: its named places.
     """
 
     in_base: bool

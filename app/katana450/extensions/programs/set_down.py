@@ -1,4 +1,4 @@
-"""The step that puts what the hand holds back."""
+"""The step ``set_down``: put the held object back."""
 
 from __future__ import annotations
 
@@ -17,22 +17,24 @@ from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import MARGIN
 
 SET_DOWN = MARGIN + 2e-4
-"""[m] Above the table, from where what is set down comes to stand."""
+"""[m] Height above the table at which the fingers release the object."""
 
 
 @dataclass(frozen=True)
 class SetDown:
-    """Put what the hand holds back where it was taken, and draw back."""
+    """Put the held object back to its place of the grasp, and draw back."""
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the step, which takes no value. Raises ScriptError."""
         nothing(value, "set_down")
         return cls()
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the motions. Raises InputError if nothing is held, or there is no room."""
         taken = builder.taken
         if builder.state.grip is None or taken is None:
-            raise InputError("The hand holds nothing that it took in this program.")
+            raise InputError("The hand holds no object that this program grasped.")
         at = taken.at
         above = replace(at, position=at.position * (1, 1, 0) + builder.at.position * UP)
         carry(builder, above, "back")

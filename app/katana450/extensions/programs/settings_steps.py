@@ -1,4 +1,4 @@
-"""Steps that move no joint: the fingers, a wait, and how the rest is done."""
+"""Steps that move no joint: gripper, wait, tool frame and speed."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 
 MAX_PAUSE = 3600.0
-"""[s]"""
+"""[s] Maximum duration of a wait."""
 
 
 @dataclass(frozen=True)
 class Gripper:
-    """Open or close the fingers, or bring them to a place: [deg], or [mm] where they slide."""
+    """Open or close the fingers, or move them to a position [deg], or [mm] for sliding fingers."""
 
     where: float | str
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read ``open``, ``closed`` or a number. Raises ScriptError."""
         if value.number is not None:
             return cls(read.number(-180.0, 180.0, "deg or mm")(value))
         return cls(read.choice("open", "closed")(value))
 
     def build(self, builder: PlanBuilder) -> None:
+        """Append the finger motion. Raises InputError outside the range of the fingers."""
         fingers = builder.plan_context.arm.gripper
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
@@ -40,36 +42,40 @@ class Gripper:
         angle = ends[self.where] if isinstance(self.where, str) else scale * self.where
         if not fingers.lower <= angle <= fingers.upper:
             low, high = fingers.lower / scale, fingers.upper / scale
-            raise InputError(f"The fingers go from {low:.1f} to {high:.1f} {unit}.")
+            raise InputError(f"The range of the fingers is {low:.1f} to {high:.1f} {unit}.")
         held = replace(builder.state, gripper=angle, gripper_setpoint=angle, gripper_goal=angle)
         builder.note("gripper", MoveFingers(angle), held)
 
 
 @dataclass(frozen=True)
 class TimedPause:
-    """Wait for a time [s]."""
+    """Wait for ``seconds`` [s]."""
 
     seconds: float
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read a time [s]. Raises ScriptError."""
         return cls(read.number(0.01, MAX_PAUSE, "s")(value))
 
     def build(self, builder: PlanBuilder) -> None:
+        """Append the wait."""
         builder.note("wait", Wait(self.seconds), builder.state)
 
 
 @dataclass(frozen=True)
 class Tool:
-    """From now on points are of this tool frame."""
+    """Select the tool frame to which all later points refer."""
 
     name: str
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the name of a tool frame. Raises ScriptError."""
         return cls(read.text(value))
 
     def build(self, builder: PlanBuilder) -> None:
+        """Append the change of the tool frame. Raises InputError if it does not exist."""
         builder.plan_context.arm.chain_to(self.name)
         builder.note(
             f"tool {self.name}", UseTool(self.name), replace(builder.state, tool=self.name)
@@ -78,15 +84,17 @@ class Tool:
 
 @dataclass(frozen=True)
 class Speed:
-    """From now on no faster than this fraction of the most."""
+    """Limit all later motions to the fraction ``value`` of the program's speed."""
 
     value: float
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read a fraction. Raises ScriptError."""
         return cls(read.number(MIN_SPEED, 1.0)(value))
 
     def build(self, builder: PlanBuilder) -> None:
+        """Append the change of the speed."""
         builder.note(f"speed {self.value:g}", SetSpeed(self.value), builder.state)
 
 

@@ -1,4 +1,4 @@
-"""A program run on the real session by a clock of its own, and all that happened meanwhile."""
+"""Simulation of a program on the real session with a simulated clock, and the trace of the run."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ from katana450.extensions.programs.runner import Phase, Run
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 MAX_DURATION = 24 * 3600.0
-"""[s] No program goes on for longer."""
+"""[s] Maximum duration of a program."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """What each of N ticks was like, the first before anything moves.
+    """The record of N ticks, the first before anything moves.
 
     Attributes:
         t: (N,) [s].
-        q, qd: (N, 5) what the driver was told, and how fast that moves [rad, rad/s].
-        sent: (N, 5) where the driver said the arm is [rad].
-        fingers: (N,) [rad].
-        task: (N,) which of the program's tasks was under way.
-        segment: (N,) on which segment of its plan, -1 on none.
-        sigma: (N,) where on that segment's path, from 0 to 1.
+        q: (N, 5) setpoints [rad].
+        qd: (N, 5) velocities of the setpoints [rad/s].
+        sent: (N, 5) joints that the driver reported [rad].
+        fingers: (N,) finger joint [rad].
+        task: (N,) index of the current task of the program.
+        segment: (N,) index of the segment of its plan, -1 for none.
+        sigma: (N,) place on the path of that segment, from 0 to 1.
         tools: (N,) the tool frame.
-        water: (N,) the water, None where there is none.
-        margin: (N,) [m] how far the cup's lip is above it; infinite where there is none.
+        water: (N,) the water, None without water.
+        margin: (N,) height of the cup's lip above the water [m]; infinite without water.
     """
 
     t: FloatArray
@@ -54,46 +55,46 @@ class Trace:
 
 
 class Simulation:
-    """One run, a tick at a time."""
+    """A run of a program, tick by tick."""
 
     def __init__(self, program: Program, session: Session, driver: Driver, rate: float) -> None:
-        """``driver``: of an arm that stands where the program starts. ``rate``: [Hz]."""
+        """Prepare a run at ``rate`` [Hz]; the arm of ``driver`` stands at the program's start."""
         self._program = program
         self._session = session
         self._driver = driver
         self._period = 1.0 / rate
-        self._seen: list[tuple[State, int]] = []
+        self._records: list[tuple[State, int]] = []
         self.run = Run(0.0)
 
     def ticks(self) -> Iterator[float]:
-        """Run it; tells after each tick how much is done, from 0 to 1."""
+        """Run the program; yield the completed fraction after each tick, from 0 to 1."""
         sent = self._driver.start(0.0)
         state = self._session.begin(sent.q, sent.gripper, 0.0)
-        self._seen = [(state, 0)]
+        self._records = [(state, 0)]
         count = len(self._program.tasks)
         while self.run.phase is Phase.RUNNING:
-            t = len(self._seen) * self._period
+            t = len(self._records) * self._period
             if t > MAX_DURATION:
                 raise InputError(f"The program takes more than {MAX_DURATION / 3600.0:g} hours.")
             self.run, commands = runner.step(self._program, self.run, state, state.t)
             state = self._session.step(state, commands, t)
             sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
             state = self._session.observe(state, sent.q, sent.gripper)
-            self._seen.append((state, self.run.number))
+            self._records.append((state, self.run.number))
             fraction = runner.progress(self._program, self.run, state).fraction
             yield min((self.run.number + fraction) / count, 1.0)
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Of every tick so far."""
-        return tuple(state for state, _ in self._seen)
+        """The states of all ticks so far."""
+        return tuple(state for state, _ in self._records)
 
     @property
     def trace(self) -> Trace:
-        """What happened so far."""
+        """The trace of the run so far."""
         states = self.states
-        tasks = [number for _, number in self._seen]
-        places = [self._place(state, number) for state, number in self._seen]
+        tasks = [number for _, number in self._records]
+        places = [self._place(state, number) for state, number in self._records]
         return Trace(
             t=np.array([state.t for state in states]),
             q=np.array([state.setpoint for state in states]),

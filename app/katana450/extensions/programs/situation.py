@@ -1,4 +1,4 @@
-"""The conditions that a program is planned for: a plan may be kept while they are the same."""
+"""The situation that a program is planned for: its plans stay valid while it is unchanged."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from katana450.arm.control.state import State
 from katana450.maths.geometry.arrays import FloatArray
 
 Scene = tuple[tuple[object, ...], ...]
-"""The shape and place of every object; its looks do not matter to a plan."""
+"""Shape and pose of every object; a plan does not depend on their appearance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """Everything of a state that plans depend on.
+    """Everything in a state on which plans depend.
 
     Attributes:
         posture: (n,) the joints [rad].
-        fingers: the finger joint, and where it grips; None with an empty hand [rad].
+        fingers: the finger joint, and the angle at which it grips, None with an empty hand [rad].
         tool: the tool frame.
-        scene: the objects that stand around or are held.
-        water: in the cup [fl]; None where there is none.
+        scene: the scene objects.
+        water: water in the cup [fl]; None without a cup.
     """
 
     posture: FloatArray
@@ -35,7 +35,7 @@ class Situation:
 
     @staticmethod
     def of(state: State) -> Situation:
-        """The situation of an arm at rest in ``state``."""
+        """Return the situation of an arm at rest in ``state``."""
         return Situation(
             state.setpoint,
             (state.gripper_setpoint, state.grip),
@@ -50,9 +50,9 @@ class Situation:
         return self.posture.tobytes(), self.fingers, self.tool, self.scene, self.water
 
     def changed_to(self, now: Situation) -> str:
-        """Return a clause that names the first change that makes a plan invalid, else "".
+        """Return a clause that names the first change that invalidates a plan, else "" for none.
 
-        The arm may stand as far from its posture as a plan may be begun.
+        A difference in posture within the start tolerance of a plan is ignored.
         """
         if float(np.abs(self.posture - now.posture).max()) > START_TOLERANCE:
             return "the arm has moved"

@@ -1,7 +1,7 @@
-"""A script's text as values that know their line: YAML, of which only plain data is understood.
+"""The YAML text of a script as values with their lines; only plain data is supported.
 
 The text is composed into nodes and never constructed: no tag makes an object, nothing is executed.
-Anchors are not understood either, so that a small text stays small.
+Anchors are not supported either, so that a small text stays small.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import yaml
 from katana450.errors import InputError
 
 MAX_BYTES = 64 * 1024
-"""[bytes] Of a script."""
+"""[bytes] Maximum size of a script."""
 
 MAX_DEPTH = 12
-"""Values within values."""
+"""Maximum nesting of values."""
 
 MAX_VALUES = 10_000
+"""Maximum number of YAML events of a text."""
 
 NULL, TEXT = "tag:yaml.org,2002:null", "tag:yaml.org,2002:str"
 WHOLE, REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
@@ -27,7 +28,7 @@ WHOLE, REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 
 @dataclass(frozen=True)
 class Problem:
-    """What is wrong at one place. line, column: from 1."""
+    """A problem at one place of the text; line and column count from 1."""
 
     line: int
     column: int
@@ -38,7 +39,7 @@ class Problem:
 
 
 class ScriptError(InputError):
-    """A script that cannot be run; all that is wrong with it, in the order of its lines."""
+    """A script that cannot be run, with all its problems in the order of their lines."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         self.problems = tuple(sorted(problems, key=lambda each: (each.line, each.column)))
@@ -47,9 +48,14 @@ class ScriptError(InputError):
 
 @dataclass(frozen=True)
 class YamlValue:
-    """One of the text. held: a text, a list, or names with values; None for nothing.
+    """One value of the text.
 
-    number: what a text that is a number says; None of any other.
+    Attributes:
+        line: line of its start, from 1.
+        column: column of its start, from 1.
+        held: a text, a list, or pairs of name and value; None for null.
+        kind: ``text``, ``whole``, ``number``, ``list``, ``mapping``, ``nothing`` or ``other``.
+        number: the number that the text stands for; None if it stands for none.
     """
 
     line: int
@@ -60,47 +66,47 @@ class YamlValue:
 
     @property
     def items(self) -> tuple[YamlValue, ...]:
-        """Of a list."""
+        """The values of a list."""
         assert self.kind == "list"
         return self.held  # type: ignore[return-value]
 
     @property
     def fields(self) -> tuple[tuple[YamlValue, YamlValue], ...]:
-        """Of names with values."""
+        """The pairs of name and value of a mapping."""
         assert self.kind == "mapping"
         return self.held  # type: ignore[return-value]
 
-    def wrong(self, said: str) -> ScriptError:
-        """The error that says so of this place."""
-        return ScriptError((Problem(self.line, self.column, said),))
+    def wrong(self, problem: str) -> ScriptError:
+        """Return the error ``problem`` for the place of this value."""
+        return ScriptError((Problem(self.line, self.column, problem),))
 
     def __str__(self) -> str:
-        return {"nothing": "nothing", "list": "a list", "mapping": "names with values"}.get(
+        return {"nothing": "nothing", "list": "a list", "mapping": "a mapping"}.get(
             self.kind, repr(self.held)
         )
 
 
 def read(text: str, what: str = "script") -> YamlValue:
-    """The one value that `text` is. Raises ScriptError with its place for what it cannot be.
+    """Return ``text`` as one value. Raises ScriptError with the place of an error.
 
-    ``what``: how a person calls it.
+    ``what`` names the text in messages.
     """
     if len(text.encode("utf-8", "replace")) > MAX_BYTES:
         raise ScriptError((Problem(1, 1, f"A {what} has at most {MAX_BYTES // 1024} KB."),))
     try:
-        # Read event by event first: composing recurses, and takes anchors for values.
+        # The events are checked first: composing recurses, and resolves anchors.
         _check_bounds(text, what)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
-        said = error.problem or error.context or "this is not YAML"
-        raise ScriptError((Problem(line, column, f"This cannot be read: {said}."),)) from error
+        problem = error.problem or error.context or "this is not YAML"
+        raise ScriptError((Problem(line, column, f"This cannot be read: {problem}."),)) from error
     except yaml.YAMLError as error:
-        # A character that no text holds.
-        said = str(error).partition("\n")[0]
+        # The text has a character that YAML does not allow.
+        problem = str(error).partition("\n")[0]
         line = text[: getattr(error, "position", 0) or 0].count("\n") + 1
-        raise ScriptError((Problem(line, 1, f"This cannot be read: {said}."),)) from error
+        raise ScriptError((Problem(line, 1, f"This cannot be read: {problem}."),)) from error
     if node is None:
         raise ScriptError((Problem(1, 1, f"The {what} is empty."),))
     return _value(node)
@@ -109,21 +115,21 @@ def read(text: str, what: str = "script") -> YamlValue:
 def _check_bounds(text: str, what: str) -> None:
     depth = 0
     for count, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
-        said = ""
+        problem = ""
         if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
             depth += 1
         elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
             depth -= 1
         if getattr(event, "anchor", None) is not None:
-            said = "Anchors and aliases (& and *) are not understood; say it in full."
+            problem = "Anchors and aliases (& and *) are not supported. Write the value in full."
         elif getattr(event, "tag", None) is not None:
-            said = f"Tags (!) are not understood: a {what} is plain data."
+            problem = f"Tags (!) are not supported: a {what} is plain data."
         elif depth > MAX_DEPTH:
-            said = f"This is more than {MAX_DEPTH} levels deep."
+            problem = f"This is more than {MAX_DEPTH} levels deep."
         elif count > MAX_VALUES:
-            said = f"A {what} holds at most {MAX_VALUES} values."
-        if said:
-            raise ScriptError((Problem(*_place(event.start_mark), said),))
+            problem = f"A {what} holds at most {MAX_VALUES} values."
+        if problem:
+            raise ScriptError((Problem(*_place(event.start_mark), problem),))
 
 
 def _place(mark: Any) -> tuple[int, int]:

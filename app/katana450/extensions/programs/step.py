@@ -1,4 +1,4 @@
-"""What every kind of step can do."""
+"""The protocol of a program step."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from katana450.extensions.programs.source import YamlValue
 
 
 class Step(Protocol):
-    """One of them."""
+    """A program step."""
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """From what stands behind its name. Raises ScriptError."""
+        """Read the step from the value after its name. Raises ScriptError."""
         ...
 
     def build(self, builder: PlanBuilder) -> None:
-        """Note what is to be done, with its plans. Raises InputError where that cannot be."""
+        """Append the step's actions, with their plans. Raises InputError if it is not possible."""
         ...
 
 
 def nothing(value: YamlValue, name: str) -> None:
-    """Refuse anything that stands behind a step that says all by its ``name``."""
+    """Refuse a value after the step ``name``, which takes none. Raises ScriptError."""
     if value.kind != "nothing":
-        raise value.wrong(f"`{name}` says all there is to say; nothing stands behind it.")
+        raise value.wrong(f"`{name}` takes no value. Remove it.")

@@ -1,6 +1,7 @@
-"""The steps a script can have, by their names.
+"""All program steps by name.
 
-Another kind is a class with `read` and `lay` as `Step` has them, in the `STEPS` of its module.
+To add a kind, write a class with `read` and `build` as in `Step`, and list it in `STEPS` of its
+module.
 """
 
 from __future__ import annotations
@@ -25,3 +26,4 @@ STEPS: dict[str, type[Step]] = {
     **pouring.STEPS,
     **set_down.STEPS,
 }
+"""The class of each step by its name in a script."""

@@ -1,4 +1,4 @@
-"""Steps that lay the table: where objects stand, and how much water is in the cup."""
+"""Steps that arrange the table: places of objects, and water in the cup."""
 
 from __future__ import annotations
 
@@ -26,15 +26,17 @@ from katana450.maths.water.units import ML
 
 @dataclass(frozen=True)
 class Fill:
-    """Fill the cup with water [m^3]."""
+    """Fill the cup with ``volume`` [m^3] of water."""
 
     volume: float
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read a volume [ml]. Raises ScriptError."""
         return cls(ML * read.number(0.0, 1000.0, "ml")(value))
 
     def build(self, builder: PlanBuilder) -> None:
+        """Append the filling. Raises InputError if the cup is absent or too small."""
         command = cmd.Fill(self.volume)
         builder.plan_context.session.check(command)
         builder.note("fill", FillCup(self.volume), builder.after(command, ticks=1))
@@ -42,10 +44,10 @@ class Fill:
 
 @dataclass(frozen=True)
 class Put:
-    """Have an object stand elsewhere on the table, x, y [m] in the base frame; nothing carries it.
+    """Place an object at x, y [m] in the base frame on the table; the arm does not carry it.
 
-    Several in a row are one arrangement: what only passes through the old place of something that
-    is itself put elsewhere is in nobody's way.
+    Consecutive steps of this kind form one arrangement: an object may overlap the old place of
+    another that is placed elsewhere by a later one of them.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Put:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {object, x, y} [mm]. Raises ScriptError."""
         fields = Fields(value, "a put")
         found = cls(
             fields.need("object", read.text, ""),
@@ -64,13 +67,14 @@ class Put:
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Append the placement. Raises InputError if the place is occupied."""
         scene_object = builder.scene_object(self.name)
         if scene_object.carried:
             raise InputError(f"{self.name} is in the hand: set it down first.")
         T = se3.from_rotation_translation(scene_object.T[:3, :3], (self.x, self.y, 0.0))
         put = replace(scene_object, T=T)
         check_carried(builder.plan_context.session.environment.table, builder.state.objects, put)
-        # Each of them is looked at when it comes to where it stays.
+        # An object that a later `put` moves is checked at its final place.
         moved = {put.name for put in takewhile(_is_put, builder.ahead) if isinstance(put, Put)}
         for other in builder.state.objects:
             if other.name not in {scene_object.name, *moved} and _overlap(put, other):
@@ -85,7 +89,7 @@ def _is_put(step: object) -> bool:
 
 
 def _overlap(one: SceneObject, other: SceneObject) -> bool:
-    """Whether two objects on the table are in each other, taken for round."""
+    """Return whether two objects on the table overlap, each approximated by a circle."""
     apart = float(np.linalg.norm(one.T[:2, 3] - other.T[:2, 3]))
     return apart < girth(one) + girth(other)
 

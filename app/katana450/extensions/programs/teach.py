@@ -1,4 +1,4 @@
-"""A script out of postures that a person showed."""
+"""Scripts from taught postures."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from katana450.maths.geometry.arrays import FloatArray
 
 DIGITS = 3
-"""Of the degrees that are written: a tenth of what the arm can tell apart."""
+"""Decimal places of written angles [deg]: a tenth of the arm's resolution."""
 
 
 def script_from_postures(name: str, postures: Sequence[FloatArray]) -> str:
-    """The text of a script through `postures` (5,) [rad], one after another."""
+    """Return the text of a script through ``postures``, each (5,) [rad], one after another."""
     steps = "\n".join(
         "  - joints: [" + ", ".join(f"{angle + 0.0:g}" for angle in rounded.tolist()) + "]"
         for rounded in (np.round(np.degrees(q), DIGITS) for q in postures)

@@ -1,4 +1,4 @@
-"""Where a program has the arm at a time: its plans one after another."""
+"""The posture of the arm at a time of a program."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from katana450.maths.planning.plan import Segment
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The motions of a program at full speed, on the clock of `Program.duration`; pauses between
-    them, for the gripper for example, are left out.
+    """The motions of a program at full speed, on the clock of `Program.duration`.
 
-    pieces: in their order, each with the finger joint meanwhile [rad]. begins: [s] when each does,
-    and the last ends.
+    Pauses between the motions, such as for the gripper, are left out.
+
+    Attributes:
+        pieces: segments in their order, each with its finger joint [rad].
+        begins: start times of the segments and the end of the last [s].
     """
 
     pieces: tuple[tuple[Segment, float], ...]
@@ -28,7 +30,7 @@ class Timeline:
 
     @staticmethod
     def of(program: Program) -> Timeline:
-        """The timeline of ``program``."""
+        """Return the timeline of ``program``."""
         plans = [task.order.plan for task in program.tasks if isinstance(task.order, FollowPlan)]
         pieces = tuple((segment, plan.fingers) for plan in plans for segment in plan.segments)
         durations = (segment.scaling.duration for segment, _ in pieces)
@@ -36,18 +38,18 @@ class Timeline:
 
     @property
     def span(self) -> float:
-        """[s] to its end."""
+        """The duration [s]."""
         return self.begins[-1]
 
     def at(self, t: float) -> tuple[FloatArray, float]:
-        """The joints (5,) and the fingers [rad] at ``t`` [s], from 0 to ``span``.
+        """Return the joints (5,) and the fingers [rad] at ``t`` [s], from 0 to ``span``.
 
-        There has to be a motion.
+        The timeline must not be empty.
         """
         number = min(max(bisect_right(self.begins, t) - 1, 0), len(self.pieces) - 1)
         segment, fingers = self.pieces[number]
         return segment.at(segment.scaling.tau_after(t - self.begins[number])).q, fingers
 
     def postures(self, count: int) -> list[tuple[FloatArray, float]]:
-        """``count`` of them evenly in time, from start to end."""
+        """Return ``count`` postures (joints and fingers [rad]), evenly spaced in time."""
         return [self.at(t) for t in np.linspace(0.0, self.span, count).tolist()]

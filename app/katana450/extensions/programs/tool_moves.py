@@ -1,4 +1,4 @@
-"""Steps that lead the tool along a curve: lines, arcs, circles, screws."""
+"""Steps that move the tool along a curve: lines, arcs, circles, screws."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from katana450.maths.planning.pitch import roomiest
 from katana450.maths.planning.tool_path import ToolPath
 
 LEVEL_TOLERANCE = 1e-6
-"""[1] A normal nearer to the vertical has a level circle."""
+"""[1] Maximum horizontal component of the normal of a level circle."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """The tool on a straight line, pitch and roll turning evenly."""
+    """Move the tool on a straight line; pitch and roll change evenly."""
 
     to: FloatArray | None
     by: FloatArray | None
@@ -39,44 +39,48 @@ class Line:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {to, by, pitch, roll}. Raises ScriptError."""
         fields = Fields(value, "a line")
         to = fields.take("to", read.vector(read.millimetres()), None)
         by = fields.take("by", read.vector(read.millimetres(), partly=True), None)
         if to is not None and by is not None:
-            fields.problems += value.wrong("A line goes `to` a point or `by` a way.").problems
+            fields.problems += value.wrong("A line takes `to` or `by`, not both.").problems
         found = cls(to, by, *places.angles(fields), setting.in_base)
         fields.done()
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the line. Raises InputError if the tool cannot follow it."""
         start = builder.at
         end = builder.target_at(
             StepTarget(None, self.to, self.pitch, self.roll, None, self.in_base)
         )
         if self.by is not None:
-            way = builder.direction(self.by, in_base=self.in_base)
-            end = ToolTarget(start.position + way, end.pitch, end.roll)
+            offset = builder.direction(self.by, in_base=self.in_base)
+            end = ToolTarget(start.position + offset, end.pitch, end.roll)
         builder.lead([ToolLine(start, end)], "line")
 
 
 @dataclass(frozen=True)
 class Lines:
-    """The tool on straight lines from place to place without a rest, their corners rounded."""
+    """Move the tool on straight lines through places without a rest, with rounded corners."""
 
     through: tuple[StepTarget, ...]
     blend: float
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {through, blend}. Raises ScriptError."""
         fields = Fields(value, "lines")
         found = cls(*through(fields, setting))
         if any(each.joints is not None or each.branch is not None for each in found.through):
-            said = "Lines lead through points; through postures and branches leads `via`."
-            fields.problems += value.wrong(said).problems
+            problem = "`lines` takes points only. Use `via` for joint angles and branches."
+            fields.problems += value.wrong(problem).problems
         fields.done()
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the lines. Raises InputError if the tool cannot follow them."""
         vias = [builder.at]
         for each in self.through:
             vias.append(builder.target_at(each, vias[-1]))
@@ -86,7 +90,15 @@ class Lines:
 
 @dataclass(frozen=True)
 class ArcGeometry:
-    """What arcs and circles have in common: the axis, and what the tool does meanwhile."""
+    """The common part of arcs and circles: the axis, and the orientation of the tool.
+
+    Attributes:
+        centre: (3,) [m].
+        axis: (3,) unit vector.
+        pitch: [rad], ROOMIEST, or None to keep it.
+        roll: [rad]; None to keep it.
+        in_base: whether centre and axis are in the base frame, not in {S}.
+    """
 
     centre: FloatArray
     axis: FloatArray
@@ -96,7 +108,7 @@ class ArcGeometry:
 
     @classmethod
     def read(cls, fields: Fields, axis: str, setting: ScriptContext) -> Self:
-        """``axis``: what it is called."""
+        """Read centre, axis, pitch and roll. ``axis`` is the name of the axis field."""
         return cls(
             fields.need("centre", read.vector(read.millimetres()), np.zeros(3)),
             fields.need(axis, read.direction, np.eye(3)[0]),
@@ -106,32 +118,32 @@ class ArcGeometry:
         )
 
     def seen(self, builder: PlanBuilder) -> tuple[FloatArray, FloatArray]:
-        """Centre and axis (3,) in {S}."""
+        """Return centre [m] and axis, each (3,), in {S}."""
         centre = builder.point(self.centre, in_base=self.in_base)
         return centre, builder.direction(self.axis, in_base=self.in_base)
 
     def angles(self, now: ToolTarget) -> tuple[float, float]:
-        """Pitch and roll [rad] that it says, or those of ``now``."""
+        """Return pitch and roll [rad], from ``now`` where they are not given."""
         pitch = self.pitch if isinstance(self.pitch, float) else now.pitch
         return pitch, now.roll if self.roll is None else self.roll
 
     def follow(
         self, builder: PlanBuilder, arc: ToolArc, name: str, branch: Branch | None = None
     ) -> None:
-        """Go to where ``arc`` begins, if the arm is not there, and along it."""
+        """Move to the start of ``arc`` if the arm is not there, then along it."""
 
         def path(tried: Branch) -> ToolPath:
             found = roomiest(builder.chain, tried, arc) if self.pitch == places.ROOMIEST else arc
             return ToolPath(builder.chain, found, tried, builder.q)
 
-        way = builder.first(builder.branches(branch), path)
-        builder.move_to(way.start, f"{name}: to its start")
-        builder.follow([way], name)
+        tool_path = builder.first(builder.branches(branch), path)
+        builder.move_to(tool_path.start, f"{name}: to its start")
+        builder.follow([tool_path], name)
 
 
 @dataclass(frozen=True)
 class Arc:
-    """The tool round an axis from where it is, climbing along it or not."""
+    """Move the tool about an axis by ``angle`` [rad] and along it by ``climb`` [m]."""
 
     turn: ArcGeometry
     angle: float
@@ -139,6 +151,7 @@ class Arc:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {centre, axis, angle, climb, pitch, roll}. Raises ScriptError."""
         fields = Fields(value, "an arc")
         found = cls(
             ArcGeometry.read(fields, "axis", setting),
@@ -149,6 +162,7 @@ class Arc:
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the arc. Raises InputError if the tool cannot follow it."""
         start = builder.at
         pitch, roll = self.turn.angles(start)
         profiles = Linear(start.pitch, pitch), Linear(start.roll, roll)
@@ -158,7 +172,7 @@ class Arc:
 
 @dataclass(frozen=True)
 class Circle:
-    """The tool round a circle, from its highest point; it is gone to first."""
+    """Move the tool to the highest point of a circle of ``radius`` [m], and from there round it."""
 
     turn: ArcGeometry
     radius: float
@@ -167,6 +181,7 @@ class Circle:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {centre, normal, radius, turns, pitch, roll, branch}. Raises ScriptError."""
         fields = Fields(value, "a circle")
         found = cls(
             ArcGeometry.read(fields, "normal", setting),
@@ -175,16 +190,17 @@ class Circle:
             places.branch(fields),
         )
         if found.turns == 0.0:
-            fields.problems += value.wrong("A circle of no turns is no way.").problems
+            fields.problems += value.wrong("`turns` must not be 0.").problems
         fields.done()
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the circle. Raises InputError if the tool cannot follow it."""
         centre, normal = self.turn.seen(builder)
         up = builder.direction(np.array((0.0, 0.0, 1.0)), in_base=True)
         out = up - (up @ normal) * normal
         if math.hypot(*out) < LEVEL_TOLERANCE:
-            # A level circle has no highest point: from the one farthest in front.
+            # A level circle has no highest point: start at the point farthest in front.
             ahead = builder.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
             out = ahead - (ahead @ normal) * normal
         start = centre + self.radius / math.hypot(*out) * out
@@ -196,7 +212,7 @@ class Circle:
 
 @dataclass(frozen=True)
 class Screw:
-    """The tool moved as one body round an axis and along it, as five axes can."""
+    """Move the tool as one rigid body about an axis and along it, as far as five axes can."""
 
     point: FloatArray
     axis: FloatArray
@@ -206,6 +222,7 @@ class Screw:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {point, axis, angle, climb}. Raises ScriptError."""
         fields = Fields(value, "a screw")
         found = cls(
             fields.need("point", read.vector(read.millimetres()), np.zeros(3)),
@@ -215,11 +232,12 @@ class Screw:
             setting.in_base,
         )
         if found.angle == 0.0 and found.climb == 0.0:
-            fields.problems += value.wrong("A screw has an `angle`, a `climb` or both.").problems
+            fields.problems += value.wrong("A screw needs an `angle`, a `climb` or both.").problems
         fields.done()
         return found
 
     def build(self, builder: PlanBuilder) -> None:
+        """Plan the screw. Raises InputError if the tool cannot follow it."""
         axis = builder.direction(self.axis, in_base=self.in_base)
         omega = self.angle * axis
         v = np.cross(builder.point(self.point, in_base=self.in_base), omega) + self.climb * axis

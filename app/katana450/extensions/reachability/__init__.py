@@ -1,1 +1,1 @@
-"""Where the tool can be, and how freely it can be turned there."""
+"""Maps of the points that the tool reaches, and of the orientations that it can have there."""

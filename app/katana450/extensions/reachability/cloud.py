@@ -1,4 +1,4 @@
-"""Points the tool reaches, found by forward kinematics of random joint angles."""
+"""Tool points by forward kinematics of random joint angles."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from katana450.maths.geometry.arrays import FloatArray
 
 
 def tool_cloud(reachability: Reachability, count: int, seed: int) -> FloatArray:
-    """(K, 3) tool points in the base frame [m], K <= `count`: those not below the table.
+    """Return up to ``count`` tool points (K, 3) in the base frame [m], those not below the table.
 
-    The joint angles are uniform inside the limits and follow from `seed`; elbow and wrist are kept
-    off the table too.
+    The joint angles are uniform inside the limits and follow from ``seed``. Elbow and wrist must be
+    above the table too.
     """
     chain = reachability.chain
     q = np.random.default_rng(seed).uniform(chain.lower, chain.upper, (count, chain.n))

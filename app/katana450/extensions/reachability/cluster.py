@@ -1,7 +1,7 @@
-"""The chunks of a survey on a Dask cluster, with the result of a single machine to the bit.
+"""Computation of the chunks of a survey on a Dask cluster, with bit-identical results.
 
-The cluster's machines need katana450 installed, in this version and with this numpy: the same
-chunks then go through the same code everywhere, and what comes back is put together in order.
+The machines of the cluster need katana450 in this version and the same numpy. Each chunk then runs
+through the same code everywhere, and the results are joined in order.
 """
 
 from __future__ import annotations
@@ -23,24 +23,25 @@ from katana450.extensions.reachability.grid import IntArray
 from katana450.extensions.reachability.map import Survey
 
 CONNECT_SECONDS = 5.0
-"""For the scheduler to answer, and then for a first worker."""
+"""[s] Timeout for the answer of the scheduler, and again for a first worker."""
 
 CLOSE_SECONDS = 1.0
-"""For the scheduler to take leave."""
+"""[s] Timeout for closing the connection to the scheduler."""
 
 
 class Cluster:
-    """A connection to a scheduler that has workers fit for the task."""
+    """A connection to a scheduler with compatible workers."""
 
     def __init__(self, client: Any, distributed: Any, address: str) -> None:
+        """Use ``client`` of the module ``distributed`` at ``address``."""
         self._client = client
         self._distributed = distributed
         self._address = address
 
     def counts(self, survey: Survey, chunks: list[range]) -> Iterator[tuple[int, IntArray]]:
-        """The number of each chunk and its counts, as they come.
+        """Yield the number of each chunk with its counts, in order of completion.
 
-        Raises ConfigurationError when the cluster cannot finish.
+        Raises ConfigurationError if the cluster cannot finish.
         """
         futures = self._client.map(survey.count, chunks, pure=False)
         numbers = {future: number for number, future in enumerate(futures)}
@@ -48,43 +49,43 @@ class Cluster:
             for future, counts in self._distributed.as_completed(
                 futures, with_results=True, loop=self._client.loop
             ):
-                # What was lost with the scheduler comes as the error that tells so.
+                # A result lost with the scheduler arrives as an exception.
                 if isinstance(counts, BaseException):
                     raise counts
                 yield numbers[future], counts
         except (Exception, CancelledError) as error:
             raise ConfigurationError(
-                f"The cluster at {self._address} could not finish: {_said(error)}. See what its "
-                "scheduler and workers logged."
+                f"The cluster at {self._address} could not finish: {_reason(error)}. See the "
+                "logs of its scheduler and workers."
             ) from error
 
 
 @contextmanager
 def connect_cluster(address: str) -> Iterator[Cluster]:
-    """The cluster whose scheduler is at `address`, such as tcp://10.0.0.1:8786.
+    """Connect to the scheduler at ``address``, such as tcp://10.0.0.1:8786.
 
-    Raises ConfigurationError when the scheduler does not answer, it has no workers, or they have
-    another version of what counts.
+    Raises ConfigurationError if the scheduler does not answer, has no workers, or has workers of
+    another version.
     """
     distributed: Any = import_module("distributed")
-    # What goes wrong is told as one error of ours.
+    # Failures are reported once, as a ConfigurationError.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        # A client that finds nobody takes long to give up, so see first who is there.
+        # A client takes long to give up, so the address is tested first.
         socket.create_connection(
             distributed.comm.get_address_host_port(address), CONNECT_SECONDS
         ).close()
         client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ConfigurationError(
-            f"No Dask scheduler answers at {address!r}: {_said(error)}. Give an address such as "
-            "tcp://10.0.0.1:8786, and see that `dask scheduler` runs there."
+            f"No Dask scheduler answers at {address!r}: {_reason(error)}. Give an address such as "
+            "tcp://10.0.0.1:8786, and check that `dask scheduler` runs there."
         ) from error
     try:
         _check_workers(client, address)
         yield Cluster(client, distributed, address)
     finally:
-        # A scheduler that is gone says no farewell; that is no new error.
+        # A timeout of a lost scheduler is not an error here.
         with suppress(TimeoutError):
             client.close(timeout=CLOSE_SECONDS)
 
@@ -94,26 +95,26 @@ def _check_workers(client: Any, address: str) -> None:
         client.wait_for_workers(1, timeout=CONNECT_SECONDS)
     except TimeoutError:
         raise ConfigurationError(
-            f"The Dask scheduler at {address} has no workers; start one with "
+            f"The Dask scheduler at {address} has no workers. Start one with "
             f"`dask worker {address}`."
         ) from None
     own = _fingerprint()
     for worker, found in client.run(_fingerprint, on_error="return").items():
         if isinstance(found, BaseException):
             raise ConfigurationError(
-                f"The Dask worker {worker} cannot run katana450: {_said(found)}. Install katana450 "
-                "in the worker's environment."
+                f"The Dask worker {worker} cannot run katana450: {_reason(found)}. Install "
+                "katana450 in the worker's environment."
             )
         for what, mine in own.items():
             if found[what] != mine:
                 raise ConfigurationError(
-                    f"The Dask worker {worker} has {what} {found[what]} and this machine {mine}; "
-                    "install the same, else the result would not be the same."
+                    f"The Dask worker {worker} has {what} {found[what]}, but this machine {mine}. "
+                    "Install the same, or the results would differ."
                 )
 
 
 def _fingerprint() -> dict[str, str]:
-    """What the bits of a result depend on."""
+    """Return everything on which the bits of a result depend."""
     return {
         "katana450": version(),
         "numpy": np.__version__,
@@ -121,5 +122,5 @@ def _fingerprint() -> dict[str, str]:
     }
 
 
-def _said(error: BaseException) -> str:
+def _reason(error: BaseException) -> str:
     return str(error).strip().rstrip(".") or type(error).__name__

@@ -1,4 +1,4 @@
-"""The extension ``reachability``: where the tool can be, as a command and in the scene."""
+"""The extension ``reachability``: a command that maps the workspace, and a layer of the scene."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def add_workspace_options(parser: argparse.ArgumentParser) -> None:
-    """Put them into `parser`; lengths are in mm, as a person measures them."""
+    """Add the options of ``katana450 workspace`` to ``parser``; lengths are in mm."""
     parser.add_argument(
         "--table",
         type=float,
@@ -51,7 +51,7 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
         help="random postures for the cloud of tool points (default: %(default)s)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="of the random postures (default: %(default)s)"
+        "--seed", type=int, default=0, help="seed of the random postures (default: %(default)s)"
     )
     parser.add_argument("--out", type=Path, metavar="FILE.npz", help="file for map and cloud")
     parser.add_argument(
@@ -60,7 +60,7 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="spread the work over the Dask cluster of this scheduler, such as tcp://10.0.0.1:8786",
+        help="use the Dask cluster of this scheduler, such as tcp://10.0.0.1:8786",
     )
     add_arm_options(parser)
 
@@ -72,12 +72,12 @@ def _workspace(options: argparse.Namespace) -> int:
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
-    """Add to `katana450 serve` the option that shows a map."""
+    """Add the option for a map to ``katana450 serve``."""
     parser.add_argument(
         "--workspace",
         type=Path,
         metavar="FILE.npz",
-        help="a map written by `katana450 workspace --out`, to be shown in the scene",
+        help="map from `katana450 workspace --out`, shown in the scene",
     )
 
 

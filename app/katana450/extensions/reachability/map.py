@@ -1,4 +1,4 @@
-"""The reachability map: voxels the tool reaches, and how freely it can be turned in each."""
+"""The reachability map: voxels that the tool reaches, with the fraction of orientations in each."""
 
 from __future__ import annotations
 
@@ -15,22 +15,24 @@ from katana450.extensions.reachability.reachability import Reachability
 from katana450.maths.geometry.arrays import FloatArray
 
 POSES = 65536
-"""Poses worked on at a time: some 50 MB, and enough chunks for a progress bar and a cluster."""
+"""Poses per chunk: 50 MB each, and enough chunks for a progress bar and a cluster."""
 
 MAX_MAP_SAMPLES = 1_000_000
-"""Their poses take 170 MB."""
+"""Maximum number of random postures; their poses take 170 MB."""
 
 MAX_SEED = 2**63 - 1
-"""The file of the map keeps it in 64 bits."""
+"""Maximum seed; the file of the map stores it in 64 bits."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReachabilityMap:
-    """What was found, all in the base frame [m].
+    """The result of a survey, in the base frame [m].
 
-    points: (N, 3) centres of the voxels where at least one orientation can be had, in the order of
-    the grid. share: (N,) of how many, above 0 and up to 1. cloud: (K, 3) tool points at random
-    joint angles.
+    Attributes:
+        points: (N, 3) centres of the voxels with at least one orientation, in the order of the
+            grid.
+        fraction: (N,) fraction of orientations in each voxel, above 0 and up to 1.
+        cloud: (K, 3) tool points at random joint angles.
     """
 
     points: FloatArray
@@ -40,10 +42,15 @@ class ReachabilityMap:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """The work of one map, cut into chunks that can be done apart, anywhere and in any order.
+    """The computation of one map, in chunks that are independent and can run in any order.
 
-    voxel: edge [m]. samples: random postures for the cloud. seed: of those. Raises InputError for a
-    voxel that makes no grid, a table that leaves none, another number or seed than 0 to the most.
+    Attributes:
+        reachability: the arm and the tested orientations.
+        voxel: edge of a voxel [m].
+        samples: number of random postures for the cloud.
+        seed: seed of the random postures.
+
+    Raises InputError for an invalid voxel or table, and for samples or seed out of range.
     """
 
     reachability: Reachability
@@ -57,25 +64,25 @@ class Survey:
             ("seed", self.seed, MAX_SEED),
         ):
             if not 0 <= value <= maximum:
-                raise InputError(f"The {name} is {value}; give 0 to {maximum}.")
-        # Asked for now, because it may refuse.
+                raise InputError(f"The {name} is {value}; it must be from 0 to {maximum}.")
+        # Computed now, because it may raise InputError.
         _ = self.grid
 
     @cached_property
     def grid(self) -> VoxelGrid:
-        """The voxels looked at."""
+        """The voxels of the survey."""
         return self.reachability.grid(self.voxel)
 
     def chunks(self) -> list[range]:
-        """What `count` is to be called with."""
+        """Return the chunks, the arguments of ``count``."""
         return self.grid.chunks(max(1, POSES // self.reachability.pitches))
 
     def count(self, chunk: range) -> IntArray:
-        """How many orientations can be had in each voxel of `chunk`."""
+        """Return the number of possible orientations in each voxel of ``chunk``."""
         return self.reachability.count(self.grid.centers(chunk))
 
     def map(self, counts: Iterable[IntArray]) -> ReachabilityMap:
-        """The map from the counts of all chunks in their order."""
+        """Return the map from the counts of all chunks in their order."""
         found = np.concatenate(list(counts))
         reached = np.flatnonzero(found)
         return ReachabilityMap(

@@ -1,4 +1,4 @@
-"""Many poses and postures at once, in the shape the workspace is worked out in."""
+"""Batches of poses and postures in the shapes that the workspace needs."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from katana450.maths.kinematics.chain import Chain
 
 
 def at(chain: Chain, T: FloatArray) -> FloatArray:
-    """(N, 4, 5) joint angles [rad] of every posture for the poses `T` (N, 4, 4) = T_S_tool [m].
+    """Return the joint angles (N, 4, 5) [rad] of all postures for ``T`` (N, 4, 4) = T_S_tool [m].
 
-    Each angle is in the turn that fits the limits. Postures for a pose out of reach only come near.
+    Each angle is in the turn that fits the limits. Postures for a pose out of reach are only near
+    it.
     """
     return inverse_batch(chain, T).q
 
 
 def poses(chain: Chain, q: FloatArray) -> FloatArray:
-    """(N, 4, 4) poses T_S_tool [m] at the joint angles `q` (N, n) [rad]."""
+    """Return the poses T_S_tool (N, 4, 4) [m] at the joint angles ``q`` (N, n) [rad]."""
     return forward_batch(chain, q)

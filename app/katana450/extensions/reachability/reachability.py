@@ -1,15 +1,15 @@
-"""How freely the tool can be turned at a point: the fraction of orientations inside the limits.
+"""The fraction of tool orientations that a 5-axis arm can have at a point.
 
-At a point off axis 1 a 5-axis arm is free to choose two angles of the tool: its pitch, by which the
-roll axis leans in the arm's plane through the point, and its roll about that axis. The fraction is
-that of pitch and roll, each taken all round in equal steps, at which some posture holds the tool
-there with every joint inside its limits and elbow, wrist and tool point not below the table. Bodies
-are not looked at: links may cross each other or the table's edge.
+At a point off axis 1 a 5-axis arm is free in two angles of the tool: its pitch, by which the roll
+axis leans in the arm's plane through the point, and its roll about that axis. Pitch and roll are
+each tried in equal steps over a full turn. The fraction counts the pairs for which a posture holds
+the tool at the point with every joint inside its limits, and elbow, wrist and tool point not below
+the table. Contacts of bodies are not checked: links may cross each other or the table's edge.
 
-All is worked out on the canonical arm (maths/kinematics/arm.py). Where its plane passes beside
-axis 1 there are two planes through a point, one a shoulder; the same pitch and roll in both
-counts once. A tool point beside the roll axis moves as the tool rolls, so each roll is
-looked at by itself.
+Everything is computed on the canonical arm (maths/kinematics/arm.py). If its plane passes beside
+axis 1, there are two planes through a point, one for each shoulder posture; the same pitch and roll
+in both count once. A tool point beside the roll axis moves as the tool rolls, so each roll is
+computed separately.
 """
 
 from __future__ import annotations
@@ -33,17 +33,22 @@ from katana450.maths.kinematics.chain import Chain
 BoolArray = npt.NDArray[np.bool]
 
 MAX_STEPS = 720
-"""Half a degree, finer than the links of the arm are straight."""
+"""Maximum number of steps of a turn: half a degree, finer than the straightness of the links."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reachability:
-    """What is asked of every point.
+    """The test of orientations at points.
 
-    chain: the arm with its tool, in {S}. T_base_shoulder: (4, 4) where {S} stands. table: height z
-    of the table in the base frame [m]. pitches, rolls: in how many steps a turn is cut. Raises
-    InputError for another number of steps than 1 to MOST_STEPS, RobotDescriptionError for an arm
-    whose axis 1 is not upright.
+    Attributes:
+        chain: the arm with its tool, in {S}.
+        T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
+        table: height z of the table in the base frame [m].
+        pitches: number of pitches in a turn.
+        rolls: number of rolls in a turn.
+
+    Raises InputError for a number of steps outside 1 to MAX_STEPS, and RobotDescriptionError for an
+    arm whose axis 1 is not upright.
     """
 
     chain: Chain
@@ -55,7 +60,9 @@ class Reachability:
     def __post_init__(self) -> None:
         for name, steps in (("pitches", self.pitches), ("rolls", self.rolls)):
             if not 1 <= steps <= MAX_STEPS:
-                raise InputError(f"The number of {name} is {steps}; give 1 to {MAX_STEPS}.")
+                raise InputError(
+                    f"The number of {name} is {steps}; it must be from 1 to {MAX_STEPS}."
+                )
         lean = float(np.linalg.norm(self.T_base_canonical[:3, 2] - (0.0, 0.0, 1.0)))
         if lean > tolerances.MAPPED_ARM:
             raise RobotDescriptionError(
@@ -69,26 +76,26 @@ class Reachability:
 
     @property
     def T_base_canonical(self) -> FloatArray:
-        """(4, 4) where the frame {C} of the canonical arm stands in the base frame [m]."""
+        """The pose (4, 4) of the canonical arm's frame {C} in the base frame [m]."""
         return self.T_base_shoulder @ se3.inverse(self._arm.T_C_S)
 
     @property
     def orientations(self) -> int:
-        """How many pairs of pitch and roll are tried at a point."""
+        """The number of pairs of pitch and roll that are tried at a point."""
         return self.pitches * self.rolls
 
     @property
     def reach(self) -> float:
-        """No point farther than this from the origin of {C} can be reached [m]."""
+        """The maximum distance of the tool from the origin of {C} [m]."""
         arm = self._arm
         return math.hypot(abs(arm.a) + arm.l1 + arm.l2 + arm.l3, arm.d) + arm.off_axis
 
     def grid(self, voxel: float) -> VoxelGrid:
-        """The voxels of edge `voxel` [m] that may hold a reachable point."""
+        """Return the voxels of edge ``voxel`` [m] that may have a reachable point."""
         return VoxelGrid.around(self.T_base_canonical[:3, 3], self.reach, voxel, self.table)
 
     def count(self, points: FloatArray) -> IntArray:
-        """(N,) how many orientations can be had at each of `points` (N, 3), base frame [m]."""
+        """Return the number of possible orientations (N,) at ``points`` (N, 3), base frame [m]."""
         T_base_C = self.T_base_canonical
         p = (points - T_base_C[:3, 3]) @ T_base_C[:3, :3]
         within = (points[:, 2] >= self.table) & ((p * p).sum(axis=1) <= self.reach**2)
@@ -97,13 +104,13 @@ class Reachability:
         possible = np.zeros((len(near) * self.pitches, self.rolls), dtype=np.bool)
         beside = self._arm.off_axis > 0.0
         for roll in range(self.rolls if beside else 1):
-            # What a posture can be rolled to: everything, or nothing but the roll it is for.
+            # The rolls that a posture can take: all of them, or only the one that it is for.
             rolls = slice(roll, roll + 1) if beside else slice(None)
             for poses in self.tool_poses(p[near], roll):
                 T = poses.reshape(-1, 4, 4)
                 q = postures.at(self.chain, T)
                 pose, branch = np.nonzero(self._free(q))
-                # The postures for a pose out of reach only come near it.
+                # Postures for a pose out of reach are only near it.
                 exact = _same(postures.poses(self.chain, q[pose, branch]), T[pose])
                 pose, branch = pose[exact], branch[exact]
                 rollable = self._rollable(q[pose, branch, 4])
@@ -116,18 +123,18 @@ class Reachability:
         return counts
 
     def tool_poses(self, p: FloatArray, roll: int = 0) -> Iterator[FloatArray]:
-        """T_S_tool (N, pitches, 4, 4) at the points `p` (N, 3) of {C} [m], at a step of the roll.
+        """Yield T_S_tool (N, pitches, 4, 4) at ``p`` (N, 3) of {C} [m], at a step of the roll.
 
-        Pitch 0 is outward and positive pitch downwards. Once for the arm facing the points and,
-        where that makes another plane, once for the arm with its back to them.
+        Pitch 0 is outward and positive pitch downwards. The first item is for the arm facing the
+        points. If that gives another plane, a second item is for the arm with its back to them.
         """
         arm = self._arm
         phi = np.linspace(0.0, math.tau, self.pitches, endpoint=False)
         angle = roll * math.tau / self.rolls
         rho = np.hypot(p[:, 0], p[:, 1])[:, None]
-        # On axis 1 every bearing will do.
+        # On axis 1 the bearing is arbitrary.
         bearing = np.where(rho == 0.0, 0.0, np.arctan2(p[:, 1], p[:, 0])[:, None])
-        # From {K} to the tool point: (1 or pitches,) outward, sideways and up.
+        # Offset from {K} to the tool point: (1 or pitches,) outward, sideways and up.
         pitches = phi.tolist() if arm.off_axis else [0.0]
         out, side, up = np.transpose([arm.beside(pitch, angle) for pitch in pitches])
         T_S_C, roll_K = se3.inverse(arm.T_C_S), np.eye(4)
@@ -142,7 +149,7 @@ class Reachability:
             yield T_S_C @ T_C_K @ roll_K @ arm.T_K_tool
 
     def _rollable(self, theta5: FloatArray) -> BoolArray:
-        """(N, rolls) whether axis 5 can add each roll to its angle `theta5` (N,) [rad]."""
+        """Return (N, rolls) whether axis 5 can add each roll to its angle ``theta5`` (N,) [rad]."""
         lower, upper = self.chain.lower[4], self.chain.upper[4]
         slack = tolerances.LIMIT_SLACK
         rolls = np.arange(self.rolls) * (math.tau / self.rolls) * self._arm.signs[4]
@@ -151,14 +158,14 @@ class Reachability:
         return fits
 
     def _free(self, q: FloatArray) -> BoolArray:
-        """(N, B) whether axes 1 to 4 are inside their limits and the arm is clear of the table."""
+        """Return (N, B) whether axes 1 to 4 are within limits, and the arm above the table."""
         slack = tolerances.LIMIT_SLACK
         lower, upper = self.chain.lower[:4] - slack, self.chain.upper[:4] + slack
         inside = ((q[..., :4] >= lower) & (q[..., :4] <= upper)).all(axis=-1)
         return np.asarray(inside & self.clear(q))
 
     def clear(self, q: FloatArray) -> BoolArray:
-        """(...) whether elbow and wrist are not below the table at angles `q` (..., 5) [rad]."""
+        """Return (...) whether elbow and wrist are not below the table at ``q`` (..., 5) [rad]."""
         arm = self._arm
         alpha = arm.canonical(q)
         elbow = self.T_base_canonical[2, 3] - arm.l1 * np.sin(alpha[..., 1])
@@ -166,15 +173,15 @@ class Reachability:
         return np.asarray(np.minimum(elbow, wrist) >= self.table)
 
     def in_base(self, p: FloatArray) -> FloatArray:
-        """(N, 3) points `p` (N, 3) of {S} in the base frame [m]."""
+        """Return points ``p`` (N, 3) of {S} in the base frame, (N, 3) [m]."""
         return p @ self.T_base_shoulder[:3, :3].T + self.T_base_shoulder[:3, 3]
 
 
 def _roll_frames(p: FloatArray, c: FloatArray, s: FloatArray, phi: FloatArray) -> FloatArray:
-    """T_C_K (N, pitches, 4, 4) at `p` (N, 1 or pitches, 3), unrolled and pitched by `phi`.
+    """Return T_C_K (N, pitches, 4, 4) at ``p`` (N, 1 or pitches, 3), pitched by ``phi``, unrolled.
 
-    c, s: (N, 1 or pitches) cosine and sine of the bearing that is outward. From the back of the
-    arm's plane that is against its own u.
+    ``c`` and ``s`` (N, 1 or pitches) are cosine and sine of the outward bearing. Seen from the back
+    of the arm's plane, this is opposite to its own u.
     """
     cp, sp = np.cos(phi), np.sin(phi)
     T = np.zeros((len(p), len(phi), 4, 4))
@@ -187,7 +194,7 @@ def _roll_frames(p: FloatArray, c: FloatArray, s: FloatArray, phi: FloatArray) -
 
 
 def _same(Ta: FloatArray, Tb: FloatArray) -> BoolArray:
-    """(N,) whether poses (N, 4, 4) agree, entry by entry."""
+    """Return (N,) whether poses (N, 4, 4) agree, entry by entry."""
     gap = np.abs(Ta - Tb)
     in_place = gap[:, :3, 3].max(axis=1) <= tolerances.SAME_POSITION
     return np.asarray(in_place & (gap[:, :3, :3].max(axis=(1, 2)) <= tolerances.SAME_ROTATION))

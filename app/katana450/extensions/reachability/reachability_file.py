@@ -1,15 +1,15 @@
-"""A reachability map as .npz, to be read again, and as .ply, for programs that show points.
+"""Files of a reachability map: .npz to be read again, and .ply for programs that show points.
 
 Keys of the .npz, lengths in m, angles in rad, points in the base frame:
 
     format           "katana450 reachability 1"
-    points (N, 3)    centres of the voxels the tool reaches
-    share (N,)       of orientations it can have there, above 0 and up to 1
+    points (N, 3)    centres of the voxels that the tool reaches
+    fraction (N,)    fraction of orientations there, above 0 and up to 1
     cloud (K, 3)     tool points at random joint angles
     voxel, table     edge of a voxel; height of the table
-    pitches, rolls   in how many steps a turn was cut
+    pitches, rolls   number of steps in a turn
     robot, tool      name of the arm and of its tool frame
-    seed             of the cloud
+    seed             seed of the cloud
 """
 
 from __future__ import annotations
@@ -29,16 +29,21 @@ from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 FORMAT = "katana450 reachability 1"
+"""Value of the key `format`."""
 ZIP = b"PK"
-"""What an .npz, being a .zip, begins with."""
+"""First bytes of an .npz, which is a .zip."""
 
 
 @dataclass(frozen=True, eq=False)
 class StoredMap:
-    """A map as it was read.
+    """A map from a file.
 
-    points: (N, 3) centres of voxels of edge `voxel` in the base frame [m]. share: (N,) of the
-    orientations, above 0 and up to 1. robot, tool: which arm and which of its tools it is of.
+    Attributes:
+        points: (N, 3) centres of voxels in the base frame [m].
+        fraction: (N,) fraction of orientations, above 0 and up to 1.
+        voxel: edge of a voxel [m].
+        robot: name of the arm.
+        tool: name of the tool frame.
     """
 
     points: FloatArray
@@ -51,7 +56,7 @@ class StoredMap:
 def write_npz(
     file: BinaryIO, survey: Survey, found: ReachabilityMap, robot: str, tool: str
 ) -> None:
-    """Write everything; the same map gives the same bytes."""
+    """Write the map; the same map gives the same bytes."""
     reachability = survey.reachability
     np.savez_compressed(
         file,
@@ -71,16 +76,16 @@ def write_npz(
 
 
 def load_map(path: str | os.PathLike[str]) -> StoredMap:
-    """The map in an .npz file, its arrays read-only.
+    """Return the map in an .npz file, with read-only arrays.
 
-    Raises InputError for a file that is missing, no such map or broken.
+    Raises InputError for a file that is missing, corrupt, or not a map.
     """
     name = Path(path)
     try:
         with name.open("rb") as file:
-            # Else numpy takes it for a pickle, and advises to trust it.
+            # Otherwise numpy takes the file for a pickle, and advises to trust it.
             if file.read(len(ZIP)) != ZIP:
-                raise ValueError("it is no .npz file")
+                raise ValueError("it is not an .npz file")
             file.seek(0)
             arrays = np.load(file, allow_pickle=False)
             if str(arrays["format"]) != FORMAT:
@@ -90,11 +95,13 @@ def load_map(path: str | os.PathLike[str]) -> StoredMap:
     except OSError as error:
         raise InputError(f"{name} cannot be read: {error.strerror or error}.") from error
     except Exception as error:
-        raise InputError(f"{name} is no reachability map, or is broken: {error}.") from error
+        raise InputError(f"{name} is corrupt or not a reachability map: {error}.") from error
     if not (isinstance(voxel, float) and isinstance(robot, str) and isinstance(tool, str)):
-        raise InputError(f"'voxel' of {name} must be a number, 'robot' and 'tool' must be names.")
+        raise InputError(
+            f"In {name}, 'voxel' must be a number, and 'robot' and 'tool' must be names."
+        )
     if not 0.0 < voxel < math.inf:
-        raise InputError(f"The voxels of {name} have an edge of {voxel} m, which is none.")
+        raise InputError(f"In {name}, 'voxel' is {voxel} m; it must be above 0 and finite.")
     return StoredMap(*_checked(name, points, fraction), voxel, robot, tool)
 
 
@@ -112,7 +119,7 @@ def _checked(
 
 
 def write_ply(file: BinaryIO, found: ReachabilityMap) -> None:
-    """The voxel centres as binary .ply: x, y, z [m], colour, and the fraction as a property."""
+    """Write the voxel centres as binary .ply: x, y, z [m], colour, and the fraction."""
     header = (
         "ply\nformat binary_little_endian 1.0\n"
         "comment Katana450 reachability: metres in the base frame, fraction of orientations\n"

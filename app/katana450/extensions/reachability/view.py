@@ -1,4 +1,4 @@
-"""The reachability map in the scene: voxels as points, cut open so that one sees inside."""
+"""The reachability map in the scene: voxels as points, with a choice of cuts."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from katana450.extensions.reachability.colors import share_colors
 from katana450.extensions.reachability.reachability_file import StoredMap, load_map
 
 FILL = 0.2
-"""Radius of a point to the edge of its voxel: the arm is seen between them."""
+"""Ratio of a point's radius to its voxel's edge; the arm is visible between the points."""
 
 STOPS = 9
-"""Colours of the scale; a browser draws those between them."""
+"""Number of colours of the scale; the browser interpolates between them."""
 
 
 class Cut(Enum):
@@ -32,26 +32,28 @@ class Cut(Enum):
 
 
 class ReachabilityLayer:
-    """A stored map as a layer of the scene, hidden until a person chooses a cut of it."""
+    """A stored map as a layer of the scene, hidden until a person chooses a cut."""
 
     def __init__(self, path: Path) -> None:
+        """Show the map of the file ``path``, which is read by `attach`."""
         self._path = path
 
     @property
     def what(self) -> str:
-        """A sentence that says what needs an arm."""
-        return f"{self._path} maps where a tool can be."
+        """The sentence that states why an arm is needed."""
+        return f"{self._path} is a map of the points that a tool reaches."
 
     def attach(self, server: viser.ViserServer, robot: Robot) -> None:
         """Read the map and prepare to draw it in the scene of ``robot``.
 
-        Raises InputError if the file is no map, ConfigurationError if it is that of another arm.
+        Raises InputError if the file is not a map, and ConfigurationError if it is the map of
+        another arm.
         """
         stored = load_map(self._path)
         if stored.robot != robot.name:
             raise ConfigurationError(
-                f"The map given with --workspace is of the arm {stored.robot!r}; this one is "
-                f"{robot.name!r}. Make one with: katana450 workspace --urdf ... --out map.npz"
+                f"The map given with --workspace is of the arm {stored.robot!r}; this arm is "
+                f"{robot.name!r}. Make a map with: katana450 workspace --urdf ... --out map.npz"
             )
         middle = float(robot.require_arm().T_base_shoulder[1, 3])
         self._cloud = ReachabilityCloud(server, stored, middle)
@@ -62,7 +64,7 @@ class ReachabilityLayer:
             "Reachability",
             tuple(cut.value for cut in Cut),
             initial_value=Cut.HIDDEN.value,
-            hint="Where the tool can be: the map given with --workspace",
+            hint="Points that the tool reaches, from the map given with --workspace",
         )
         legend = gui.add_html(self._cloud.legend, visible=False)
 
@@ -77,7 +79,7 @@ class ReachabilityCloud:
     """The voxels of a map as points in the scene."""
 
     def __init__(self, server: viser.ViserServer, stored: StoredMap, middle: float) -> None:
-        """``middle``: y of axis 1 in the base frame [m], where the map is cut."""
+        """Prepare to draw ``stored``; ``middle`` is y [m] of axis 1 in the base frame."""
         self._server = server
         self._stored = stored
         self._middle = middle
@@ -86,7 +88,7 @@ class ReachabilityCloud:
 
     @property
     def legend(self) -> str:
-        """What the colours mean, as HTML: a scale, and its ends in words."""
+        """The legend as HTML: a colour scale, with labels at its ends."""
         top = self._stored.fraction.max(initial=0.0)
         stops = ", ".join(
             f"rgb({red}, {green}, {blue})"
@@ -109,7 +111,7 @@ class ReachabilityCloud:
         across = self._stored.points[:, 1] - self._middle
         edge = self._stored.voxel
         shown = {
-            # Of the two layers beside the plane one is the slice.
+            # The slice is one of the two layers beside the plane.
             Cut.SLICE: np.floor(across / edge) == 0.0,
             Cut.HALF: across >= 0.0,
             Cut.WHOLE: np.ones(len(across), dtype=bool),

@@ -1,4 +1,4 @@
-"""``katana450 workspace``: where the tool can be, and how freely it can be turned there."""
+"""``katana450 workspace``: map the points that the tool reaches, and its orientations there."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from katana450.extensions.reachability.reachability_file import write_npz, write
 
 
 def workspace(options: argparse.Namespace) -> int:
-    """Map the workspace, write the files asked for, print what was found."""
+    """Map the workspace, write the requested files, print a summary. Raises InputError."""
     _check_files(options.out, options.ply)
     robot = load(options.urdf, options.tool)
     arm = robot.require_arm()
@@ -59,7 +59,7 @@ def _check_files(out: Path | None, ply: Path | None) -> None:
 
 
 def _counts(survey: Survey, scheduler: str | None) -> list[IntArray]:
-    """The counts of all chunks in their order, worked out here or on a cluster."""
+    """Return the counts of all chunks in their order, computed here or on a cluster."""
     chunks = survey.chunks()
     with ExitStack() as stack:
         arriving: Iterator[tuple[int, IntArray]]
@@ -74,7 +74,7 @@ def _counts(survey: Survey, scheduler: str | None) -> list[IntArray]:
 def _summary(survey: Survey, found: ReachabilityMap, tool: str) -> str:
     reachability = survey.reachability
     if not len(found.points):
-        return f"The tool {tool} reaches no voxel; choose smaller voxels or a lower table."
+        return f"The tool {tool} reaches no voxel. Choose smaller voxels or a lower table."
     litres = 1e3 * len(found.points) * survey.voxel**3
     low, high = (1e3 * edge(found.points, axis=0) for edge in (np.min, np.max))
     extent = ", ".join(
@@ -86,7 +86,6 @@ def _summary(survey: Survey, found: ReachabilityMap, tool: str) -> str:
         f"The tool {tool} reaches {len(found.points)} voxels of {1e3 * survey.voxel:g} mm, "
         f"{litres:.1f} litres above the table at {1e3 * reachability.table:g} mm:\n"
         f"{extent} mm in the base frame.\n"
-        f"Of {reachability.orientations} orientations {found.fraction.mean():.1%} on average, up "
-        f"to "
-        f"{found.fraction.max():.1%} at {where} mm."
+        f"Of {reachability.orientations} orientations {found.fraction.mean():.1%} on average, "
+        f"up to {found.fraction.max():.1%} at {where} mm."
     )

@@ -1,1 +1,1 @@
-"""Scenes: what stands around the arm, as a text that people read and write."""
+"""Scenes as YAML texts that people read and write."""

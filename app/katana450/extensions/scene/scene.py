@@ -1,4 +1,4 @@
-"""A scene as a value, and what its text leaves to be read elsewhere."""
+"""A scene as a value, and the draft of a scene before its meshes are read."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from katana450.maths.geometry.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What stands around or is fixed to the hand, the water, and where the arm stood.
+    """The scene objects, the water, and the posture of the arm.
 
     Attributes:
-        objects: with nothing held.
-        water: in the cup [m^3]; None for no water anywhere.
-        joints: (n,) [rad]; None where nobody says.
+        objects: the objects, none of them held.
+        water: in the cup [m^3]; None for no water.
+        joints: (n,) [rad]; None if not given.
     """
 
     objects: tuple[SceneObject, ...]
@@ -29,10 +29,13 @@ class Scene:
 
 @dataclass(frozen=True)
 class MeshFile:
-    """A file beside the scene: its relative path, how it is read, and what it has to be.
+    """A mesh file of a scene.
 
-    unit, up: as `read_mesh` of exchange has them, None to guess. sha256: of its bytes, None
-    where anything will do.
+    Attributes:
+        path: path relative to the scene.
+        unit: as in `read_mesh`, None to guess.
+        up: as in `read_mesh`, None for the default of the format.
+        sha256: hash of its bytes; None to accept any content.
     """
 
     path: str
@@ -43,7 +46,7 @@ class MeshFile:
 
 @dataclass(frozen=True, eq=False)
 class SceneEntry:
-    """One object of a text, whose mesh is still in its file. ``at``: where it is in the text."""
+    """An object of a text, whose mesh is not read yet. ``at`` is its place in the text."""
 
     at: YamlValue
     name: str
@@ -59,23 +62,25 @@ class SceneEntry:
 
 @dataclass(frozen=True, eq=False)
 class SceneDraft:
-    """A text that is understood. Poses of what is fixed are in the frame of the tool."""
+    """A parsed text. Poses of fixed objects are in the frame of the tool."""
 
     entries: tuple[SceneEntry, ...]
     water: float | None
     joints: FloatArray | None
 
     def scene(self, solids: Mapping[MeshFile, Solid], T_palm_tool: FloatArray | None) -> Scene:
-        """With its meshes read. ``T_palm_tool``: of the hand; None where there is none.
+        """Return the scene with its meshes. ``T_palm_tool``: see ``Hand``; None without a hand.
 
-        Raises ScriptError with the places of all that cannot be.
+        Raises ScriptError with the places of all errors.
         """
         objects: list[SceneObject] = []
         problems: list[Problem] = []
         for entry in self.entries:
             try:
                 if entry.fixed and T_palm_tool is None:
-                    raise InputError("This arm's contacts are not looked at: it has no hand.")
+                    raise InputError(
+                        "Nothing can be attached to the hand: this arm has no model of a hand."
+                    )
                 objects.append(
                     SceneObject(
                         entry.name,

@@ -1,4 +1,4 @@
-"""A scene as YAML: lengths in mm, angles in degrees, poses in the frame of the base."""
+"""A scene as YAML: lengths in mm, angles in degrees, poses in the base frame."""
 
 from __future__ import annotations
 
@@ -26,30 +26,33 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import ML
 
 VERSION = 1
+"""Version of the format."""
 
 LENGTH_DIGITS, ANGLE_DIGITS = 6, 9
-"""Of a number in mm, and in degrees: to a millionth of a millimetre, a reader sees whole ones."""
+"""Decimal places of written numbers [mm], [deg]: a millionth of a millimetre."""
 
 HEAD = """\
 # A scene of katana450. Lengths are in mm and angles in degrees. A pose is x, y, z, roll, pitch, yaw
 # in the frame of the base, or in that of the tool for what is attached to the hand.
 """
+"""Comment at the start of a written scene."""
 
 UNITS = ("mm", "cm", "in", "m")
-"""Of a mesh, those that programs write."""
+"""Units of a mesh file."""
 
 COLOUR = re.compile(r"#[0-9a-f]{6}")
+"""Pattern of a colour, in lower case."""
 
 MAX_WRITTEN_SIZE = 4000.0
-"""[mm] Of a size as it is written."""
+"""[mm] Maximum size in a text."""
 
 
 def parsed(source: str) -> SceneDraft:
-    """What a text says. Raises ScriptError with all that is wrong, line by line."""
+    """Return a text as a draft. Raises ScriptError with all errors, line by line."""
     fields = Fields(read(source, "scene"), "a scene")
     version = fields.need("scene", number(1, 1000), VERSION)
     if version != VERSION:
-        raise fields.value.wrong(f"A scene of version {VERSION} is understood, not {version:g}.")
+        raise fields.value.wrong(f"The version must be {VERSION}, not {version:g}.")
     joints = fields.take("joints", listed(read_degrees(), 1, 16), None)
     water = fields.take("water", number(0.0, 10_000.0, "ml"), None)
     entries = fields.take("objects", listed(_entry, 0, MAX_OBJECTS), ())
@@ -63,24 +66,28 @@ def parsed(source: str) -> SceneDraft:
 
 
 def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray | None) -> str:
-    """The text of a scene. ``files``: of its meshes, by their keys."""
-    told: dict[str, object] = {"scene": VERSION}
+    """Return the text of a scene. ``files`` are the files of its meshes by their keys."""
+    entry: dict[str, object] = {"scene": VERSION}
     if scene.joints is not None:
-        told["joints"] = [_round(each, ANGLE_DIGITS) for each in np.degrees(scene.joints)]
+        entry["joints"] = [_round(each, ANGLE_DIGITS) for each in np.degrees(scene.joints)]
     if scene.water is not None:
-        told["water"] = _round(scene.water / ML, LENGTH_DIGITS)
-    told["objects"] = [_told(scene_object, files, T_palm_tool) for scene_object in scene.objects]
-    said: str = yaml.dump(told, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
-    return HEAD + said
+        entry["water"] = _round(scene.water / ML, LENGTH_DIGITS)
+    entry["objects"] = [
+        _object_entry(scene_object, files, T_palm_tool) for scene_object in scene.objects
+    ]
+    body: str = yaml.dump(entry, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+    return HEAD + body
 
 
 class _Dumper(yaml.SafeDumper):  # type: ignore[misc]  # PyYAML has no types
-    """Numbers side by side, all else a line each."""
+    """A YAML dumper that writes lists of numbers on one line."""
 
     def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002
+        """Return True, so that repeated values are written in full."""
         return True
 
     def represent_list(self, data: list[object]) -> yaml.Node:
+        """Return the node of a list; a list of numbers is on one line."""
         plain = all(isinstance(each, int | float) for each in data)
         return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=plain)
 
@@ -88,20 +95,20 @@ class _Dumper(yaml.SafeDumper):  # type: ignore[misc]  # PyYAML has no types
 _Dumper.add_representer(list, _Dumper.represent_list)
 
 
-def _told(
+def _object_entry(
     scene_object: SceneObject, files: Mapping[str, MeshFile], T_palm_tool: FloatArray | None
 ) -> dict[str, object]:
-    told: dict[str, object] = {"name": scene_object.name, "shape": scene_object.shape.value}
+    entry: dict[str, object] = {"name": scene_object.name, "shape": scene_object.shape.value}
     T = scene_object.T
     if scene_object.fixed and T_palm_tool is not None:
         T = se3.inverse(T_palm_tool) @ T
     if scene_object.solid is None:
-        told["size"] = [_round(1e3 * each, LENGTH_DIGITS) for each in scene_object.size]
+        entry["size"] = [_round(1e3 * each, LENGTH_DIGITS) for each in scene_object.size]
     else:
         file = files[scene_object.solid.key]
-        said = {"file": file.path, "unit": file.unit, "up": file.up, "sha256": file.sha256}
-        told["mesh"] = {name: each for name, each in said.items() if each is not None}
-    told["pose"] = [
+        values = {"file": file.path, "unit": file.unit, "up": file.up, "sha256": file.sha256}
+        entry["mesh"] = {name: each for name, each in values.items() if each is not None}
+    entry["pose"] = [
         *(_round(1e3 * each, LENGTH_DIGITS) for each in T[:3, 3]),
         *(_round(each, ANGLE_DIGITS) for each in np.degrees(so3.to_rpy(T[:3, :3]))),
     ]
@@ -109,20 +116,20 @@ def _told(
         float(f"{each:.12g}") for each in (scene_object.scale, scene_object.appearance.opacity)
     )
     if scale != 1.0:
-        told["scale"] = scale
+        entry["scale"] = scale
     if scene_object.appearance.colour is not None:
-        told["colour"] = "#{:02x}{:02x}{:02x}".format(*scene_object.appearance.colour)
+        entry["colour"] = "#{:02x}{:02x}{:02x}".format(*scene_object.appearance.colour)
     if opacity != 1.0:
-        told["opacity"] = opacity
+        entry["opacity"] = opacity
     for name, true in (
         ("hidden", scene_object.appearance.hidden),
         ("can_be_held", scene_object.can_be_held),
     ):
         if true:
-            told[name] = True
+            entry[name] = True
     if scene_object.fixed:
-        told["attach"] = "hand"
-    return told
+        entry["attach"] = "hand"
+    return entry
 
 
 def _round(value: float, digits: int) -> int | float:
@@ -132,23 +139,23 @@ def _round(value: float, digits: int) -> int | float:
 
 def _entry(value: YamlValue) -> SceneEntry:
     fields = Fields(value, "an object")
-    told = fields.need("shape", choice(*(each.value for each in Shape)), "")
-    form = Shape(told) if told else Shape.BOX
+    shape_name = fields.need("shape", choice(*(each.value for each in Shape)), "")
+    shape = Shape(shape_name) if shape_name else Shape.BOX
     size: tuple[float, ...] = ()
     mesh = None
-    if not told:
-        # Which of the two it should have nobody knows.
+    if not shape_name:
+        # Without a shape, `size` and `mesh` are both accepted.
         fields.has("size")
         fields.has("mesh")
-    elif form is Shape.MESH:
+    elif shape is Shape.MESH:
         mesh = fields.need("mesh", _mesh, None)
     else:
-        count = form.numbers
+        count = shape.numbers
         size = fields.need("size", listed(millimetres(0.0, MAX_WRITTEN_SIZE), count, count), ())
     found = SceneEntry(
         value,
         fields.need("name", text, ""),
-        form,
+        shape,
         size,
         fields.need("pose", _pose, np.eye(4)),
         fields.take("can_be_held", _true, False),
@@ -178,10 +185,10 @@ def _mesh(value: YamlValue) -> MeshFile:
 
 
 def _pose(value: YamlValue) -> FloatArray:
-    """(4, 4) of six numbers."""
+    """Return the pose (4, 4) [m] of six numbers."""
     if value.kind != "list" or len(value.items) != 6:
-        raise value.wrong("A pose is six numbers: x, y, z in mm, roll, pitch, yaw in degrees.")
-    # In the frame of the tool a place that is near enough may have larger numbers.
+        raise value.wrong("A pose must be six numbers: x, y, z in mm, roll, pitch, yaw in degrees.")
+    # In the frame of the tool, coordinates of a valid place can be larger.
     farthest = 2e3 * MAX_COORDINATE
     lengths = [millimetres(-farthest, farthest)(each) for each in value.items[:3]]
     angles = [read_degrees()(each) for each in value.items[3:]]
@@ -189,24 +196,24 @@ def _pose(value: YamlValue) -> FloatArray:
 
 
 def _colour(value: YamlValue) -> Colour:
-    said = str(value.held).lower()
-    if not COLOUR.fullmatch(said):
-        raise value.wrong(f'A colour is as "#94a3b8", in quotes, not {value}.')
-    red, green, blue = bytes.fromhex(said[1:])
+    word = str(value.held).lower()
+    if not COLOUR.fullmatch(word):
+        raise value.wrong(f'A colour must be like "#94a3b8", in quotes, not {value}.')
+    red, green, blue = bytes.fromhex(word[1:])
     return red, green, blue
 
 
 def _digest(value: YamlValue) -> str:
     if not re.fullmatch(r"[0-9a-f]{64}", str(value.held)):
-        raise value.wrong("A SHA-256 has 64 digits from 0 to f.")
+        raise value.wrong("A SHA-256 must have 64 digits from 0 to f.")
     return str(value.held)
 
 
 def _true(value: YamlValue) -> bool:
-    said = str(value.held).lower()
-    if said not in ("true", "false", "yes", "no"):
-        raise value.wrong(f"true or false goes here, not {value}.")
-    return said in ("true", "yes")
+    word = str(value.held).lower()
+    if word not in ("true", "false", "yes", "no"):
+        raise value.wrong(f"Expected true or false, not {value}.")
+    return word in ("true", "yes")
 
 
 def _twice(entries: tuple[SceneEntry, ...]) -> list[Problem]:

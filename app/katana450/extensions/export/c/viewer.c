@@ -5,13 +5,13 @@
  *
  *   --pose        values of the joints at the start, rad or m
  *   --follow      show the arm of `katana450 serve --lines PORT` of this machine
- *   --screenshot  draw one picture, write it and end; with --follow that of the first state
- *   --frames      draw so many pictures as fast as can be, print how many a second, and end
+ *   --screenshot  write one picture and exit; with --follow, the picture of the first state
+ *   --frames      draw COUNT pictures at maximum speed, print the frame rate and exit
  *
- * Keys: 1 to 9 choose a joint, + and - or the arrows left and right turn it, 0 puts all back to
- * where they started, c the camera, p writes the picture viewer.ppm, Esc ends. Mouse: drag left to
- * turn the view, with Shift held to turn the chosen joint, drag right or roll the wheel to come
- * nearer.
+ * Keys: 1 to 9 select a joint; +, - and the arrows left and right move it; 0 resets all joints,
+ * c resets the camera, p writes the picture viewer.ppm, Esc exits. Mouse: drag with the left button
+ * to rotate the view, with Shift to move the selected joint; drag with the right button or turn
+ * the wheel to zoom.
  */
 #define _POSIX_C_SOURCE 200112L
 
@@ -35,9 +35,9 @@
 static const double PI = 3.14159265358979323846;
 
 enum {
-    LINE = 65536,      /* bytes of a state at most */
-    AGAIN = 1000,      /* ms until a lost server is looked for again */
-    FIRST_STATE = 5000 /* ms that a screenshot waits for one */
+    LINE = 65536,      /* maximum bytes of a state */
+    AGAIN = 1000,      /* ms between attempts to connect */
+    FIRST_STATE = 5000 /* ms, timeout of a screenshot */
 };
 
 static double q[ROBOT_JOINTS + 1];
@@ -50,7 +50,7 @@ static int held = -1, held_with_shift, last_x, last_y;
 
 static const char *screenshot;
 static int frames;
-static int wanted; /* a picture, by a key */
+static int wanted; /* a key has requested a picture */
 
 static int port;
 static int link_socket = -1;
@@ -109,14 +109,14 @@ static void write_words(void)
     }
     if (port > 0) {
         snprintf(text, sizeof text, "%s port %d",
-                 link_socket >= 0 && states > 0 ? "follows" : "no server at", port);
+                 link_socket >= 0 && states > 0 ? "following" : "no server at", port);
         write_text(12, 12, text);
     }
     glEnable(GL_DEPTH_TEST);
     glEnable(GL_LIGHTING);
 }
 
-/* All but the words. */
+/* Everything except the texts. */
 static void draw(void)
 {
     static const float ahead[4] = {0.0f, 0.0f, 1.0f, 0.0f}, above[4] = {0.3f, -0.4f, 1.0f, 0.0f};
@@ -142,7 +142,7 @@ static void draw(void)
     robot_draw(q);
 }
 
-/* What was drawn and not shown yet. */
+/* Reads the back buffer. */
 static int write_picture(const char *name)
 {
     size_t row = 3 * (size_t)width;
@@ -201,7 +201,7 @@ static void display(void)
     glutSwapBuffers();
 }
 
-/* The server: JSON, an object a line --------------------------------------- */
+/* The server: JSON, one object per line --------------------------------------- */
 
 /* The text behind "key": or NULL. Keys of the server's states have no escapes. */
 static const char *behind(const char *line, const char *key)
@@ -314,7 +314,7 @@ static void tick(int unused)
 {
     follow();
     if (screenshot != NULL && states == 0 && glutGet(GLUT_ELAPSED_TIME) > FIRST_STATE) {
-        fprintf(stderr, "viewer: nothing is told at port %d.\n", port);
+        fprintf(stderr, "viewer: no server answers at port %d.\n", port);
         exit(EXIT_FAILURE);
     }
     glutTimerFunc(15, tick, unused);
@@ -396,7 +396,7 @@ static void resize(int w, int h)
 
 static void refuse(const char *what)
 {
-    fprintf(stderr, "viewer: %s; the words it understands are at the top of viewer.c.\n", what);
+    fprintf(stderr, "viewer: %s. The options are described at the top of viewer.c.\n", what);
     exit(2);
 }
 
@@ -407,11 +407,11 @@ static void read_pose(const char *text)
     for (k = 0; *text != '\0'; k++) {
         double value = strtod(text, &end);
         if (end == text || (*end != ',' && *end != '\0'))
-            refuse("--pose wants numbers with commas between");
+            refuse("--pose needs comma-separated numbers");
         if (k >= ROBOT_JOINTS)
             refuse("--pose has more numbers than the robot has joints");
         if (!(value >= robot_joints[k].lower && value <= robot_joints[k].upper))
-            refuse("--pose is beyond the limits of a joint");
+            refuse("--pose is outside the limits of a joint");
         start[k] = value;
         text = *end == ',' ? end + 1 : end;
     }
@@ -432,7 +432,7 @@ static void read_words(int count, char **words)
             port = atoi(value);
         else if (strcmp(words[k], "--size") == 0) {
             if (sscanf(value, "%dx%d", &width, &height) != 2 || width < 1 || height < 1)
-                refuse("--size wants WIDTHxHEIGHT");
+                refuse("--size needs WIDTHxHEIGHT");
         } else
             refuse(words[k]);
     }
@@ -440,10 +440,10 @@ static void read_words(int count, char **words)
         refuse(words[k]);
 #ifdef _WIN32
     if (port != 0)
-        refuse("--follow is not made for Windows");
+        refuse("--follow is not supported on Windows");
 #endif
     if (port < 0 || port > 65535)
-        refuse("--follow wants a port from 1 to 65535");
+        refuse("--follow needs a port from 1 to 65535");
 }
 
 int main(int count, char **words)

@@ -1,4 +1,4 @@
-"""The panel of programs: choose one, see its way, run, step, pause and end it; teach a new one."""
+"""The panel of programs: choose, preview, run, step, pause and end a script; teach a new one."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ from katana450.server.api.answers import Progress
 from katana450.server.view.controls import GestureGate, refuse
 
 FOLLOW_INTERVAL = 0.1
-"""[s] Between two times to look at."""
+"""[s] Step of the slider with which a preview is looked at."""
 
 MAX_TAUGHT_POSTURES = 200
+"""Maximum number of poses of a taught script."""
 
 ORDERS = {
     "Run": ProgramOrder.RUN,
@@ -37,32 +38,33 @@ ORDERS = {
     "Wait": ProgramOrder.PAUSE,
     "End": ProgramOrder.END,
 }
+"""The order that each button gives."""
 
 
 class Steering(Protocol):
-    """What the panel asks of whoever runs programs. Each raises KatanaError with the reason."""
+    """The panel's interface to the runner. All methods raise KatanaError with the reason."""
 
     def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
-        """Plan a script for ``actor``, and then run it."""
+        """Plan a script for ``actor``; then carry out ``then``."""
         ...
 
     def steer(self, order: ProgramOrder, actor: Actor) -> None:
-        """Steer the one that runs."""
+        """Give an order to the present program."""
         ...
 
     @property
     def progress(self) -> Progress | None:
-        """How it stands."""
+        """The progress of the present or last program."""
         ...
 
     @property
     def program(self) -> Program | None:
-        """The one that is planned."""
+        """The program that is planned."""
         ...
 
 
 class ProgramsPanel:
-    """A folder of controls, and the preview in the scene."""
+    """The folder of controls, and the preview in the scene."""
 
     def __init__(
         self,
@@ -73,37 +75,37 @@ class ProgramsPanel:
         gestures: GestureGate,
         state: Callable[[], State],
     ) -> None:
-        """``state``: the newest."""
+        """Build the controls. ``state`` returns the newest state."""
         self._steering = steering
         self._scripts = scripts
         self._gestures = gestures
         self._state = state
         self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
-        # The script that was last asked for.
+        # The script that was last requested.
         self._text = ""
-        # Held while a person asks for one, which viser hears in a thread of its own.
-        self._asking = threading.Lock()
-        # Whether a person asked to see it before it runs.
-        self._wanted = False
+        # Held while an order is carried out: viser calls back in a thread of its own.
+        self._order_lock = threading.Lock()
+        # Whether the program was requested as a preview, which shows ghosts.
+        self._with_ghosts = False
         self._preview = Preview(server, robot)
         gui = server.gui
         with gui.add_folder("Programs", expand_by_default=False):
             names = tuple(scripts.paths)
-            # First one that this arm can run: the library has a circle for the bare flange too.
+            # The first script that this arm can run: the library has one for the bare flange too.
             fitting = (name for name in names if _suits(scripts, name, robot))
             self._choice = gui.add_dropdown(
                 "Script",
                 names,
                 initial_value=next(fitting, None),
-                hint="Those that come along, and of --programs DIR",
+                hint="Scripts of the library and of --programs DIR",
             )
             self._choice.on_update(lambda _: self._draw(None))
             self._orders = gui.add_button_group(
                 "Program",
                 ("Preview", *ORDERS),
-                hint="Preview: plan it and show the tool's way. Step: to the end of a step. "
-                "Wait: rest on the way, until Run or Step. End: end the run, or the planning",
+                hint="Preview: plan it and show the tool's path. Step: run to the end of a step. "
+                "Wait: pause until Run or Step. End: end the run, or the planning",
             )
             self._orders.on_click(self._guarded(self._order))
             self._look = gui.add_slider(
@@ -113,31 +115,33 @@ class ProgramsPanel:
                 step=FOLLOW_INTERVAL,
                 initial_value=0.0,
                 disabled=True,
-                hint="Seconds of what is previewed, at full speed: the arm as it will stand then",
+                hint="Time in the preview [s], at full speed: shows the arm at that time",
             )
             self._look.on_update(lambda _: self._preview.look(self._look.value))
             self._status = gui.add_html("")
             self._teach = gui.add_button_group(
                 "Teach",
                 ("Add pose", "Forget", "Save"),
-                hint="Add pose: where the arm is now. Save: a script through all of them, in the "
+                hint="Add pose: add the present pose. Save: save a script through all poses in the "
                 "folder of --programs, or else as a download",
             )
             self._teach.on_click(self._guarded(self._on_teach))
-            self._name = gui.add_text("Name", "My script", hint="Of the script that Save writes")
+            self._name = gui.add_text(
+                "Name", "My script", hint="Name of the script that Save writes"
+            )
 
     def follow(self) -> None:
-        """Show how the program stands."""
-        told = self._steering.progress
-        page = _page(told, len(self._taught))
+        """Update the display of the program's progress."""
+        progress = self._steering.progress
+        page = _page(progress, len(self._taught))
         if page != self._status.content:
             self._status.content = page
-        if self._asking.acquire(blocking=False):
+        if self._order_lock.acquire(blocking=False):
             try:
                 self._follow_program()
             finally:
-                self._asking.release()
-        if not self._look.disabled and told is not None and told.status in RUNS:
+                self._order_lock.release()
+        if not self._look.disabled and progress is not None and progress.status in RUNS:
             self._preview.begin()
             self._look.disabled = True
 
@@ -146,33 +150,33 @@ class ProgramsPanel:
         if program is not self._drawn:
             self._drawn = program
             self._draw(program)
-            self._wanted = self._wanted and program is None
+            self._with_ghosts = self._with_ghosts and program is None
 
     def _draw(self, program: Program | None) -> None:
-        """Show what ``program`` would do."""
-        span = self._preview.show(program, self._state().tool, ghosts=self._wanted)
+        """Show the preview of ``program``."""
+        span = self._preview.show(program, self._state().tool, ghosts=self._with_ghosts)
         self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
         if span > 0.0:
             self._look.max = shown_seconds(span)
 
     def _order(self, actor: Actor, _client: viser.ClientHandle | None = None) -> None:
-        said = self._orders.value
-        told = self._steering.progress
-        status = "" if told is None else told.status
-        if said in ("Wait", "End") or (said != "Preview" and status in RUNS):
-            self._steering.steer(ORDERS[said], actor)
+        button = self._orders.value
+        progress = self._steering.progress
+        status = "" if progress is None else progress.status
+        if button in ("Wait", "End") or (button != "Preview" and status in RUNS):
+            self._steering.steer(ORDERS[button], actor)
             return
         text = self._scripts.text(self._choice.value)
-        if said != "Preview" and status == "planning" and text == self._text:
-            # A preview is on its way already: it is run once it is planned.
-            self._steering.steer(ORDERS[said], actor)
+        if button != "Preview" and status == "planning" and text == self._text:
+            # This script is being planned for a preview; it runs once it is planned.
+            self._steering.steer(ORDERS[button], actor)
             return
-        with self._asking:
-            self._wanted = said == "Preview"
-            self._steering.plan(text, ORDERS.get(said), actor)
+        with self._order_lock:
+            self._with_ghosts = button == "Preview"
+            self._steering.plan(text, ORDERS.get(button), actor)
             self._text = text
-            # A plan that is kept is drawn anew.
+            # Forces a kept plan to be drawn again.
             self._drawn = None
             self._draw(None)
 
@@ -180,21 +184,23 @@ class ProgramsPanel:
         match self._teach.value:
             case "Add pose":
                 if len(self._taught) >= MAX_TAUGHT_POSTURES:
-                    raise InputError(f"No more than {MAX_TAUGHT_POSTURES} poses; save these first.")
+                    raise InputError(
+                        f"The maximum is {MAX_TAUGHT_POSTURES} poses. Save these first."
+                    )
                 self._taught.append(self._state().goal)
             case "Forget":
                 self._taught.clear()
             case "Save":
                 if not self._taught:
-                    raise InputError("There is no pose yet: bring the arm somewhere and add it.")
+                    raise InputError("There is no pose yet. Move the arm and add a pose.")
                 self._save(client)
 
     def _save(self, client: viser.ClientHandle | None) -> None:
-        """Save the poses in the folder; where there is none, as a download of ``client``."""
+        """Save the poses in the folder or, without one, as a download of ``client``."""
         name = self._name.value.strip()
         text = script_from_postures(name, self._taught)
         if client is not None and not self._scripts.keeps:
-            # The poses stay: a browser may refuse the file.
+            # The poses are kept, because a browser may refuse the file.
             client.send_file_download(file_name(name), text.encode(), save_immediately=True)
             return
         self._scripts.save(name, text)
@@ -205,7 +211,7 @@ class ProgramsPanel:
     def _guarded(
         self, act: Callable[[Actor, viser.ClientHandle | None], None]
     ) -> Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]:
-        """``act`` in a thread, and what is wrong told in the window of whoever asked."""
+        """Return a handler that runs ``act`` in a thread and shows errors in the sender's page."""
 
         async def acted(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:
@@ -220,39 +226,40 @@ class ProgramsPanel:
 
 
 def shown_seconds(duration: float) -> float:
-    """``duration`` [s] as the panel shows it, in words and as the end of its slider."""
+    """Return ``duration`` [s] rounded up to the resolution of the panel's text and slider."""
     return math.ceil(round(duration / FOLLOW_INTERVAL, 6)) * FOLLOW_INTERVAL
 
 
 def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
-    """Whether the script can be read, and is not for an arm without the gripper there is."""
+    """Return whether the script can be read and suits the arm's gripper."""
     try:
         return not (parse(scripts.text(name)).bare and robot.require_arm().gripper.moves)
     except KatanaError:
         return False
 
 
-def _page(told: Progress | None, poses: int) -> str:
+def _page(progress: Progress | None, poses: int) -> str:
     lines = []
-    if told is not None:
-        head = f"<b>{escape(told.name)}</b> " if told.name else ""
-        lines.append(f"{head}{escape(told.status)}")
-        if told.status in RUNS:
+    if progress is not None:
+        head = f"<b>{escape(progress.name)}</b> " if progress.name else ""
+        lines.append(f"{head}{escape(progress.status)}")
+        if progress.status in RUNS:
             lines.append(
-                f"Step {told.step} of {told.steps}, line {told.line}: {escape(told.task)}, "
-                f"{told.fraction:.0%}"
+                f"Step {progress.step} of {progress.steps}, line {progress.line}: "
+                f"{escape(progress.task)}, {progress.fraction:.0%}"
             )
-        elif told.status == "planning":
-            lines.append("All of it is planned before anything moves, which may take a while.")
-            if told.steps:
-                at = f"Step {told.step} of {told.steps}: {escape(told.task)}"
+        elif progress.status == "planning":
+            lines.append("The whole script is planned before the arm moves. This may take a while.")
+            if progress.steps:
+                at = f"Step {progress.step} of {progress.steps}: {escape(progress.task)}"
                 lines.append(
-                    f"{at}, {told.fraction:.0%}<progress value='{told.fraction:.2f}'></progress>"
+                    f"{at}, {progress.fraction:.0%}"
+                    f"<progress value='{progress.fraction:.2f}'></progress>"
                 )
-        elif told.status == "ready":
-            seconds = shown_seconds(told.seconds)
-            lines.append(f"{told.steps} steps, {seconds:.1f} s of motion at full speed")
-        lines += [escape(line) for line in told.why.splitlines()]
+        elif progress.status == "ready":
+            seconds = shown_seconds(progress.seconds)
+            lines.append(f"{progress.steps} steps, {seconds:.1f} s of motion at full speed")
+        lines += [escape(line) for line in progress.why.splitlines()]
     if poses:
         lines.append(f"Taught: {poses} pose{'s' if poses > 1 else ''}")
     body = "".join(f"<div>{line}</div>" for line in lines)

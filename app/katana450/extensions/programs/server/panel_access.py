@@ -1,4 +1,4 @@
-"""Requests of the programs' panel, carried from viser's threads to the server's."""
+"""Transfer of the panel's requests from viser's threads to the server's thread."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from katana450.server.service.hub import Hub, Window
 
 
 class PanelAccess:
-    """The runner as the panel uses it: for any thread, and for the actor of a gesture."""
+    """The interface of the panel to the runner: for any thread, with the actor of a gesture."""
 
     def __init__(
         self, runner: ProgramRunner, hub: Hub, call: Callable[[Callable[[], None]], None]
     ) -> None:
-        """``call``: runs a function in the server's thread, see ``FolderContext``."""
+        """Use ``call`` to run functions in the server's thread, see ``FolderContext``."""
         self._runner = runner
         self._hub = hub
         self._call = call
@@ -35,11 +35,11 @@ class PanelAccess:
         return self._runner.program
 
     def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
-        """Plan ``text`` for ``actor``, and do ``then`` once it is planned. Raises KatanaError."""
+        """Plan ``text`` for ``actor``, then carry out ``then``. Raises KatanaError."""
         self._call(lambda: self._plan(text, then, actor))
 
     def steer(self, order: ProgramOrder, actor: Actor) -> None:
-        """Steer the program for ``actor``. Raises LeaseError with the reason why not."""
+        """Give the program an order of ``actor``. Raises LeaseError if it is refused."""
         self._call(lambda: self._steer(order, actor))
 
     def _steer(self, order: ProgramOrder, actor: Actor) -> None:

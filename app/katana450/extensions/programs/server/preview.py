@@ -1,4 +1,4 @@
-"""What a program would do, in the scene before it does: the tool's way, and the arm along it."""
+"""Preview of a program in the scene: the path of the tool, and the arm along it."""
 
 from __future__ import annotations
 
@@ -19,30 +19,35 @@ from katana450.server.view.scene import Colour, GhostNodes, surface
 from katana450.server.viser_bridge.posing import arrange
 
 COLOUR: Colour = (64, 156, 255)
+"""Colour of the path and of the ghosts."""
 
 PATH_SAMPLES = 60
-"""Pieces that the way of each plan is drawn with."""
+"""Number of line segments with which the tool's path of one plan is drawn."""
 
 GHOSTS = 7
-"""Postures of the arm along the whole way."""
+"""Number of ghost postures along the whole program."""
 
 FAINT, CLEAR = 0.06, 0.26
-"""How opaque the first and the last of them are."""
+"""Opacities of the first and of the last ghost."""
 
 LOOK: Colour = (255, 153, 0)
+"""Colour of the ghost at the slider's time."""
 LOOK_OPACITY = 0.5
+"""Opacity of the ghost at the slider's time."""
 
 
 class Preview:
-    """The line is there until another program is; the ghosts until it runs.
+    """The path line, kept until another program is shown, and the ghosts, kept until it runs.
 
-    They are sent when they are first wanted: their shapes are as much as a sixth of the page.
+    The ghosts are sent when they are first shown: their shapes take up to a sixth of the page's
+    data.
     """
 
     def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
+        """Add the hidden path line to the scene."""
         self._server = server
         self._robot = robot
-        self._way = server.scene.add_line_segments(
+        self._path_line = server.scene.add_line_segments(
             "/path/preview",
             np.zeros((1, 2, 3), dtype=np.float32),
             COLOUR,
@@ -52,18 +57,18 @@ class Preview:
         self._sweep: GhostSweep | None = None
         self._ghost: GhostNodes | None = None
         self._timeline: Timeline | None = None
-        # A hand on the slider is heard in a thread of viser's.
+        # The slider's callback runs in a thread of viser.
         self._lock = threading.Lock()
 
     def show(self, program: Program | None, tool: str, *, ghosts: bool) -> float:
-        """Draw ``program``, which begins with ``tool``; tells how long it is [s], 0 for nothing."""
+        """Draw ``program``, which begins with ``tool``; return its duration [s], 0 for nothing."""
         with self._lock:
             self._hide_ghosts()
-            ways = [] if program is None else _ways(self._robot.require_arm(), program, tool)
-            if ways:
-                self._way.points = np.concatenate(ways).astype(np.float32)
-            self._way.visible = bool(ways)
-            self._timeline = Timeline.of(program) if program is not None and ways else None
+            paths = [] if program is None else _tool_paths(self._robot.require_arm(), program, tool)
+            if paths:
+                self._path_line.points = np.concatenate(paths).astype(np.float32)
+            self._path_line.visible = bool(paths)
+            self._timeline = Timeline.of(program) if program is not None and paths else None
             if self._timeline is None:
                 return 0.0
             if ghosts:
@@ -73,7 +78,7 @@ class Preview:
             return self._timeline.span
 
     def look(self, t: float) -> None:
-        """Show the arm at ``t`` [s] of what is drawn; at 0 nothing."""
+        """Show the arm at the time ``t`` [s] of the preview; hide it at 0."""
         with self._lock:
             timeline = self._timeline
             if timeline is None or t <= 0.0:
@@ -88,7 +93,7 @@ class Preview:
             self._ghost.show(True, LOOK)
 
     def begin(self) -> None:
-        """It runs: the arm itself is to be seen."""
+        """Hide the ghosts, because the program runs and the arm itself shows it."""
         with self._lock:
             self._hide_ghosts()
             self._timeline = None
@@ -101,22 +106,23 @@ class Preview:
 
 
 class GhostSweep:
-    """The arm in several postures at once, each shape sent once and the first the faintest."""
+    """The arm in several postures at once. Each shape is sent once; opacity grows with time."""
 
     def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
+        """Add the hidden shapes of ``robot`` to the scene."""
         self._robot = robot
         self._root = server.scene.add_frame("/path/sweep", show_axes=False, visible=False)
-        still = np.tile((1.0, 0.0, 0.0, 0.0), (GHOSTS, 1)), np.zeros((GHOSTS, 3))
+        identity_poses = np.tile((1.0, 0.0, 0.0, 0.0), (GHOSTS, 1)), np.zeros((GHOSTS, 3))
         self._nodes: list[tuple[str, viser.BatchedMeshHandle]] = [
             (
                 link.name,
                 server.scene.add_batched_meshes_simple(
                     f"/path/sweep/{link.name}{number}",
                     *surface(visual),
-                    *still,
+                    *identity_poses,
                     batched_colors=COLOUR,
                     batched_opacities=np.linspace(FAINT, CLEAR, GHOSTS),
-                    # The browser would work out coarser shapes, which takes it long.
+                    # Levels of detail would take the browser long to compute.
                     lod="off",
                     opacity=1.0,
                     cast_shadow=False,
@@ -129,7 +135,7 @@ class GhostSweep:
         ]
 
     def show(self, timeline: Timeline) -> None:
-        """Postures evenly in time, from start to end."""
+        """Show postures of ``timeline``, evenly spaced in time from start to end."""
         placed = [
             self._robot.frames(self._robot.joint_values(*each))
             for each in timeline.postures(GHOSTS)
@@ -141,14 +147,14 @@ class GhostSweep:
         self._root.visible = True
 
     def hide(self) -> None:
-        """Show none of them."""
+        """Hide all postures."""
         if self._root.visible:
             self._root.visible = False
 
 
-def _ways(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
-    """Of each plan the way of the tool, (PLACES, 2, 3) in the base frame [m]."""
-    ways: list[FloatArray] = []
+def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
+    """Return the tool's path of each plan, (PATH_SAMPLES, 2, 3) in the base frame [m]."""
+    paths: list[FloatArray] = []
     for task in program.tasks:
         if isinstance(task.order, UseTool):
             tool = task.order.name
@@ -156,5 +162,5 @@ def _ways(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
             chain = arm.chain_to(tool)
             postures = task.order.plan.postures(PATH_SAMPLES + 1)
             points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
-            ways.append(np.stack((points[:-1], points[1:]), axis=1))
-    return ways
+            paths.append(np.stack((points[:-1], points[1:]), axis=1))
+    return paths

@@ -1,4 +1,4 @@
-"""A script that is planned in a thread of its own, and the program that is kept of it."""
+"""Planning of a script in a thread of its own, and its result."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from katana450.server.api import answers
 log = logging.getLogger(__name__)
 
 MAX_PLANNING_TIME = 120.0
-"""[s]"""
+"""[s] Maximum duration of the planning."""
 
 
 class PlanningPhase(Enum):
-    """How far a program is that has not begun."""
+    """The phase of a program that has not begun."""
 
     PLANNING = "planning"
     REFUSED = "refused"
@@ -33,16 +33,17 @@ class PlanningPhase(Enum):
 
 
 class Planning:
-    """One script with one speed, planned from one situation of the arm.
+    """The planning of one script with one speed, from one situation of the arm.
 
     Attributes:
-        text, speed: the script, and the fraction of its own speed.
-        situation: what it is planned from.
-        name: of the script; empty until it is read.
-        stage: how far the planning is; None before its first step.
-        refused: why it cannot be run, else None.
-        cancelled: why the planning was ended, else None.
-        note: for people: why it was planned anew, or not run.
+        text: the script.
+        speed: fraction of the script's own speed.
+        situation: the situation that it is planned for.
+        name: name of the script; empty until it is parsed.
+        stage: present stage of the planning; None before the first step.
+        refused: reason why the program cannot run, else None.
+        cancelled: reason why the planning was cancelled, else None.
+        note: note for people: why it was planned again, or not run.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class Planning:
         clock: Callable[[], float],
         note: str = "",
     ) -> None:
-        """Start the thread. ``clock``: in seconds."""
+        """Start the thread. ``clock`` returns the time [s]."""
         self.text = text
         self.speed = speed
         self.situation = Situation.of(state)
@@ -73,30 +74,30 @@ class Planning:
 
     @property
     def busy(self) -> bool:
-        """Whether it is still planned."""
+        """True while the planning is in progress."""
         return self._program is None and self.refused is None and self.cancelled is None
 
     @property
     def program(self) -> Program | None:
-        """The result; None before it is there, and where there is none."""
+        """The planned program; None before the end of the planning, or without success."""
         return None if self.cancelled is not None else self._program
 
     def cancel(self, why: str) -> None:
-        """End the planning. The thread ends at its next checkpoint, some milliseconds later."""
+        """Cancel the planning. The thread ends at its next checkpoint, some milliseconds later."""
         if self.busy:
             self.cancelled = why
 
     def fits(self, text: str, speed: float, state: State) -> bool:
-        """Whether this program is what planning ``text`` from ``state`` would give."""
+        """Return whether planning ``text`` at ``speed`` from ``state`` would give this program."""
         same = self.program is not None and (self.text, self.speed) == (text, speed)
         return same and not self.changed_to(state)
 
     def changed_to(self, state: State) -> str:
-        """Return a clause that names what is no longer as it was planned for, else ""."""
+        """Return a clause that names what has changed since the planning, else "" for nothing."""
         return self.situation.changed_to(Situation.of(state))
 
     def progress(self, by: str) -> answers.Progress:
-        """How a program stands that has not begun; ``by``: its owner's name."""
+        """Return the progress of a program that has not begun. ``by`` is its owner's name."""
         program, now = self.program, self.stage
         if self.cancelled is not None or self.refused is not None:
             stage = PlanningPhase.REFUSED if self.cancelled is None else PlanningPhase.CANCELLED
@@ -134,8 +135,8 @@ class Planning:
         except KatanaError as error:
             self.refused = str(error)
         except Exception:
-            log.exception("Planning met an error.")
-            self.refused = "Planning met an error; see the server's log."
+            log.exception("Planning failed with an internal error.")
+            self.refused = "Planning failed with an internal error. See the server's log."
 
     def _report(self, stage: PlanningStage) -> None:
         self.stage = stage
@@ -144,7 +145,7 @@ class Planning:
         if self.cancelled is not None:
             raise CancelledError(self.cancelled)
         if self._clock() - self._began > MAX_PLANNING_TIME:
-            at = "" if self.stage is None else f" (it is at step {self.stage.step})"
+            at = "" if self.stage is None else f" (at step {self.stage.step})"
             raise CancelledError(
                 f"Planning takes longer than {MAX_PLANNING_TIME:g} s{at}. Make the script shorter."
             )

@@ -1,6 +1,6 @@
-"""A program on a running server: a participant of its own that holds the arm.
+"""Execution of a program on a running server, as a participant of its own that holds the lease.
 
-Planning takes long and happens in a thread (`Planning`); all else lives in the server's thread.
+Planning takes long and runs in a thread (`Planning`); everything else runs in the server's thread.
 """
 
 from __future__ import annotations
@@ -33,8 +33,11 @@ from katana450.server.service.runner import Runner, StatusLine
 log = logging.getLogger(__name__)
 
 
-class _MeasuresOwnerAge(LastHeartbeat):
-    """A program runs in this thread and so is always there; its owner is watched instead."""
+class _AlwaysAlive(LastHeartbeat):
+    """The heartbeat of a program, always up to date because it runs in this thread.
+
+    The heartbeat of the owner is monitored instead.
+    """
 
     @property
     def newest(self) -> float:
@@ -42,14 +45,16 @@ class _MeasuresOwnerAge(LastHeartbeat):
 
 
 class ProgramRunner(Runner):
-    """At most one program at a time."""
+    """The runner of at most one program at a time."""
 
     request_types = (requests.Program, requests.Steer)
     controls = ("Script", "Program", "Look at", "Teach", "Name")
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
-        """``options.owner_silence``: time without a heartbeat of its owner after which a program
-        ends [s]; a page that reloads is back sooner.
+        """Prepare to run programs of ``hub``.
+
+        ``options.owner_silence`` is the heartbeat timeout of the owner [s], after which a program
+        ends. A page that reloads returns sooner.
         """
         super().__init__(hub, options)
         self._owner_silence: float = options.owner_silence
@@ -57,37 +62,39 @@ class ProgramRunner(Runner):
         self._planning: Planning | None = None
         self._owner: Window | None = None
         self._then: ProgramOrder | None = None
-        self._seen = 0.0
-        self._self: Window | None = None
+        self._owner_seen = 0.0
+        self._participant: Window | None = None
         self._run: Run | None = None
-        # The speed to restore at the end, the greatest a person allows, and the last one commanded.
+        # The speed to restore at the end, the maximum that a person allows, and the last command.
         self._speed = self._allowed = self._commanded = 1.0
 
     @property
     def running(self) -> bool:
-        """Whether a program has the arm."""
-        return self._self is not None
+        """True while a program holds the arm."""
+        return self._participant is not None
 
     @property
     def program(self) -> Program | None:
-        """The one that is planned."""
+        """The planned program."""
         return None if self._planning is None else self._planning.program
 
     @property
     def waits(self) -> bool:
-        """Whether the program that is planned runs as soon as it is."""
+        """True if the program runs as soon as it is planned."""
         return self._then is not None
 
     def owns(self, window: Window) -> bool:
-        """Whether ``window`` is the page or API program that the present program is of."""
+        """Return whether ``window`` is the page or API program that owns the present program."""
         return self._is_owner(window.person)
 
     def check_may_touch(self, actor: Actor) -> None:
+        """Raise LeaseError if ``actor`` may not drive, or does not own the running program."""
         self._check_may_drive(actor.person)
         if self.running:
             self._check_owns(actor.person)
 
     def handle(self, window: Window, request: Request) -> answers.Answer:
+        """Execute ``request``. Raises LeaseError or InputError."""
         match request:
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(window, text, more=more, speed=speed)
@@ -98,14 +105,15 @@ class ProgramRunner(Runner):
         return answers.Done()
 
     def then(self, order: ProgramOrder | None) -> None:
-        """Do ``order`` as soon as the present script is planned."""
+        """Carry out ``order`` as soon as the present script is planned."""
         self._then = order
 
     def script(self, window: Window, text: str, *, more: bool, speed: float) -> None:
-        """Take a part of a script; after the last it is planned, from where the arm stands then.
+        """Take a part of a script; after the last part, plan it from the present state of the arm.
 
         The last plan is kept if it is of the same script and nothing has changed since. Raises
-        LeaseError while another runs or is planned, InputError for one that is too long.
+        LeaseError while another program runs or is planned, and InputError for a script that is too
+        long.
         """
         key = window.person.key
         text = self._parts.pop(key, "") + text
@@ -117,7 +125,7 @@ class ProgramRunner(Runner):
         self._check_free()
         arm = self.hub.present()
         if arm.state.moving:
-            raise LeaseError("The arm moves: a program is planned from where it stands.")
+            raise LeaseError("The arm is moving. Plan the program when it is at rest.")
         self._check_may_drive(window.person)
         before = self._planning
         if before is not None and before.fits(text, speed, arm.state):
@@ -130,24 +138,24 @@ class ProgramRunner(Runner):
         self._plan(window, text, speed, changed)
 
     def _plan(self, window: Window, text: str, speed: float, changed: str) -> None:
-        """Plan ``text`` from the present state; ``changed`` is why an earlier plan is not kept."""
+        """Plan ``text`` from the present state; ``changed`` tells why an earlier plan is void."""
         arm = self.hub.present()
-        note = f"Planned anew: {changed}." if changed else ""
+        note = f"Planned again: {changed}." if changed else ""
         context = PlanContext(arm.session, arm.arm.T_base_shoulder)
         self._planning = Planning(text, speed, context, arm.state, self.hub.clock, note)
         self._own(window)
 
     def _own(self, window: Window) -> None:
         self._owner, self._run, self._then = window, None, None
-        self._seen = self.hub.clock()
+        self._owner_seen = self.hub.clock()
 
     def steer(self, window: Window, order: ProgramOrder) -> int | None:
-        """Run, step, pause, resume or end it. Raises LeaseError with the reason why not.
+        """Run, step, pause, resume or end the program. Raises LeaseError if it is refused.
 
-        While it is planned, RUN and STEP are done as soon as it is, PAUSE and RESUME decide whether
-        it then starts paused, and END cancels the planning.
+        During planning, RUN and STEP take effect at its end, PAUSE and RESUME decide whether the
+        program then starts paused, and END cancels the planning.
 
-        Return the ticket of the command that this gives the arm now; None for none.
+        Returns the ticket of the command that the arm was given now; None for none.
         """
         self._check_may_drive(window.person)
         planning = self._planning
@@ -157,16 +165,16 @@ class ProgramRunner(Runner):
         if order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running:
             return self._begin(window, order)
         if not self.running or self._run is None:
-            raise LeaseError("No program runs.")
+            raise LeaseError("No program is running.")
         self._check_owns(window.person)
         match order:
             case ProgramOrder.RUN | ProgramOrder.RESUME:
-                return self._tell(cmd.Resume())
+                return self._send(cmd.Resume())
             case ProgramOrder.STEP:
                 self._run, commands = runner.stepping(self._run)
-                return self._tell(*commands)
+                return self._send(*commands)
             case ProgramOrder.PAUSE:
-                return self._tell(cmd.Pause())
+                return self._send(cmd.Pause())
             case ProgramOrder.END:
                 return self._end(f"{window.person.name} ended it.")
 
@@ -187,10 +195,12 @@ class ProgramRunner(Runner):
         return None
 
     def stopped(self) -> None:
-        self._forget_run("STOP was pressed while it was planned")
+        """Cancel a run that waits for its planning, after STOP."""
+        self._forget_run("STOP was pressed during planning")
 
     def redirected(self) -> None:
-        self._forget_run("the arm was told something else while it was planned")
+        """Cancel a run that waits for its planning, after another command to the arm."""
+        self._forget_run("the arm was given another command during planning")
 
     def _forget_run(self, why: str) -> None:
         planning = self._planning
@@ -198,6 +208,7 @@ class ProgramRunner(Runner):
             self._then, planning.note = None, f"Not run: {why}."
 
     def leave(self, window: Window) -> None:
+        """Forget ``window``; end its program, or the run that waits for its planning."""
         self._parts.pop(window.person.key, None)
         if not self.owns(window):
             return
@@ -206,34 +217,35 @@ class ProgramRunner(Runner):
             self._end(f"{window.person.name} left.")
 
     def tick(self) -> None:
+        """Advance the running program by one step, or end it if owner, lease or stop demand it."""
         hub, t = self.hub, self.hub.clock()
         if self._then is not None and self._owner_is_silent(t):
-            self._forget_run("whoever asked for it is gone")
+            self._forget_run("its owner sends no heartbeats")
         if self.program is not None and self._then is not None:
-            self._go_on()
+            self._start_planned()
         program = self.program
-        if self._self is None or self._run is None or program is None:
+        if self._participant is None or self._run is None or program is None:
             return
-        if hub.lease.holder != self._self.person:
-            # The next who holds the arm finds one that stands, so nothing is left to be told.
-            self._leave_with(Phase.STOPPED, "The arm was taken from it.")
+        if hub.lease.holder != self._participant.person:
+            # The next holder takes over an arm at rest, so no command is needed.
+            self._leave_with(Phase.STOPPED, "The lease was taken from the program.")
             return
         owner = self._owner
         if hub.stopped is not None:
             self._leave_with(Phase.STOPPED, hub.stopped.why)
             return
         if owner is not None and self._owner_is_silent(t):
-            why = "fell silent" if self._owner_is_here() else "left"
-            self._end(f"{owner.person.name} {why}: a program ends with its owner's heartbeats.")
+            why = "sends no heartbeats" if self._owner_is_here() else "left"
+            self._end(f"{owner.person.name} {why}. A program ends without its owner.")
             return
         arm = hub.arm
         if arm is not None and arm.caught_up:
             if arm.state.speed != self._commanded:
-                # A person's speed holds to the end of the program, and after it.
+                # A speed set by a person applies to the end of the program and after it.
                 self._speed = self._allowed = self._commanded = arm.state.speed
             self._run, commands = runner.step(program, self._run, arm.state, t)
             try:
-                self._tell(*commands)
+                self._send(*commands)
             except InputError as error:
                 self._leave_with(Phase.FAILED, str(error))
                 return
@@ -241,6 +253,7 @@ class ProgramRunner(Runner):
                 self._leave_with(self._run.phase, self._run.why)
 
     def progress(self) -> answers.Progress | None:
+        """Return the progress of the present or last program; None if there was none."""
         planning, owner = self._planning, self._owner
         if planning is None or owner is None:
             return None
@@ -262,9 +275,11 @@ class ProgramRunner(Runner):
         )
 
     def status_line(self, state: State, line: StatusLine) -> StatusLine:
+        """Return the line for the program in place of ``line``."""
         return state_line.status_line(state, line, self.progress(), waits=self.waits)
 
     def orders(self, window: Window) -> tuple[str, ...]:
+        """Return the orders that the page of ``window`` offers; none if it is not the owner."""
         arm = self.hub.arm
         if arm is None or not self.owns(window):
             return ()
@@ -272,11 +287,11 @@ class ProgramRunner(Runner):
         offered = state_line.orders(arm.state, self.progress(), stopped=stopped, waits=self.waits)
         return tuple(order.value for order in offered)
 
-    def _go_on(self) -> None:
-        """Do what was to be done once a program is planned."""
+    def _start_planned(self) -> None:
+        """Carry out the order that waits for the end of the planning."""
         then, self._then = self._then, None
         if then is None or self._owner is None:
-            # It was forgotten meanwhile, in another thread.
+            # The order was cancelled meanwhile.
             return
         try:
             self.steer(self._owner, then)
@@ -285,20 +300,18 @@ class ProgramRunner(Runner):
             self._planning.refused = str(error)
 
     def _begin(self, window: Window, order: ProgramOrder) -> int | None:
-        """Run the program that is planned; where the arm or the scene is not as it was planned for,
-        plan it anew first.
-        """
+        """Run the planned program. If the situation has changed, plan it again first."""
         planning, hub = self._planning, self.hub
         if planning is None or planning.program is None:
-            raise LeaseError("There is no program that is planned; send one first.")
+            raise LeaseError("No program is planned. Send a script first.")
         arm = hub.present()
         changed = planning.changed_to(arm.state)
         if changed:
             self.hub.gate.check_not_stopped()
             if arm.state.moving:
-                raise LeaseError("The arm moves: a program is planned from where it stands.")
+                raise LeaseError("The arm is moving. Plan the program when it is at rest.")
             if hub.lease.holder != window.person:
-                # It refuses the same at the end of the planning, which takes long.
+                # Otherwise a refusal would come only at the end of the planning, which takes long.
                 hub.lease.acquire(window.person, hub.clock())
             self._plan(window, planning.text, planning.speed, changed)
             self._then = order
@@ -306,38 +319,38 @@ class ProgramRunner(Runner):
         planning.refused, planning.note = None, ""
         program = planning.program
         identity = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
-        here = _MeasuresOwnerAge(hub.clock)
-        joined = hub.join(identity, "program", lambda _notice: None, here, CommandChannel.PROGRAM)
+        alive = _AlwaysAlive(hub.clock)
+        joined = hub.join(identity, "program", lambda _notice: None, alive, CommandChannel.PROGRAM)
         try:
             if hub.lease.holder == window.person:
-                # In one step: nobody takes the lease in between.
+                # A handover in one step: no other participant can take the lease in between.
                 hub.hand_over(window, joined.number)
             else:
                 hub.acquire(joined)
-            # What was wanted before is over; a pause lasts until somebody resumes. This also finds
-            # out whether the arm is stopped.
+            # Drops earlier targets; a pause lasts until it is resumed. Raises LeaseError if the arm
+            # is stopped.
             ticket = hub.move(joined, cmd.Hold())
         except LeaseError:
             hub.leave(joined, for_good=True)
             raise
-        self._self, self._owner, self._seen = joined, window, hub.clock()
+        self._participant, self._owner, self._owner_seen = joined, window, hub.clock()
         hub.gate.program = RunningProgram(joined.person, window.person.key)
         self._speed = self._commanded = arm.state.speed
         self._allowed = 1.0
-        self._run = Run(self._seen, single=order is ProgramOrder.STEP)
+        self._run = Run(self._owner_seen, single=order is ProgramOrder.STEP)
         log.info("%s runs the program %s.", window.person.name, program.name)
         return ticket
 
-    def _tell(self, *commands: cmd.Command) -> int | None:
+    def _send(self, *commands: cmd.Command) -> int | None:
         """Give ``commands`` to the arm; return the ticket of the last."""
-        assert self._self is not None
+        assert self._participant is not None
         ticket = None
         for command in commands:
-            ticket = self.hub.move(self._self, self._as_allowed(command))
+            ticket = self.hub.move(self._participant, self._as_allowed(command))
         return ticket
 
     def _as_allowed(self, command: cmd.Command) -> cmd.Command:
-        """``command``, no faster than a person has allowed since the program began."""
+        """Return ``command``, no faster than a person has allowed since the program began."""
         if not isinstance(command, cmd.SpeedScale):
             return command
         self._commanded = min(command.value, self._allowed)
@@ -347,20 +360,20 @@ class ProgramRunner(Runner):
         assert self._run is not None
         self._run, commands = runner.stopped(self._run, why)
         ticket = None
-        # A stopped arm takes no commands, nor does one that does not answer.
+        # An arm that is stopped or does not answer accepts no commands.
         with suppress(LeaseError, InputError):
-            ticket = self._tell(*commands)
+            ticket = self._send(*commands)
         self._leave_with(Phase.STOPPED, why)
         return ticket
 
     def _leave_with(self, phase: Phase, why: str) -> None:
-        """Give up the arm, which is at rest or comes to it."""
-        assert self._self is not None
+        """End the run and release the lease; the arm is at rest or comes to rest."""
+        assert self._participant is not None
         assert self._run is not None
-        joined, self._self = self._self, None
+        joined, self._participant = self._participant, None
         self.hub.gate.program = None
         self._run = runner.ended(self._run, phase, why)
-        # A program's speed is its own.
+        # The speed of a program does not outlast it.
         with suppress(InputError):
             self.hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
         if self.hub.lease.holder == joined.person:
@@ -370,13 +383,13 @@ class ProgramRunner(Runner):
 
     def _check_free(self) -> None:
         if self.running:
-            raise LeaseError("A program runs: end it first.")
+            raise LeaseError("A program is running. End it first.")
         planning = self._planning
         if planning is None or not planning.busy:
             return
         if not self._owner_is_silent(self.hub.clock()):
-            raise LeaseError("Another program is being planned: cancel that first, or wait for it.")
-        planning.cancel("Whoever asked for it is gone.")
+            raise LeaseError("Another program is being planned. Cancel it, or wait for it.")
+        planning.cancel("Its owner sends no heartbeats.")
 
     def _owner_is_here(self) -> bool:
         owner = self._owner
@@ -386,8 +399,8 @@ class ProgramRunner(Runner):
         """Return whether no heartbeat of the owner was received for the heartbeat timeout."""
         window = None if self._owner is None else self.hub.window(self._owner.person.key)
         if window is not None:
-            self._seen = max(self._seen, window.heartbeat.newest)
-        return t - self._seen > self._owner_silence
+            self._owner_seen = max(self._owner_seen, window.heartbeat.newest)
+        return t - self._owner_seen > self._owner_silence
 
     def _check_may_drive(self, person: Person) -> None:
         if not person.role.may_drive:
@@ -399,4 +412,4 @@ class ProgramRunner(Runner):
     def _check_owns(self, person: Person) -> None:
         owner = self._owner
         if owner is not None and not self._is_owner(person) and not person.role.may_take:
-            raise LeaseError(f"The program is {owner.person.name}'s.")
+            raise LeaseError(f"The program belongs to {owner.person.name}.")

@@ -9,7 +9,7 @@ from katana450.server.api.answers import Progress
 from katana450.server.service.runner import StatusLine
 
 RUNS = ("running", "paused", "blocked")
-"""States of a program that holds the arm, as `answers.Progress.status`."""
+"""Statuses of a program that holds the arm, as in `answers.Progress.status`."""
 
 PLANNING = "planning"
 """The mood of the page while a program is planned."""
@@ -18,7 +18,7 @@ PLANNING = "planning"
 def status_line(
     state: State, line: StatusLine, program: Progress | None, *, waits: bool
 ) -> StatusLine:
-    """Return the line for ``program`` in place of ``line``, which tells of ``state`` alone.
+    """Return the line for ``program`` in place of ``line``, which describes ``state`` alone.
 
     ``waits``: whether the program runs as soon as it is planned.
     """
@@ -31,18 +31,18 @@ def status_line(
         return line._replace(mood="moving", headline=f"{program.name}, {step.lower()}")
     if program.status != PlanningPhase.PLANNING.value:
         return line
-    said = f"Planning {program.name or 'the script'}"
+    headline = f"Planning {program.name or 'the script'}"
     about = [program.why] if program.why else []
     if program.steps:
         about.append(f"{step}: {program.task}, {program.fraction:.0%}.")
     if state.moving:
-        return line._replace(why=" ".join((f"{said}.", *about)))
-    said += ", paused" if state.paused else f" {program.fraction:.0%}"
+        return line._replace(why=" ".join((f"{headline}.", *about)))
+    headline += ", paused" if state.paused else f" {program.fraction:.0%}"
     if waits:
         about.append("Then it waits for Resume." if state.paused else "Then it runs.")
     else:
-        about.append("It does not run by itself.")
-    return StatusLine(PLANNING, said, " ".join(about))
+        about.append("It does not start by itself.")
+    return StatusLine(PLANNING, headline, " ".join(about))
 
 
 def orders(
