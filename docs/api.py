@@ -150,7 +150,7 @@ def page() -> str:
 
 
 def added_requests() -> dict[str, tuple[type[Request], ...]]:
-    """Return the requests that extensions add, by the names of these."""
+    """Return the requests of extensions, by the name of the extension."""
     return {
         each.name: each.serve.runner().request_types
         for each in extensions()

@@ -1,4 +1,4 @@
-"""Takes the pictures of the documentation from the app: ``python -m docs.pictures [NAME...]``."""
+"""Take the pictures of the documentation from the app: ``python -m docs.pictures [NAME...]``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MOVE = "/target/move"
 
 
 def at_rest(page: ViserPage) -> None:
-    """Let the arm arrive and the picture settle."""
+    """Wait until the arm is at rest and the page is drawn."""
     page.page.mouse.move(60, 60)
     page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
     page.page.wait_for_timeout(1500)
@@ -37,13 +37,13 @@ def at_rest(page: ViserPage) -> None:
 
 
 def app(page: ViserPage) -> None:
-    """The app as it opens."""
+    """Take a picture of the app as it opens."""
     at_rest(page)
     page.screenshot(IMAGES / "app.png")
 
 
 def out_of_reach(page: ViserPage) -> None:
-    """The handle dragged away from what the arm can do."""
+    """Take a picture while the handle is dragged out of reach."""
     page.drag_slider("Axis 1", -35.0)
     at_rest(page)
     with page.grip_arrow(MOVE, "z") as grip:
@@ -62,17 +62,17 @@ POSES = {
     "upright": (40.0, -92.0, 12.0, 20.0, 60.0),
     "folded": (110.0, -112.0, 112.0, 70.0, -90.0),
 }
-"""[degrees] Of the gallery."""
+"""Joint angles [deg] of the poses of the gallery, by name."""
 
 BACK = Camera((-1.24, 0.98, 0.71), (0.0, 0.0, 0.36))
-"""The sixth view; the others are the panel's."""
+"""The view from behind; the other views are those of the panel."""
 
 TILE = (880, 800)
-"""Pixels of the scene in each picture of the gallery, where they are half as many."""
+"""Width and height [pixels] of the part of the scene in one picture; saved at half that size."""
 
 
 def gallery(page: ViserPage) -> None:
-    """A sheet a theme: each pose a row, each camera a column."""
+    """Make one picture per theme, with a row for each pose and a column for each camera."""
     page.page.set_viewport_size({"width": 1300, "height": 920})
     page.frame.get_by_text("Show", exact=True).click()
     for theme in ("Light", "Dark"):
@@ -85,7 +85,7 @@ def gallery(page: ViserPage) -> None:
             row = []
             for preset in Preset:
                 if preset is Preset.TOOL:
-                    # Before this one, which does not let go of the camera.
+                    # Take the view from behind first: this preset keeps control of the camera.
                     page.look_from(BACK)
                     page.page.wait_for_timeout(700)
                     row.append(tile(page))
@@ -102,25 +102,25 @@ STAGES = (
     ("over basin", 0.5),
     ("pour", 0.62),
 )
-"""Of the pouring demo, as in the paper's figures 9 to 12: the task, and how much of it is done."""
+"""Task of the pouring demo and the fraction of it done, as in figures 9 to 12 of the paper."""
 
 
-UNHURRIED = 0.5
-"""Of full speed, so that no stage is over before it is seen."""
+SPEED = 0.5
+"""Fraction of full speed: slow enough to see every stage before it is over."""
 
 
 def pouring(page: ViserPage) -> None:
-    """Initial, grasping, approaching, emptying."""
-    # The taller the scene, the closer its middle is seen.
+    """Make a picture of four stages: initial, grasping, approaching, emptying."""
+    # A taller scene shows its middle closer.
     page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 200})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
         send(arm, PourDemo().text)
-        program(arm, lambda told: told.status in ("ready", "refused"))
+        program(arm, lambda progress: progress.status in ("ready", "refused"))
         arm.ask(Steer(order=ProgramOrder.RUN))
         for task, fraction in STAGES:
-            program(arm, lambda told, t=task, s=fraction: told.task == t and told.fraction >= s)  # type: ignore[misc]
+            program(arm, lambda run, t=task, s=fraction: run.task == t and run.fraction >= s)  # type: ignore[misc]
             arm.ask(Steer(order=ProgramOrder.PAUSE))
             page.page.wait_for_timeout(700)
             page.wait_drawn()
@@ -132,19 +132,19 @@ def pouring(page: ViserPage) -> None:
 
 
 def instruments(page: ViserPage) -> None:
-    """They show the paper's circle, up to where it was paused."""
+    """Take a picture of the instruments with the paper's circle, which is paused."""
     url = page.page.url.split("/?")[0].rstrip("/")
-    # To draw the scene all the while would take the time that the plots need.
+    # Drawing the scene would take the processor time that the plots need.
     page.frame.evaluate("() => harness.draw(false)")
     with connect(url, "Circle") as arm:
         page.press_in_bar("Instruments")
         send(arm, CircleDemo(tool="tcp").text)
-        program(arm, lambda told: told.status in ("ready", "refused"))
+        program(arm, lambda progress: progress.status in ("ready", "refused"))
         arm.ask(Steer(order=ProgramOrder.RUN))
-        # The way to its start counts as a fraction of its own.
-        program(arm, lambda told: told.task == "circle" and told.fraction > 0.75)
-        program(arm, lambda told: told.task == "circle" and 0.05 < told.fraction < 0.3)
-        program(arm, lambda told: told.fraction > 0.75)
+        # The path to the start of the circle counts from 0 to 1 too.
+        program(arm, lambda progress: progress.task == "circle" and progress.fraction > 0.75)
+        program(arm, lambda progress: progress.task == "circle" and 0.05 < progress.fraction < 0.3)
+        program(arm, lambda progress: progress.fraction > 0.75)
         arm.ask(Steer(order=ProgramOrder.PAUSE))
         page.page.locator("#instruments").get_by_role("button", name="Pause").click()
         page.page.wait_for_timeout(3000)
@@ -152,25 +152,25 @@ def instruments(page: ViserPage) -> None:
 
 
 def send(arm: Client, text: str) -> None:
-    """Have a script planned."""
+    """Send the text of a script to the server, which plans it."""
     parts = [text[at : at + 600] for at in range(0, len(text), 600)]
     for number, part in enumerate(parts, start=1):
-        arm.ask(Program(text=part, more=number < len(parts), speed=UNHURRIED))
+        arm.ask(Program(text=part, more=number < len(parts), speed=SPEED))
 
 
 def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.Progress:
-    """What is told of the program as soon as it is as wanted."""
+    """Return the progress of the program as soon as ``wanted`` is true of it."""
     while True:
-        told = arm.query(answers.State).program
-        if told is not None and wanted(told):
-            return told
-        if told is not None and told.status in ("refused", "stopped", "failed", "done"):
-            sys.exit(f"The program {told.name} is {told.status}: {told.why}")
+        progress = arm.query(answers.State).program
+        if progress is not None and wanted(progress):
+            return progress
+        if progress is not None and progress.status in ("refused", "stopped", "failed", "done"):
+            sys.exit(f"The program {progress.name} is {progress.status}: {progress.why}")
         time.sleep(0.02)
 
 
 def tile(page: ViserPage) -> NDArray[np.uint8]:
-    """The middle of the scene."""
+    """Return the middle of the scene at half its size."""
     picture = page.scene_picture()
     across, down = TILE
     height, width, _ = picture.shape
@@ -190,11 +190,12 @@ PICTURES: dict[Callable[[ViserPage], None], Camera] = {
 
 
 def main() -> None:
-    """Take those that are named, or all."""
+    """Take the named pictures, or all."""
     names = sys.argv[1:] or [take.__name__ for take in PICTURES]
     wanted = {take: camera for take, camera in PICTURES.items() if take.__name__ in names}
     if len(wanted) < len(names):
-        sys.exit(f"There are: {', '.join(take.__name__ for take in PICTURES)}.")
+        known = ", ".join(take.__name__ for take in PICTURES)
+        sys.exit(f"Unknown picture in {' '.join(names)}. Choose from: {known}.")
     IMAGES.mkdir(exist_ok=True)
     with launched() as browser:
         for number, (take, camera) in enumerate(wanted.items(), start=1):

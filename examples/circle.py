@@ -1,4 +1,4 @@
-"""The circle of the 2013 paper with the tip of the gripper: planned, plotted, and shown."""
+"""Plan, plot and show the circle of the 2013 paper, drawn with the tip of the gripper."""
 
 import katana450
 

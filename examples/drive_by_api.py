@@ -18,15 +18,15 @@ with katana450.connect(url, name="drive_by_api.py") as client:
     state = client.query(answers.State)
     print(f"The joints are at {np.degrees(state.q).round(1).tolist()} deg.")
 
-    # The server moves the joints, and keeps clear of everything on the way.
+    # Move the joints. The server stops the arm before a contact.
     state = client.joints([0.3, -1.0, 1.4, 0.3, 0.0])
-    print(f"At the posture: {state.why or 'as wanted'}.")
+    print(f"At the posture: {state.why or 'as requested'}.")
 
-    # The tool point, with pitch and roll kept.
+    # Move the tool point. Pitch and roll stay the same.
     state = client.go(requests.Position(p=(0.40, 0.0, 0.0)))
-    print(f"At the point: {state.why or 'as wanted'}.")
+    print(f"At the point: {state.why or 'as requested'}.")
 
-    # A path planned here, followed there. A STOP on the page ends it.
+    # Plan a path here and let the arm of the server follow it. A STOP on the page ends it.
     circle = arm.circle(centre=(0.150, 0.0, -0.110), radius=0.100)
     client.joints(arm.ready)
     for plan in (arm.plan(circle.start), circle):

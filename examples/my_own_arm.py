@@ -1,4 +1,4 @@
-"""An arm of your own: any URDF with a pan axis, three parallel axes and a roll axis.
+"""Load your own arm: any URDF with a pan axis, three parallel axes and a roll axis.
 
 python my_own_arm.py [FILE.urdf] [TOOL_LINK]
 """
@@ -16,7 +16,7 @@ tool = sys.argv[2] if len(sys.argv) > 2 else None
 try:
     arm = katana450.load(file, tool, frame="base")
 except katana450.RobotDescriptionError as error:
-    sys.exit(f"This is no arm for katana450: {error}")
+    sys.exit(f"This is not an arm for katana450: {error}")
 
 print(f"{arm.name}: {arm.n} joints, poses of the link {arm.tool!r} in the base frame")
 for note in arm.notes:
@@ -28,12 +28,12 @@ for solution in arm.ik(T):
     inside = "inside" if solution.within_limits else "outside"
     print(f"  {solution.branch}: {np.degrees(solution.q).round(1).tolist()} deg, {inside} limits")
 
-# Five axes cannot take every pose: ask for the nearest one, and why it is not the one wanted.
+# Five axes cannot reach every pose. Compute the nearest one, and the reason for the difference.
 T[:3, 3] += (0.0, 0.1, 0.5)
 best = arm.nearest(T)
 print(f"The nearest pose to one half a metre higher: {best.reason}.")
 
-# A sequence of poses at once.
+# Solve a sequence of poses at once.
 q = np.linspace(arm.ready, arm.ready + 0.2, 1000)
 found = arm.ik(arm.fk(q))
 print(f"{len(q)} poses solved, at most {found.position_error[:, 0].max():.1e} m off.")

@@ -1,9 +1,9 @@
-"""Builds the documentation site in ``build/site``, offline, with every warning as an error.
+"""Build the documentation site in ``build/site``, offline, with every warning as an error.
 
 ``python -m docs.site.build``
 
-The Markdown files are copied into ``build/docs`` where they stand in the repository, so that their
-relative links need no change. The pages of the reference are written beside them.
+The Markdown files are copied to the same relative paths in ``build/docs``, so that their links need
+no change. The pages of the reference are written beside them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import katana450
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "build" / "docs"
-# Files of the site that stand elsewhere in the repository.
+# Files that are copied to the root of the site.
 ASSETS = (
     ROOT / "docs" / "site" / "style.css",
     ROOT / "docs" / "site" / "iframe-worker.js",
@@ -37,7 +37,7 @@ PAGES = (
     "tests/exchange/foreign/README.md",
 )
 
-# Title of a page of the reference, and the public names that it documents.
+# Titles of the pages of the reference, with the public names on each.
 REFERENCE = {
     "Arms": ("load", "Arm"),
     "Kinematics": ("IKSolutions", "Solution", "Branch", "NearestPose"),
@@ -60,7 +60,7 @@ def reference_page(title: str, names: tuple[str, ...]) -> str:
 
 
 def assemble(folder: Path) -> None:
-    """Copy every page into ``folder``, which is emptied first, and write the reference there."""
+    """Empty ``folder``, copy every page into it, and write the reference there."""
     shutil.rmtree(folder, ignore_errors=True)
     for pattern in PAGES:
         for file in filter(Path.is_file, ROOT.glob(pattern)):

@@ -1,4 +1,4 @@
-"""Shows the examples of docstrings as code: an extension of griffe, which reads the docstrings."""
+"""Show the examples of docstrings as code: an extension of griffe, which reads the docstrings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def fenced(text: str) -> str:
 
 
 class FencedDoctests(griffe.Extension):
-    """Fences the doctest examples of every docstring in a package."""
+    """A griffe extension that fences the doctest examples of every docstring in a package."""
 
     def on_instance(self, *, obj: griffe.Object, **_kwargs: Any) -> None:
         """Fence the examples in the docstring of one object, if it has any."""

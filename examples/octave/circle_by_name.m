@@ -1,11 +1,11 @@
-% The circle of the 2013 paper as its Simulink model drives it: rotations of the VRML world's
-% Transforms are set by their DEF names, and read back.
+% Drive the circle of the 2013 paper as its Simulink model does: set the rotations of Transforms of
+% the VRML world by their DEF names, and read them back.
 %
 %   katana450 serve --lines 5560
 %   octave-cli --path examples/octave --eval "port = 5560; circle_by_name"
 %
-% The angles come from kinematics in m-code. The world is no drawing: setting a rotation tells the arm
-% to go there, under its limits, and what is read back is where it is.
+% The angles come from kinematics in m-code. Setting a rotation moves the arm under its limits;
+% reading it returns where the arm is.
 if ! exist ("port", "var")
   port = 5560;
 end

@@ -1,6 +1,6 @@
 function values = katana_get (arm, nodes, field)
-  % That field of the nodes (cellstr, DEF names of the VRML world) as it is now, as Simulink's VR
-  % Source reads it: a row each.
+  % Return the present values of a field of nodes (cellstr, DEF names of the VRML world), one row per
+  % node, as Simulink's VR Source does.
   request = struct ("do", "get", "node", nodes{1}, "field", field);
   request.more = cellfun (@(node) struct ("node", node, "field", field), nodes(2:end), ...
                           "UniformOutput", false);

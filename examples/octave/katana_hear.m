@@ -1,5 +1,5 @@
 function answer = katana_hear (arm, kind)
-  % The next answer of that kind, a struct. What was refused is an error.
+  % Return the next answer of a kind, a struct. Raise an error if a request was refused.
   persistent unread = "";
   do
     while ! any (unread == "\n")

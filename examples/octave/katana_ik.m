@@ -1,12 +1,12 @@
 function q = katana_ik (p, pitch, roll, tool)
-  % Joint angles (1x5) [rad] that bring the tool point to p (1x3) [m] in the frame {S}, the tool
-  % pitch below the horizontal and turned by roll [rad]: shoulder in front, elbow up.
+  % Return joint angles (1x5) [rad] that bring the tool point to p (1x3) [m] in the frame {S}, with the
+  % tool pitched below the horizontal and rolled by pitch and roll [rad]: shoulder front, elbow up.
   %
-  % The arm's product of exponentials, solved from the outside in. Axis 1 turns the arm's plane to
-  % the point (Paden-Kahan subproblem 1). In it the pitch fixes where the wrist is; its distance
-  % from the shoulder gives axis 3 (subproblem 3), its direction axis 2 (subproblem 1).
+  % Axis 1 turns the plane of the arm to the point (Paden-Kahan subproblem 1). In this plane the pitch
+  % determines the position of the wrist. Its distance from the shoulder gives axis 3 (subproblem 3),
+  % its direction axis 2 (subproblem 1).
   %
-  % tool: distance of the tool point from axis 4 [m]; 0.1883 is the bare flange.
+  % tool: distance of the tool point from axis 4 [m]; 0.1883 for the bare flange.
   upper = 0.190;
   fore = 0.139;
   theta1 = atan2 (p(2), p(1));
@@ -17,7 +17,7 @@ function q = katana_ik (p, pitch, roll, tool)
     error ("katana_ik: the point is out of reach by axis 3");
   end
   theta3 = acos (c3);
-  % z is up and angles about y count downwards.
+  % z points up, and positive angles about y point down.
   theta2 = -atan2 (z, r) - atan2 (fore * sin (theta3), upper + fore * c3);
   q = [theta1, theta2, theta3, pitch - theta2 - theta3, roll];
 end

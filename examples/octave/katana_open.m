@@ -1,7 +1,7 @@
 function arm = katana_open (port, name)
-  % A connection to `katana450 serve --lines PORT` on this machine.
+  % Connect to `katana450 serve --lines PORT` on this machine.
   %
-  % Whoever drives gives ten heartbeats a second; each request is one.
+  % The driver must send ten heartbeats a second; each request is one.
   pkg load instrument-control
   arm = tcpclient ("127.0.0.1", port);
   katana_say (arm, struct ("do", "hello", "name", name));

@@ -1,5 +1,5 @@
 function state = katana_rest (arm, done)
-  % The state once the arm is at rest with the order in it that done (an answer) is of.
+  % Wait until the command that done (an answer) confirms is executed. Return the state at rest.
   do
     pause (0.05);
     katana_say (arm, struct ("do", "query"));

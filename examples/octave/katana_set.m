@@ -1,7 +1,7 @@
 function done = katana_set (arm, nodes, field, values)
-  % Set that field of the nodes (cellstr, DEF names of the VRML world), as Simulink's VR Sink does:
-  % row k of values is for nodes{k}. All at once, and none where one cannot be.
-  % done is the answer, for katana_rest.
+  % Set a field of nodes (cellstr, DEF names of the VRML world), as Simulink's VR Sink does. Row k of
+  % values is for nodes{k}. All are set in one tick, or none if one is refused.
+  % Return the answer, for katana_rest.
   settings = cell (1, numel (nodes));
   for k = 1:numel (nodes)
     settings{k} = struct ("node", nodes{k}, "field", field, "value", values(k, :));

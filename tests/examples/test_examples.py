@@ -84,14 +84,14 @@ def test_other_mechanism_is_refused_in_a_sentence(tmp_path: Path) -> None:
         timeout=SECONDS,
     )
     assert done.returncode == 1
-    assert done.stderr.startswith("This is no arm for katana450: ")
+    assert done.stderr.startswith("This is not an arm for katana450: ")
 
 
 def test_arm_of_a_server_is_driven(tmp_path: Path) -> None:
     with AppServer() as server:
         said = run(tmp_path, EXAMPLES / "drive_by_api.py", server.url)
-    assert "At the posture: as wanted." in said
-    assert "At the point: as wanted." in said
+    assert "At the posture: as requested." in said
+    assert "At the point: as requested." in said
     missed = re.search(r"The circle is done, (\S+) rad", said)
     assert missed is not None
     assert float(missed[1]) < 1e-6
