@@ -1,4 +1,4 @@
-"""What many tests stand on: the arm of the URDF, and a session of it."""
+"""Fixtures of many tests: the arm of the URDF, and a session of it."""
 
 from __future__ import annotations
 

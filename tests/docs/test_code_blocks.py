@@ -40,7 +40,7 @@ ELSEWHERE = {
     "apt-get": "changes the system",
     "sudo apt": "changes the system",
     "uv tool install": "tests/packaging/test_tool_install.py",
-    "pipx install": "installs as uv does, from the same package; pipx is not among the dependencies",
+    "pipx install": "installs the same package as uv; pipx is not among the dependencies",
     "docker": "needs a container service; .ci/image builds and runs the image without one",
     "export": "sets a variable for docker",
     "git": "reads the history, which an archive of the sources does not have",

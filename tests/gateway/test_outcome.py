@@ -195,7 +195,9 @@ def test_server_names_the_refused_parts_of_a_request(server: AppServer) -> None:
                 break
         lines.answer(do="release_lease")
     assert answer["outcome"] == "limited"
-    assert answer["refused"] == [{"part": 2, "command": "move_object", "why": "There is no 'ball'."}]
+    assert answer["refused"] == [
+        {"part": 2, "command": "move_object", "why": "There is no 'ball'."}
+    ]
 
 
 def test_request_without_a_command_has_no_outcome(program: Client) -> None:

@@ -1,1 +1,1 @@
-"""What the arm can do without: programs, files of other programs, pictures, maps."""
+"""Features beyond the core: programs, files of other programs, pictures, maps."""
