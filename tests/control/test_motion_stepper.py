@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import TOOL_SPEED, Session
 from katana450.arm.control.state import JointTarget, Reason, State, Status
 from katana450.errors import InputError
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body
 from katana450.maths.kinematics.freedoms import pitch_and_roll
@@ -144,6 +145,23 @@ def test_pause_stays_on_the_path_and_resume_continues(session: Session, state: S
     assert (redirected.setpoint == paused.setpoint).all()
     assert {f.reason for f in redirected.findings} == {Reason.PAUSED}
     assert (run(session, redirected, [cmd.Resume()], 400).setpoint == session.ready).all()
+
+
+@pytest.mark.parametrize("command", [cmd.Pause(), cmd.Stop(), cmd.Resume()])
+def test_elbow_that_is_too_fast_for_its_branch_brakes_beyond_it(
+    session: Session, state: State, command: cmd.Command
+) -> None:
+    # A new goal on the old branch came while the elbow was about to pass the stretched arm.
+    q, qd = np.array(state.setpoint), np.zeros(5)
+    q[2], qd[2] = 0.002, -0.4
+    goal = q + np.array([0.0, 0.0, 0.5, 0.0, 0.0])
+    begun = run(session, state, [cmd.SetJoints(goal)])
+    moving = replace(begun, motion=JointMotion(frozen(q), frozen(qd), frozen(np.zeros(5))))
+    assert moving.branch.elbow == state.branch.elbow
+    after = session.step(moving, [command], moving.t + TICK)
+    check(session, moving.motion, after.motion)
+    travelled, expected = after.motion.q - q, 0.5 * TICK * (qd + after.motion.qd)
+    np.testing.assert_allclose(travelled, expected, rtol=0.0, atol=1e-4)
 
 
 def test_speed_scale_applies_at_once_to_every_joint(session: Session, state: State) -> None:

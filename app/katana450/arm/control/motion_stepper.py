@@ -27,8 +27,11 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitched_frame
 from katana450.maths.kinematics.velocity import JogFrame, jog, tool_speed, tool_speed_bound
-from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
+from katana450.maths.motion.limiter import LIMIT_TOLERANCE, JointMotion, Limiter, Limits
 from katana450.maths.motion.pursuit import stream_step
+
+ELBOW = 2
+"""Index of axis 3, which bends the elbow."""
 
 PROBE_LENGTH = 0.02
 """[rad] Length of path that must be clear before a waiting arm continues. After a shorter probe the
@@ -133,14 +136,29 @@ class MotionStepper:
     def limiter(self, state: State) -> Limiter:
         """Return the limiter that keeps the elbow on its branch.
 
-        Returns the limiter without that bound if the motion starts or ends on another branch.
+        Returns the limiter without that bound if the motion starts or ends on another branch, or
+        is too fast to stop on this one: a new goal can come while the elbow changes its branch.
         """
         limiter = self._elbow[state.branch.elbow]
         limits = limiter.limits
         for q in (state.setpoint, state.goal):
             if not ((q >= limits.lower) & (q <= limits.upper)).all():
                 return self._any
-        return limiter
+        return limiter if self._elbow_stops_inside(limits, state.motion) else self._any
+
+    def _elbow_stops_inside(self, limits: Limits, motion: JointMotion) -> bool:
+        """Return whether the elbow comes to rest inside ``limits`` if it brakes now."""
+        q, qd, qdd = (float(each[ELBOW]) for each in (motion.q, motion.qd, motion.qdd))
+        lower, upper = float(limits.lower[ELBOW]), float(limits.upper[ELBOW])
+        acceleration, jerk = float(limits.acceleration[ELBOW]), float(limits.jerk[ELBOW])
+        fastest = abs(qd) + qdd**2 / (2.0 * jerk)
+        # The brake takes at most this time, so the elbow travels at most this far.
+        if fastest * (fastest / acceleration + 2.0 * acceleration / jerk) <= min(
+            q - lower, upper - q
+        ):
+            return True
+        end = float(self._any.stopping_point(motion)[ELBOW])
+        return lower - LIMIT_TOLERANCE <= end <= upper + LIMIT_TOLERANCE
 
     def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
         """Return the end of a brake begun now (n,) [rad], the tool's travel [m], the time [s]."""
@@ -332,14 +350,14 @@ def _bent(arm: ArmModel, elbow: str) -> Limits:
     """Return the limits of ``arm`` with its elbow kept on one side of the stretched arm."""
     canonical = arm_of(arm.chain)
     limits = arm.limits
-    sign, shift = canonical.signs[2], canonical.shifts[2]
+    sign, shift = canonical.signs[ELBOW], canonical.shifts[ELBOW]
     seam = -sign * shift
     lower, upper = np.array(limits.lower), np.array(limits.upper)
-    if lower[2] < seam < upper[2]:
+    if lower[ELBOW] < seam < upper[ELBOW]:
         if (elbow == "up") == (sign > 0.0):
-            lower[2] = seam
+            lower[ELBOW] = seam
         else:
-            upper[2] = seam
+            upper[ELBOW] = seam
     return replace(limits, lower=lower, upper=upper)
 
 
