@@ -45,7 +45,7 @@ def test_an_object_is_brought_moved_changed_and_removed(
         page.wait_until(
             lambda: "2304 triangles, 104 × 104 × 24 mm" in sheet_text(page), "the answer"
         )
-        assert "taken as mm" in sheet_text(page)
+        assert "assumed to be mm" in sheet_text(page)
         page.wait_ready((SHAPE,))
         np.testing.assert_allclose(place_of(page), (0.36, 0.0, 0.0), atol=1e-6)
 

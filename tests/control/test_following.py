@@ -356,7 +356,7 @@ def test_goal_in_the_table_is_refused(
     arm: ArmModel, world: CollisionWorld, guarded: Session
 ) -> None:
     state = guarded.begin(LOW, 0.0, 0.0)
-    with pytest.raises(BlockedError, match=r"table.*too near"):
+    with pytest.raises(BlockedError, match=r"table.*too small"):
         plan_to(arm, world, state, LOW + np.radians([0.0, 23.0, 0.0, 0.0, 0.0]))
 
 

@@ -142,7 +142,7 @@ def test_server_runs_without_the_extensions_it_does_not_need(
         with connect(server.url, "Test") as arm:
             assert arm.query(answers.Objects).objects
             assert arm.query(answers.Links).links
-            with pytest.raises(RefusedError, match="not installed"):
+            with pytest.raises(RefusedError, match="Install the extension"):
                 arm.ask(requests.Get(node="Clock", field="startTime"))
             arm.ask(requests.Home())
         upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")

@@ -78,4 +78,4 @@ def test_stop_works_with_an_unreadable_access_file(tmp_path: Path) -> None:
         state = json.loads(ask(f"{server.url}/api/v1/state", Authorization=bearer)[2])
         assert state["stopped"] == "Vera pressed STOP."
         assert ask(f"{server.url}/stop", data=b"", Cookie="x=y", Origin=server.url)[0] == 401
-        assert server.output.count("last good links") == 1
+        assert server.output.count("The last links that could be read stay valid") == 1
