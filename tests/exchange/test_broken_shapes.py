@@ -1,75 +1,19 @@
-"""Tests of files that are corrupt, hostile or of another kind: refused with a message, or read."""
+"""Test shape files that are corrupt or of another kind: refused with a message, or read."""
 
 from __future__ import annotations
 
-import gzip
 import json
 import math
-import os
-import random
 import struct
-import subprocess
-import sys
-import time
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_text import HEADER
-from katana450.extensions.importers.reading import bind
-from katana450.extensions.importers.shape_file import (
-    MAX_MEMORY_BYTES,
-    MAX_SIZE,
-    MIN_SIZE,
-    SECONDS,
-    Format,
-    ShapeFile,
-    read_shape,
-    read_shape_guarded,
-)
+from katana450.extensions.importers.shape_file import Format, read_shape
 from katana450.extensions.importers.surface import MOST_TRIANGLES
-
-resource = pytest.importorskip("resource")
-
-FOREIGN = Path(__file__).parent / "foreign"
-
-MUTATIONS = 1000 if "KATANA450_LONG" in os.environ else 60
-"""Number of mutations of each seed."""
-
-PLY = """ply
-format ascii 1.0
-element vertex {vertices}
-property float x
-property float y
-property float z
-element face {faces}
-property list uchar int vertex_indices
-end_header
-0 0 0
-1 0 0
-0 1 0
-{rest}"""
-
-
-def ply(rest: str = "3 0 1 2\n", vertices: object = 3, faces: object = 1) -> bytes:
-    return PLY.format(rest=rest, vertices=vertices, faces=faces).encode()
-
-
-PAINTED = (
-    ply()
-    .replace(
-        b"float z\n",
-        b"float z\n"
-        + b"".join(b"property uchar %s\n" % part for part in (b"red", b"green", b"blue")),
-    )
-    .replace(b" 0\n", b" 0 9 9 9\n")
-)
+from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 
 
 def stl(count: int = 1, corners: tuple[float, ...] = (0, 0, 0, 1, 0, 0, 0, 1, 0)) -> bytes:
@@ -157,12 +101,6 @@ def test_invalid_stl_is_refused(data: bytes, said: str) -> None:
 def test_invalid_obj_is_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(text.encode(), Format.OBJ, "a.obj")
-
-
-OBJ = (
-    b"mtllib ../../etc/passwd\no a\nv 0 0 0 1 0 0\nv 1 0 0 \\\n 1 0 0\nv 1 1 0 1 0 0\n"
-    b"f -3 -2 -1\nv 0 0 1\nvt 0 0\nvn 0 0 1\nusemtl gold\nf 1/1/1 2//1 3/1 -1 # four\r\nl 1 2\n"
-)
 
 
 def test_statements_of_obj() -> None:
@@ -330,128 +268,3 @@ def test_modes_colours_and_places_of_gltf(mode: int, faces: int) -> None:
     assert shape.colours is not None
     assert np.unique(shape.colours, axis=0).tolist() == [[188, 0, 0, 128]]
     assert shape.text.endswith("Left out: pictures on the surface, motion.")
-
-
-NUMBERS = [b"nan", b"-1", b"1e999", b"2147483648", b"4294967295", b"9" * 30, b"[", b"}", b'"', b"0"]
-
-
-SEEDS = {
-    file: (FOREIGN / file).read_bytes()
-    for file in (
-        *("vtk.wrl", "castle.wrl", "meshlab.stl", "vtk.stl", "meshlab.obj", "vtk.ply"),
-        *("meshlab.ply", "assimp.glb", "vtk.gltf"),
-    )
-} | {"colours.obj": OBJ, "colours.ply": PAINTED}
-
-
-def mutated(data: bytes, chance: random.Random) -> bytes:
-    """Return ``data`` with some bytes, pieces or numbers changed, or with its end cut off."""
-    found = bytearray(data)
-    for _ in range(chance.randint(1, 4)):
-        at = chance.randrange(len(found))
-        piece = slice(at, at + chance.randint(1, 40))
-        match chance.randrange(7):
-            case 0:
-                found[at] ^= 1 << chance.randrange(8)
-            case 1:
-                found[at] = chance.choice((0, 1, 127, 128, 255))
-            case 2:
-                del found[at:]
-            case 3:
-                del found[piece]
-            case 4:
-                found[at:at] = found[piece] * chance.choice((1, 1, 1000))
-            case 5:
-                found[at : at + 4] = struct.pack("<I", chance.choice((0, 2**31, 2**32 - 1)))
-            case _:
-                found[at : at + chance.randrange(8)] = b" %s " % chance.choice(NUMBERS)
-        if not found:
-            break
-    return bytes(found)
-
-
-def looked_at(data: bytes, format: Format) -> ShapeFile | None:
-    """Return the reading; None if it is refused with a message. Other exceptions fail."""
-    try:
-        shape = read_shape(data, format, "fuzz.bin", 1e-3)
-    except InputError as error:
-        said = str(error)
-        assert said[0].isalnum()
-        assert said[-1] == "."
-        assert len(said) < 400
-        return None
-    assert np.isfinite(shape.vertices).all()
-    assert shape.faces.min() >= 0
-    assert shape.faces.max() == len(shape.vertices) - 1
-    assert shape.colours is None or shape.colours.shape == (len(shape.faces), 4)
-    assert MIN_SIZE <= np.ptp(shape.vertices, axis=0).max() <= MAX_SIZE
-    return shape
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_mutated_files_are_read_or_refused(seed: str) -> None:
-    data, format = SEEDS[seed], Format.of(seed)
-    chance = random.Random(seed)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    read = 0
-    for _ in range(MUTATIONS):
-        start = time.process_time()
-        read += looked_at(mutated(data, chance), format) is not None
-        assert time.process_time() - start < SECONDS
-    assert read < MUTATIONS
-    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MAX_MEMORY_BYTES
-
-
-@settings(max_examples=MUTATIONS, deadline=None)
-@given(st.sampled_from(Format), st.binary(max_size=200), st.integers(0, 150))
-def test_random_bytes_after_any_header_are_read_or_refused(
-    format: Format, data: bytes, kept: int
-) -> None:
-    beginnings = {Format.WRL: "castle.wrl", Format.STL: "vtk.stl", Format.OBJ: "vtk.obj"}
-    beginning = beginnings.get(format, "meshlab.ply" if format is Format.PLY else "assimp.glb")
-    looked_at((FOREIGN / beginning).read_bytes()[:kept] + data, format)
-
-
-def deeply() -> bytes:
-    return f"{HEADER}\n{'Group { children ' * 500_000}".encode()
-
-
-def laughs() -> bytes:
-    rows = ["DEF n0 Shape { geometry Box { } }"]
-    rows += [f"DEF n{i} Group {{ children [ {f'USE n{i - 1} ' * 10} ] }}" for i in range(1, 30)]
-    return f"{HEADER}\n{' '.join(rows)}".encode()
-
-
-@pytest.mark.parametrize(
-    ("make", "format"),
-    [
-        (lambda: gzip.compress(f"{HEADER}\n".encode() + bytes(50_000_000), 1), Format.WRL),
-        (deeply, Format.WRL),
-        (laughs, Format.WRL),
-        (lambda: ply(faces=99_999_999_999), Format.PLY),
-        (lambda: ply("9" * 1_000_000 + " 1" * 1_000_000, faces=0), Format.PLY),
-    ],
-    ids=["bomb", "deep", "laughs", "faces", "wide"],
-)
-def test_hostile_files_are_refused_in_time(make: Callable[[], bytes], format: Format) -> None:
-    data = make()
-    start = time.perf_counter()
-    with pytest.raises(InputError):
-        read_shape_guarded(data, format, "../../hostile\n.bin")
-    assert time.perf_counter() - start < SECONDS + 2.0
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems count no address space")
-def test_a_reading_beyond_the_memory_limit_ends() -> None:
-    assert bind.__module__ == "katana450.extensions.importers.reading"
-    words = "from katana450.extensions.importers.reading import bind; bind(); bytearray({} << 20)"
-    for mebibytes, ends in ((2048, 1), (64, 0)):
-        done = subprocess.run(
-            [sys.executable, "-c", words.format(mebibytes)],
-            cwd=Path(__file__).parents[2],
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
-            capture_output=True,
-            check=False,
-        )
-        assert done.returncode == ends
-        assert (b"MemoryError" in done.stderr) == bool(ends)

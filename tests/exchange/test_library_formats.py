@@ -26,8 +26,8 @@ from katana450.extensions.importers.shape_file import (
     read_shape_guarded,
 )
 from katana450.maths.geometry import se3, so3
+from tests.exchange.mutations import MUTATIONS, looked_at, mutated
 from tests.exchange.solids import is_closed, sides, volume
-from tests.exchange.test_broken_shapes import MUTATIONS, looked_at, mutated
 
 L = [(0, 0), (60, 0), (60, 15), (20, 15), (20, 40), (0, 40)]
 """[mm] The L of the foreign files, whose polygons are concave."""

@@ -32,6 +32,9 @@ QUIET = 0.4
 FAREWELL = 0.5
 """Timeout for the server's close frame [s]."""
 
+HOUR = 3600.0
+"""One hour [s]."""
+
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 

@@ -16,9 +16,7 @@ from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import ToolTarget
-from tests.kinematics.test_projection import targets
-
-FRONT_UP = Branch("front", "up")
+from tests.kinematics.targets import FRONT_UP, targets
 
 
 def random_pose(rng: np.random.Generator) -> FloatArray:

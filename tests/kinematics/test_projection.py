@@ -1,3 +1,5 @@
+"""Test the projection of a pose onto the feasible poses."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -5,7 +7,6 @@ import itertools
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from katana450.errors import InputError
@@ -17,40 +18,9 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.orientation import PlaneOrientation
 from katana450.maths.kinematics.projection import Projection, project
+from tests.kinematics.targets import FRONT_UP, assert_on_branch, pose, targets
 
-FRONT_UP = Branch("front", "up")
 REACH = 0.6318
-
-
-def pose(w: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
-    return se3.from_rotation_translation(so3.exp(w), p)
-
-
-def targets(chain: Chain, rng: np.random.Generator, rounds: int) -> list[FloatArray]:
-    """Return poses of every kind that the arm cannot take, one of each per round."""
-    result = []
-    for _ in range(rounds):
-        turned = forward(chain, rng.uniform(chain.lower, chain.upper))
-        turned[:3, :3] = turned[:3, :3] @ so3.exp(0.5 * rng.normal(size=3))
-        far: FloatArray = rng.normal(size=3)
-        far *= rng.uniform(0.6, 1.2) / np.linalg.norm(far)
-        behind = math.pi + 0.07 + rng.uniform(-0.25, 0.25)
-        beside_axis = [
-            *(10.0 ** rng.uniform(-6, -1.5) * rng.normal(size=2)),
-            rng.uniform(-0.6, 0.65),
-        ]
-        result += [
-            turned,
-            pose(2.0 * rng.normal(size=3), far),
-            pose(2.0 * rng.normal(size=3), 0.12 * rng.normal(size=3)),
-            pose(
-                2.0 * rng.normal(size=3),
-                [0.4 * math.cos(behind), 0.4 * math.sin(behind), rng.uniform(-0.4, 0.5)],
-            ),
-            pose(2.0 * rng.normal(size=3), beside_axis),
-            forward(chain, rng.uniform(chain.lower - 0.6, chain.upper + 0.6)),
-        ]
-    return result
 
 
 def assert_measured(chain: Chain, T: FloatArray, p: Projection) -> None:
@@ -68,13 +38,6 @@ def assert_measured(chain: Chain, T: FloatArray, p: Projection) -> None:
     in_plane = asked - (normal @ asked) * normal
     cosine = (in_plane @ taken) / np.linalg.norm(in_plane)
     assert math.cos(p.pitch_error) == pytest.approx(cosine, abs=1e-9)
-
-
-def assert_on_branch(p: Projection) -> None:
-    """Check that `p` is on `p.branch` or its edge."""
-    r = p.T[0, 3] * math.cos(p.q[0]) + p.T[1, 3] * math.sin(p.q[0])
-    assert abs(r) < 1e-11 or (r > 0.0) == (p.branch.shoulder == "front")
-    assert p.q[2] == 0.0 or (p.q[2] > 0.0) == (p.branch.elbow == "up")
 
 
 def test_a_feasible_pose_comes_back_unchanged(chain: Chain, rng: np.random.Generator) -> None:

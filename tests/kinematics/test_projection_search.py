@@ -13,7 +13,7 @@ from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.projection import project
 from tests.kinematics.brute_force import NearestPoint, least_rotation
-from tests.kinematics.test_projection import FRONT_UP, assert_on_branch, targets
+from tests.kinematics.targets import FRONT_UP, assert_on_branch, targets
 
 
 def assert_no_search_beats_it(

@@ -223,10 +223,7 @@ class Arm:
         """
         if body:
             return jacobian_body(self.chain, q)
-        J = jacobian_space(self.chain, q)
-        if not self.pose_frame.in_base:
-            return J
-        return se3.adjoint(self.pose_frame.T_frame_shoulder) @ J
+        return self.pose_frame.twists_from_shoulder(jacobian_space(self.chain, q))
 
     def plan(
         self, goal: npt.ArrayLike, start: npt.ArrayLike | None = None, *, seed: int = 0
@@ -357,10 +354,8 @@ class Arm:
         >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())
         True
         """
-        reachability = Reachability(
-            self.chain, self._mounted.T_base_shoulder, table, pitches, rolls
-        )
-        survey = Survey(reachability, voxel, samples, seed)
+        reach = Reachability(self.chain, self._mounted.T_base_shoulder, table, pitches, rolls)
+        survey = Survey(reach, voxel, samples, seed)
         return survey.map(survey.count(chunk) for chunk in survey.chunks())
 
     def show(

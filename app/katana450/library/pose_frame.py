@@ -51,6 +51,10 @@ class PoseFrame:
         """Return poses ``T`` (..., 4, 4) in {S} as poses in this frame [m]."""
         return self.T_frame_shoulder @ T if self.in_base else T
 
+    def twists_from_shoulder(self, V: FloatArray) -> FloatArray:
+        """Return twists (omega, v), the columns of ``V`` (6, n) in {S}, as twists in this frame."""
+        return se3.adjoint(self.T_frame_shoulder) @ V if self.in_base else V
+
     def to_shoulder(self, T: npt.ArrayLike) -> npt.ArrayLike:
         """Return poses ``T`` (..., 4, 4) in this frame as poses in {S} [m].
 

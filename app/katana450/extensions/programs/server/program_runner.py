@@ -20,6 +20,7 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
+from katana450.extensions.programs.server.program_owner import ProgramOwner
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api import answers
@@ -57,12 +58,10 @@ class ProgramRunner(Runner):
         ends. A page that reloads returns sooner.
         """
         super().__init__(hub, options)
-        self._owner_silence: float = options.owner_silence
+        self._owner = ProgramOwner(hub, options.owner_silence)
         self._parts: dict[str, str] = {}
         self._planning: Planning | None = None
-        self._owner: Window | None = None
         self._then: ProgramOrder | None = None
-        self._owner_seen = 0.0
         self._participant: Window | None = None
         self._run: Run | None = None
         # The speed to restore at the end, the maximum that a person allows, and the last command.
@@ -85,13 +84,13 @@ class ProgramRunner(Runner):
 
     def owns(self, window: Window) -> bool:
         """Return whether ``window`` is the page or API program that owns the present program."""
-        return self._is_owner(window.person)
+        return self._owner.is_person(window.person)
 
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError if ``actor`` may not drive, or does not own the running program."""
         self._check_may_drive(actor.person)
         if self.running:
-            self._check_owns(actor.person)
+            self._owner.check_may_steer(actor.person)
 
     def handle(self, window: Window, request: Request) -> answers.Answer:
         """Execute ``request``. Raises LeaseError or InputError."""
@@ -146,8 +145,8 @@ class ProgramRunner(Runner):
         self._own(window)
 
     def _own(self, window: Window) -> None:
-        self._owner, self._run, self._then = window, None, None
-        self._owner_seen = self.hub.clock()
+        self._run = self._then = None
+        self._owner.change_to(window, self.hub.clock())
 
     def steer(self, window: Window, order: ProgramOrder) -> int | None:
         """Run, step, pause, resume or end the program. Raises LeaseError if it is refused.
@@ -160,13 +159,13 @@ class ProgramRunner(Runner):
         self._check_may_drive(window.person)
         planning = self._planning
         if planning is not None and planning.busy:
-            self._check_owns(window.person)
+            self._owner.check_may_steer(window.person)
             return self._steer_planning(planning, window, order)
         if order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running:
             return self._begin(window, order)
         if not self.running or self._run is None:
             raise LeaseError("No program is running.")
-        self._check_owns(window.person)
+        self._owner.check_may_steer(window.person)
         match order:
             case ProgramOrder.RUN | ProgramOrder.RESUME:
                 return self._send(cmd.Resume())
@@ -219,7 +218,7 @@ class ProgramRunner(Runner):
     def tick(self) -> None:
         """Advance the running program by one step, or end it if owner, lease or stop demand it."""
         hub, t = self.hub, self.hub.clock()
-        if self._then is not None and self._owner_is_silent(t):
+        if self._then is not None and self._owner.is_silent(t):
             self._forget_run("its owner sends no heartbeats")
         if self.program is not None and self._then is not None:
             self._start_planned()
@@ -230,12 +229,12 @@ class ProgramRunner(Runner):
             # The next holder takes over an arm at rest, so no command is needed.
             self._leave_with(Phase.STOPPED, "The lease was taken from the program.")
             return
-        owner = self._owner
+        owner = self._owner.window
         if hub.stopped is not None:
             self._leave_with(Phase.STOPPED, hub.stopped.why)
             return
-        if owner is not None and self._owner_is_silent(t):
-            why = "sends no heartbeats" if self._owner_is_here() else "left"
+        if owner is not None and self._owner.is_silent(t):
+            why = "sends no heartbeats" if self._owner.is_here else "left"
             self._end(f"{owner.person.name} {why}. A program ends without its owner.")
             return
         arm = hub.arm
@@ -254,7 +253,7 @@ class ProgramRunner(Runner):
 
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last program; None if there was none."""
-        planning, owner = self._planning, self._owner
+        planning, owner = self._planning, self._owner.window
         if planning is None or owner is None:
             return None
         program, run, arm = planning.program, self._run, self.hub.arm
@@ -290,11 +289,12 @@ class ProgramRunner(Runner):
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
         then, self._then = self._then, None
-        if then is None or self._owner is None:
+        owner = self._owner.window
+        if then is None or owner is None:
             # The order was cancelled meanwhile.
             return
         try:
-            self.steer(self._owner, then)
+            self.steer(owner, then)
         except LeaseError as error:
             assert self._planning is not None
             self._planning.refused = str(error)
@@ -333,11 +333,13 @@ class ProgramRunner(Runner):
         except LeaseError:
             hub.leave(joined, for_good=True)
             raise
-        self._participant, self._owner, self._owner_seen = joined, window, hub.clock()
+        began = hub.clock()
+        self._participant = joined
+        self._owner.change_to(window, began)
         hub.gate.program = RunningProgram(joined.person, window.person.key)
         self._speed = self._commanded = arm.state.speed
         self._allowed = 1.0
-        self._run = Run(self._owner_seen, single=order is ProgramOrder.STEP)
+        self._run = Run(began, single=order is ProgramOrder.STEP)
         log.info("%s runs the program %s.", window.person.name, program.name)
         return ticket
 
@@ -387,29 +389,10 @@ class ProgramRunner(Runner):
         planning = self._planning
         if planning is None or not planning.busy:
             return
-        if not self._owner_is_silent(self.hub.clock()):
+        if not self._owner.is_silent(self.hub.clock()):
             raise LeaseError("Another program is being planned. Cancel it, or wait for it.")
         planning.cancel("Its owner sends no heartbeats.")
-
-    def _owner_is_here(self) -> bool:
-        owner = self._owner
-        return owner is not None and self.hub.window(owner.person.key) is not None
-
-    def _owner_is_silent(self, t: float) -> bool:
-        """Return whether no heartbeat of the owner was received for the heartbeat timeout."""
-        window = None if self._owner is None else self.hub.window(self._owner.person.key)
-        if window is not None:
-            self._owner_seen = max(self._owner_seen, window.heartbeat.newest)
-        return t - self._owner_seen > self._owner_silence
 
     def _check_may_drive(self, person: Person) -> None:
         if not person.role.may_drive:
             raise LeaseError("You may watch, not drive.")
-
-    def _is_owner(self, person: Person) -> bool:
-        return self._owner is not None and self._owner.person.key == person.key
-
-    def _check_owns(self, person: Person) -> None:
-        owner = self._owner
-        if owner is not None and not self._is_owner(person) and not person.role.may_take:
-            raise LeaseError(f"The program belongs to {owner.person.name}.")

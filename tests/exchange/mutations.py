@@ -1,0 +1,67 @@
+"""Mutations of files, and the check of what is read from them."""
+
+from __future__ import annotations
+
+import os
+import random
+import struct
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.importers.shape_file import (
+    MAX_SIZE,
+    MIN_SIZE,
+    Format,
+    ShapeFile,
+    read_shape,
+)
+
+MUTATIONS = 1000 if "KATANA450_LONG" in os.environ else 60
+"""Number of mutations of each seed."""
+
+NUMBERS = [b"nan", b"-1", b"1e999", b"2147483648", b"4294967295", b"9" * 30, b"[", b"}", b'"', b"0"]
+
+
+def mutated(data: bytes, chance: random.Random) -> bytes:
+    """Return ``data`` with some bytes, pieces or numbers changed, or with its end cut off."""
+    found = bytearray(data)
+    for _ in range(chance.randint(1, 4)):
+        at = chance.randrange(len(found))
+        piece = slice(at, at + chance.randint(1, 40))
+        match chance.randrange(7):
+            case 0:
+                found[at] ^= 1 << chance.randrange(8)
+            case 1:
+                found[at] = chance.choice((0, 1, 127, 128, 255))
+            case 2:
+                del found[at:]
+            case 3:
+                del found[piece]
+            case 4:
+                found[at:at] = found[piece] * chance.choice((1, 1, 1000))
+            case 5:
+                found[at : at + 4] = struct.pack("<I", chance.choice((0, 2**31, 2**32 - 1)))
+            case _:
+                found[at : at + chance.randrange(8)] = b" %s " % chance.choice(NUMBERS)
+        if not found:
+            break
+    return bytes(found)
+
+
+def looked_at(data: bytes, format: Format) -> ShapeFile | None:
+    """Return the reading; None if it is refused with a message. Other exceptions fail."""
+    try:
+        shape = read_shape(data, format, "fuzz.bin", 1e-3)
+    except InputError as error:
+        said = str(error)
+        assert said[0].isalnum()
+        assert said[-1] == "."
+        assert len(said) < 400
+        return None
+    assert np.isfinite(shape.vertices).all()
+    assert shape.faces.min() >= 0
+    assert shape.faces.max() == len(shape.vertices) - 1
+    assert shape.colours is None or shape.colours.shape == (len(shape.faces), 4)
+    assert MIN_SIZE <= np.ptp(shape.vertices, axis=0).max() <= MAX_SIZE
+    return shape

@@ -1,0 +1,65 @@
+"""Test STOP pressed by a page, and the stop caused by a page that hangs."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+from katana450.settings import Settings
+from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.gateway.client import ask, controlling, enter, opened
+
+
+def test_stop_press_over_two_channels_counts_once() -> None:
+    async def act() -> None:
+        with AppServer() as server:
+            cookie = enter(server.url)
+
+            def post(query: str = "") -> None:
+                answer = ask(
+                    f"{server.url}/stop{query}", data=b"", Cookie=cookie, Origin=server.url
+                )
+                assert answer[0] == 204
+
+            async with controlling(server.url, cookie) as control:
+                await control.wait(mood="ok")
+                await control.say("stop", press="one")
+                await control.wait(mood="stopped")
+                await control.say("clear_stop")
+                await control.wait(stopped=None)
+                post("?press=one")
+                await asyncio.sleep(0.3)
+                assert control.status["stopped"] is None
+                # A press with another name counts as a new one.
+                for query in ("?press=two", "?press=" + 100 * "x", "?press=", ""):
+                    post(query)
+                    await control.wait(mood="stopped")
+                    await control.say("clear_stop")
+                    await control.wait(stopped=None)
+
+    asyncio.run(act())
+
+
+def test_hanging_page_of_the_driver_causes_a_stop_in_time() -> None:
+    async def hang(url: str) -> list[float]:
+        took = []
+        async with opened(url) as (peer, control):
+            await control.say("take")
+            await control.wait(mine=True)
+            for degrees in (165.0, -170.0, 165.0):
+                await peer.set("Axis 1", value=degrees)
+                await control.wait(mood="moving")
+                control.alive = False
+                await control.wait(mood="stopped")
+                took.append(time.perf_counter() - control.last_beat)
+                control.alive = True
+                await control.say("clear_stop")
+                await control.wait(stopped=None)
+                assert await peer.listen()
+        return took
+
+    with AppServer(ATTENTIVE_APP) as server:
+        took = asyncio.run(hang(server.url))
+    # A status is sent every tenth of a second.
+    assert min(took) >= Settings.silence
+    assert min(took) < Settings.silence + 0.2
