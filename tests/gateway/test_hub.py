@@ -182,7 +182,7 @@ def test_window_without_control_socket_cannot_drive(table: Table) -> None:
     window = table.join(PAGES[0])
     table.touch(window.person.key)
     table.hub.leave(window)
-    with pytest.raises(LeaseError, match="front page"):
+    with pytest.raises(LeaseError, match="start page"):
         table.touch(window.person.key)
 
 

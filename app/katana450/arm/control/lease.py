@@ -27,7 +27,7 @@ class Role(Enum):
     VIEWER = "viewer"
     """Watch, and stop the arm."""
     OPERATOR = "operator"
-    """Drive the arm if nobody else does."""
+    """Drive the arm if no other person does."""
     ADMIN = "admin"
     """Take the arm from the person who drives it."""
 

@@ -126,7 +126,7 @@ def write_ply(file: BinaryIO, found: ReachabilityMap) -> None:
         f"element vertex {len(found.points)}\n"
         "property float x\nproperty float y\nproperty float z\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-        "property float share\nend_header\n"
+        "property float fraction\nend_header\n"
     )
     vertices = np.empty(
         len(found.points), dtype=[("xyz", "<f4", 3), ("color", "u1", 3), ("fraction", "<f4")]

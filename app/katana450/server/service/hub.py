@@ -168,7 +168,7 @@ class Hub:
         """
         window = self._windows.get(key)
         if window is None:
-            raise LeaseError("Open the front page to drive the arm.")
+            raise LeaseError("Open the start page to drive the arm.")
         return Actor(window.person, CommandChannel.SCENE, seen)
 
     def show(self, key: str, picture: MeasuresAge) -> None:

@@ -48,7 +48,7 @@ MAX_PAUSE = 0.5
 
 
 class RouteContext(NamedTuple):
-    """Context that a route of an extension can use.
+    """Context of the routes of an extension.
 
     Attributes:
         hub: The hub with the arm and the lease.
