@@ -143,6 +143,15 @@ def test_a_file_without_a_key_is_refused(tmp_path: Path, key: str) -> None:
         load_map(path)
 
 
+def test_map_of_an_older_version_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.npz"
+    old = {key: value for key, value in GOOD.items() if key != "fraction"}
+    arrays = old | {"format": np.array("katana450 reachability 1"), "share": FRACTION}
+    np.savez(path, allow_pickle=False, **arrays)
+    with pytest.raises(InputError, match=r"map\.npz was made by an older version.*again"):
+        load_map(path)
+
+
 def test_invalid_npz_is_refused(npz: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         load_map(tmp_path / "nothing.npz")
