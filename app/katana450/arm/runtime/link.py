@@ -190,7 +190,10 @@ class ArmEnd:
                 last = fresh[-1] if fresh else last
                 self._send(
                     StateMessage(
-                        self._named(snapshot), fresh, state_publisher.loop_timing, self._outcomes()
+                        self._named(snapshot),
+                        fresh,
+                        state_publisher.loop_timing,
+                        self._outcomes(snapshot.ticket),
                     )
                 )
                 seen = snapshot
@@ -207,8 +210,12 @@ class ArmEnd:
                 self._numbers.popleft()
             return Snapshot(snapshot.state, self._numbers[0][1])
 
-    def _outcomes(self) -> tuple[TicketOutcome, ...]:
-        """Return the new outcomes, by the numbers of the front end."""
+    def _outcomes(self, executed: int) -> tuple[TicketOutcome, ...]:
+        """Return the new outcomes, by the numbers of the front end.
+
+        ``executed``: the last ticket of a published snapshot. The outcomes up to it were noted
+        before that snapshot; those that are missing now were displaced by newer ones.
+        """
         outcomes = self._loop.state_publisher.take_outcomes()
         with self._numbering:
             # Commands of other ends, and stops by this end, have no number here.
@@ -216,6 +223,8 @@ class ArmEnd:
             named = [(number, outcome) for number, outcome in new if number is not None]
             named += self._refused
             self._refused.clear()
+            while self._number_of and (oldest := next(iter(self._number_of))) <= executed:
+                del self._number_of[oldest]
         return tuple(named)
 
     def _watch(self) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.state import State
 from katana450.arm.runtime.loop_timing import LoopTiming
-from katana450.arm.runtime.outcomes import Outcomes, TicketOutcome
+from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes, TicketOutcome
 
 MAX_KEPT_ENTRIES = 500
 """Maximum number of entries of the event log."""
@@ -31,7 +31,7 @@ class StatePublisher:
         self._snapshot = first
         self._event_log: deque[LogEntry] = deque(maxlen=MAX_KEPT_ENTRIES)
         self._pinned = threading.Condition()
-        self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_ENTRIES)
+        self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_OUTCOMES)
         self.outcomes = Outcomes()
         """Outcomes of commands, by their tickets."""
         self.loop_timing = loop_timing
@@ -62,7 +62,7 @@ class StatePublisher:
             self._unsent.extend(outcomes)
 
     def take_outcomes(self) -> tuple[TicketOutcome, ...]:
-        """Return the outcomes that were noted since the last call."""
+        """Return the outcomes noted since the last call, at most the last MAX_KEPT_OUTCOMES."""
         with self._pinned:
             outcomes = tuple(self._unsent)
             self._unsent.clear()
