@@ -12,7 +12,7 @@ import trimesh
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.extensions.reachability.reachability_file import (
@@ -91,7 +91,7 @@ def test_another_program_reads_the_point_cloud() -> None:
     ply.seek(0)
     cloud: Any = trimesh.load(ply, file_type="ply")
     assert np.allclose(cloud.vertices, POINTS, atol=1e-7)
-    assert np.array_equal(cloud.colors[:, :3], share_colors(FRACTION))
+    assert np.array_equal(cloud.colors[:, :3], fraction_colors(FRACTION))
 
 
 GOOD = {

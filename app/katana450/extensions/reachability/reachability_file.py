@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
@@ -142,7 +142,7 @@ def write_ply(file: BinaryIO, found: ReachabilityMap) -> None:
         len(found.points), dtype=[("xyz", "<f4", 3), ("color", "u1", 3), ("fraction", "<f4")]
     )
     vertices["xyz"] = found.points
-    vertices["color"] = share_colors(found.fraction)
+    vertices["color"] = fraction_colors(found.fraction)
     vertices["fraction"] = found.fraction
     file.write(header.encode("ascii"))
     file.write(vertices.tobytes())
