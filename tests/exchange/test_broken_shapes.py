@@ -33,7 +33,7 @@ from katana450.extensions.importers.shape_file import (
     read_shape,
     read_shape_guarded,
 )
-from katana450.extensions.importers.surface import MOST_TRIANGLES
+from katana450.extensions.importers.surface import MAX_TRIANGLES
 
 resource = pytest.importorskip("resource")
 
@@ -125,7 +125,7 @@ def test_the_unchanged_files_are_read() -> None:
         (f"solid\n{FACET.format('1e999')}\nendsolid".encode(), "not finite numbers"),
         (f"solid\nsolid\n{FACET.format(1)}\nendsolid".encode(), "corrupt at line 2"),
         (
-            bytes(80) + struct.pack("<I", MOST_TRIANGLES + 1) + bytes(50 * (MOST_TRIANGLES + 1)),
+            bytes(80) + struct.pack("<I", MAX_TRIANGLES + 1) + bytes(50 * (MAX_TRIANGLES + 1)),
             "more than 200000 triangles",
         ),
     ],

@@ -255,7 +255,7 @@ def test_a_corrupt_or_too_large_zip_is_refused(mesh: Mesh, monkeypatch: pytest.M
     assert len(bomb) < 5000
     with pytest.raises(InputError, match="Unpacked"):
         read_scene_zip(bomb, None)
-    many = zipped(**{f"f{i}": b"" for i in range(scene_file.MOST_FILES + 1)})
+    many = zipped(**{f"f{i}": b"" for i in range(scene_file.MAX_FILES + 1)})
     with pytest.raises(InputError, match="at most 64 files"):
         read_scene_zip(many, None)
     with pytest.raises(InputError, match=r"no scene\.yaml"):
