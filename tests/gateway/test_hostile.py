@@ -21,7 +21,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
-from katana450.server.viser_bridge.proxy import BROWSERS, BROWSERS_EACH
+from katana450.server.viser_bridge.proxy import MAX_BROWSERS, MAX_BROWSERS_EACH
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, BARE_APP, AppServer
 from tests.gateway.client import (
@@ -508,16 +508,16 @@ def test_number_of_browsers_is_limited() -> None:
                     line = websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL])
                     found_room.append(await stack.enter_async_context(line))
 
-            while len(found_room) < BROWSERS - BROWSERS_EACH:
+            while len(found_room) < MAX_BROWSERS - MAX_BROWSERS_EACH:
                 before = len(found_room)
                 with pytest.raises(InvalidStatus) as refused:
-                    await crowd_in(BROWSERS_EACH)
+                    await crowd_in(MAX_BROWSERS_EACH)
                 assert refused.value.response.status_code == 403
-                assert len(found_room) - before == BROWSERS_EACH
+                assert len(found_room) - before == MAX_BROWSERS_EACH
             with pytest.raises(InvalidStatus):
-                await crowd_in(BROWSERS_EACH)
+                await crowd_in(MAX_BROWSERS_EACH)
             # On a slow machine a connection that is still closing may hold its place.
-            assert BROWSERS - 3 <= len(found_room) <= BROWSERS - 1
+            assert MAX_BROWSERS - 3 <= len(found_room) <= MAX_BROWSERS - 1
             assert await moves_the_arm(good, 3.0)
 
     with AppServer() as server:
