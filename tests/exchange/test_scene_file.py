@@ -291,8 +291,8 @@ def test_a_mesh_stands_on_its_underside_and_its_key_tells_how_it_was_read(mesh: 
     assert low[2] == 0.0
     np.testing.assert_allclose(high - low, mesh.solid.size, atol=1e-12)
     assert mesh.unit == "mm"
-    told = read_mesh(ring(), "other.stl", "mm")
-    assert told.key == mesh.key
+    stated = read_mesh(ring(), "other.stl", "mm")
+    assert stated.key == mesh.key
     others: list[Callable[[], Mesh]] = [
         lambda: read_mesh(ring(), "ring.stl", "cm"),
         lambda: read_mesh(ring(), "ring.stl", up=Up.Y),

@@ -124,7 +124,7 @@ class Table:
         self.t = 100.0
         self.hub = Hub(lambda: self.t, runner=runner)
         self.arm = self.hub.gate.arm = FakeArm(state)
-        self.told: dict[str, list[dict[str, Any]]] = {}
+        self.notices_of: dict[str, list[dict[str, Any]]] = {}
 
     def join(
         self,
@@ -133,7 +133,7 @@ class Table:
         name: str | None = None,
         heartbeat: LastHeartbeat | None = None,
     ) -> Window:
-        notices = self.told.setdefault(page, [])
+        notices = self.notices_of.setdefault(page, [])
         return self.hub.join(Identity("session", name, role), page, notices.append, heartbeat)
 
     def touch(self, key: str) -> Actor:
