@@ -121,13 +121,13 @@ bench-import: $(dev_ok)       ## `import katana450` and its first call, beside `
 bench-pictures: $(dev_ok)     ## pictures by our renderer beside VTK; installs that
 	$(bin)/python -m benchmarks.pictures $(ARGS)
 
-pictures: $(dev_ok) browser   ## take the pictures of the documentation anew
+pictures: $(dev_ok) browser   ## take the pictures of the documentation again
 	$(bin)/python -m docs.pictures
 
 bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and beside C; installs those
 	$(bin)/python -m benchmarks.kinematics $(ARGS)
 
-lock: $(dev_ok)               ## resolve the dependencies anew into the two lock files
+lock: $(dev_ok)               ## resolve the dependencies again into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header pyproject.toml --group build --output-file requirements.lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \

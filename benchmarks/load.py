@@ -2,7 +2,7 @@
 
     python -m benchmarks.load
 
-A program swings the arm all the time. The turns are: no other clients; 32 watchers who acknowledge
+A program swings the arm all the time. The turns are: no other clients; 32 watchers that acknowledge
 pictures 30 times a second; senders that flood the server; readers that read nothing; senders of
 messages that no page can send; silent connections; thirty programs of one person that together ask
 for the branches twelve thousand times a second. Each turn prints how late the control loop's ticks
@@ -231,17 +231,17 @@ async def crowd(url: str, stops: int) -> None:
     """Run all turns."""
     pictures = [0]
     watchers = [lambda: watch(url, pictures)] * WATCHERS
-    await turn(url, "nobody else", [], stops)
+    await turn(url, "no other clients", [], stops)
     # A turn begins with a pause without watchers.
     started = time.monotonic() + RECOVERY
     await turn(url, f"{WATCHERS} watchers", [*watchers], stops)
     rate = pictures[0] / WATCHERS / (time.monotonic() - started)
     print(f"{'':20} {rate:.1f} pictures a second to each watcher")
-    await turn(url, f"{FLOODS} who flood", [lambda: flood(url)] * FLOODS, stops)
-    await turn(url, f"{SLOW} who read nothing", [lambda: crawl(url)] * SLOW, stops)
-    await turn(url, f"{HOSTILE} hostile", [lambda: poison(url)] * HOSTILE, stops)
+    await turn(url, f"{FLOODS} flooding clients", [lambda: flood(url)] * FLOODS, stops)
+    await turn(url, f"{SLOW} slow readers", [lambda: crawl(url)] * SLOW, stops)
+    await turn(url, f"{HOSTILE} hostile clients", [lambda: poison(url)] * HOSTILE, stops)
     await turn(url, f"{SILENT} silent", [lambda: keep_silent(url)], stops)
-    await turn(url, f"{ASKING} who inquire", [lambda: inquire(url)] * ASKING, stops)
+    await turn(url, f"{ASKING} querying clients", [lambda: inquire(url)] * ASKING, stops)
 
 
 def main() -> None:

@@ -24,12 +24,12 @@ def pytest_configure() -> None:
 
 
 def pytest_report_header() -> str:
-    """Say what is not run."""
+    """Report which tests are left out."""
     return "every test with all its cases" if LONG else "without what is left to `make test-long`"
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what takes long, where not all is asked for."""
+    """Deselect long tests unless all tests are requested."""
     left_out = [] if LONG else [item for item in items if item.get_closest_marker("long")]
     if left_out:
         config.hook.pytest_deselected(items=left_out)

@@ -11,7 +11,7 @@ export class Board {
   #chips;
   #lifted = null; // {card, over} while one is dragged
   #arranging = false;
-  #status = html("p", { class: "told", role: "status" });
+  #status = html("p", { class: "report", role: "status" });
 
   // kept: the storage of the browser; null if there is none.
   constructor(catalogue, kept) {

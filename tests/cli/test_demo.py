@@ -56,7 +56,7 @@ def test_the_circle_is_as_exact_as_in_the_paper(out: Path) -> None:
     assert found["path_length_mm"] == pytest.approx(200.0 * math.pi, rel=1e-5)
     assert found["margin_to_limits_deg"] > 5.0
     assert found["smallest_singular_value"] > 0.1
-    assert found["greatest_speed_share"] <= 1.0
+    assert found["max_speed_fraction"] <= 1.0
     assert found["nearest_clearance_mm"] > 6.0
     assert found["bounds_held"]
     assert found["gripper"] == "none"

@@ -12,7 +12,7 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.importers.shape_file import Format, read_shape
-from katana450.extensions.importers.surface import MOST_TRIANGLES
+from katana450.extensions.importers.surface import MAX_TRIANGLES
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 
 
@@ -38,9 +38,9 @@ def gltf(**changes: Any) -> bytes:
     return glb(json.dumps(document).encode(), numbers)
 
 
-def glb(told: bytes, numbers: bytes) -> bytes:
-    told += b" " * (-len(told) % 4)
-    chunks = struct.pack("<I4s", len(told), b"JSON") + told
+def glb(text: bytes, numbers: bytes) -> bytes:
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
     chunks += struct.pack("<I4s", len(numbers), b"BIN\0") + numbers
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
@@ -69,7 +69,7 @@ def test_the_unchanged_files_are_read() -> None:
         (f"solid\n{FACET.format('1e999')}\nendsolid".encode(), "not finite numbers"),
         (f"solid\nsolid\n{FACET.format(1)}\nendsolid".encode(), "corrupt at line 2"),
         (
-            bytes(80) + struct.pack("<I", MOST_TRIANGLES + 1) + bytes(50 * (MOST_TRIANGLES + 1)),
+            bytes(80) + struct.pack("<I", MAX_TRIANGLES + 1) + bytes(50 * (MAX_TRIANGLES + 1)),
             "more than 200000 triangles",
         ),
     ],
@@ -240,7 +240,7 @@ def test_modes_colours_and_places_of_gltf(mode: int, faces: int) -> None:
         "mode": mode,
         "material": 0,
     }
-    told = {
+    gltf = {
         "asset": {"version": "2.0"},
         "buffers": [{"byteLength": len(data)}],
         "bufferViews": [{"buffer": 0, "byteOffset": a, "byteLength": n} for a, n in views],
@@ -258,7 +258,7 @@ def test_modes_colours_and_places_of_gltf(mode: int, faces: int) -> None:
         ],
         "animations": [{}],
     }
-    shape = read_shape(glb(json.dumps(told).encode(), data), Format.GLB, "a.glb")
+    shape = read_shape(glb(json.dumps(gltf).encode(), data), Format.GLB, "a.glb")
     assert len(shape.faces) == faces
     # Mirrored, rotated by 90 degrees about its z, moved, then made upright: x, -z, y.
     assert np.ptp(shape.vertices, axis=0).tolist() == pytest.approx([1.0, 0.0, 1.0])

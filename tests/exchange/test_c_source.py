@@ -100,9 +100,9 @@ def test_a_picture_is_quick(viewer: Path) -> None:
     used = []
     for frames in (20, 70):
         before = processor()
-        told = run(*SCREEN, viewer, "--size", f"{SIZE}x{SIZE}", "--frames", str(frames))
+        output = run(*SCREEN, viewer, "--size", f"{SIZE}x{SIZE}", "--frames", str(frames))
         used.append(processor() - before)
-        assert re.fullmatch(r"[0-9.]+ frames/s\n", told)
+        assert re.fullmatch(r"[0-9.]+ frames/s\n", output)
     assert (used[1] - used[0]) / 50.0 < FRAME
 
 

@@ -74,17 +74,17 @@ def chunks(content: bytes) -> tuple[dict[str, Any], bytes]:
     assert (magic, version, length) == (b"glTF", 2, len(content))
     size, kind = struct.unpack_from("<I4s", content, 12)
     assert kind == b"JSON"
-    told = json.loads(content[20 : 20 + size])
+    gltf = json.loads(content[20 : 20 + size])
     binary, kind = struct.unpack_from("<I4s", content, 20 + size)
     assert kind == b"BIN\0"
     body = content[28 + size :]
-    assert len(body) == binary == told["buffers"][0]["byteLength"]
-    return told, body
+    assert len(body) == binary == gltf["buffers"][0]["byteLength"]
+    return gltf, body
 
 
-def floats(told: dict[str, Any], body: bytes, number: int) -> npt.NDArray[np.float32]:
-    accessor = told["accessors"][number]
-    view = told["bufferViews"][accessor["bufferView"]]
+def floats(gltf: dict[str, Any], body: bytes, number: int) -> npt.NDArray[np.float32]:
+    accessor = gltf["accessors"][number]
+    view = gltf["bufferViews"][accessor["bufferView"]]
     values = np.frombuffer(body, "<f4", view["byteLength"] // 4, view["byteOffset"])
     return values.reshape(accessor["count"], -1)
 
@@ -93,14 +93,14 @@ def test_the_motion_is_that_of_the_file(tmp_path: Path, gantry: Robot) -> None:
     (tmp_path / "m.csv").write_text("t,rail,turn,grip\n0,0,0,0\n1,0.4,5,-1\n3,-0.4,4,0.5\n")
     motion = load_motion(tmp_path / "m.csv", gantry)
     ((_, content),) = glb_files(gantry, gantry.values(()), motion).items()
-    told, body = chunks(content)
-    (animation,) = told["animations"]
+    gltf, body = chunks(content)
+    (animation,) = gltf["animations"]
     assert len(animation["channels"]) == len(gantry.joints)
     urdf = yourdfpy.URDF.load(str(GANTRY), load_meshes=False, build_scene_graph=True)
     for channel in animation["channels"]:
         sampler = animation["samplers"][channel["sampler"]]
-        node = told["nodes"][channel["target"]["node"]]
-        t, rows = (floats(told, body, sampler[side]) for side in ("input", "output"))
+        node = gltf["nodes"][channel["target"]["node"]]
+        t, rows = (floats(gltf, body, sampler[side]) for side in ("input", "output"))
         joint = next(j for j in urdf.robot.joints if j.child == node["name"])
         for when, row in zip(t[:, 0], rows, strict=True):
             now = {
@@ -114,7 +114,7 @@ def test_the_motion_is_that_of_the_file(tmp_path: Path, gantry: Robot) -> None:
             else:
                 R = so3.from_quaternion(np.roll(row.astype(float), 1))
                 np.testing.assert_allclose(R, T[:3, :3], atol=2e-6)
-    extras = {n["name"]: n["extras"]["joint"] for n in told["nodes"] if "extras" in n}
+    extras = {n["name"]: n["extras"]["joint"] for n in gltf["nodes"] if "extras" in n}
     assert extras["cart"] == {
         "name": "rail",
         "type": "prismatic",

@@ -66,12 +66,12 @@ GEOMETRY = (
 def dae(
     meter: object = 0.001, up: str = "Z_UP", nodes: str = f"<node>{GEOMETRY}</node>", **other: str
 ) -> bytes:
-    told = {
+    fields = {
         "points": " ".join(f"{x} {y} {z}" for x, y, z in POINTS),
         "counts": " ".join(str(len(each)) for each in POLYGONS),
         "corners": " ".join(str(corner) for each in POLYGONS for corner in each),
     } | other
-    return DAE.format(meter=meter, up=up, nodes=nodes, **told).encode()
+    return DAE.format(meter=meter, up=up, nodes=nodes, **fields).encode()
 
 
 def off(header: str = "OFF") -> bytes:

@@ -12,7 +12,7 @@ import trimesh
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.extensions.reachability.reachability_file import (
@@ -91,7 +91,7 @@ def test_another_program_reads_the_point_cloud() -> None:
     ply.seek(0)
     cloud: Any = trimesh.load(ply, file_type="ply")
     assert np.allclose(cloud.vertices, POINTS, atol=1e-7)
-    assert np.array_equal(cloud.colors[:, :3], share_colors(FRACTION))
+    assert np.array_equal(cloud.colors[:, :3], fraction_colors(FRACTION))
 
 
 GOOD = {
@@ -140,6 +140,15 @@ def test_a_file_without_a_key_is_refused(tmp_path: Path, key: str) -> None:
     path = tmp_path / "map.npz"
     np.savez(path, allow_pickle=True, **{name: GOOD[name] for name in GOOD if name != key})
     with pytest.raises(InputError, match=key):
+        load_map(path)
+
+
+def test_map_of_an_older_version_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.npz"
+    old = {key: value for key, value in GOOD.items() if key != "fraction"}
+    arrays = old | {"format": np.array("katana450 reachability 1"), "share": FRACTION}
+    np.savez(path, allow_pickle=False, **arrays)
+    with pytest.raises(InputError, match=r"map\.npz was made by an older version.*again"):
         load_map(path)
 
 

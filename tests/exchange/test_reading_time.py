@@ -11,7 +11,7 @@ import pytest
 from katana450.extensions.importers import shape_file
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import SECONDS
-from katana450.extensions.importers.surface import MOST_TRIANGLES
+from katana450.extensions.importers.surface import MAX_TRIANGLES
 from katana450.maths.geometry.arrays import FloatArray
 
 resource = pytest.importorskip("resource")
@@ -63,8 +63,8 @@ def spent() -> tuple[float, float]:
     ("name", "data", "count"),
     [
         ("soup.stl", stl(soup(20_000)), 20_000),
-        ("soup.stl", stl(soup(MOST_TRIANGLES)), MOST_TRIANGLES),
-        ("ball.stl", stl(ball(MOST_TRIANGLES)), MOST_TRIANGLES),
+        ("soup.stl", stl(soup(MAX_TRIANGLES)), MAX_TRIANGLES),
+        ("ball.stl", stl(ball(MAX_TRIANGLES)), MAX_TRIANGLES),
         ("star.obj", star(10_000), 9_998),
     ],
     ids=["soup of 20k", "soup of 200k", "ball of 200k", "polygon of 10k"],

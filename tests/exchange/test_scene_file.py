@@ -255,7 +255,7 @@ def test_a_corrupt_or_too_large_zip_is_refused(mesh: Mesh, monkeypatch: pytest.M
     assert len(bomb) < 5000
     with pytest.raises(InputError, match="Unpacked"):
         read_scene_zip(bomb, None)
-    many = zipped(**{f"f{i}": b"" for i in range(scene_file.MOST_FILES + 1)})
+    many = zipped(**{f"f{i}": b"" for i in range(scene_file.MAX_FILES + 1)})
     with pytest.raises(InputError, match="at most 64 files"):
         read_scene_zip(many, None)
     with pytest.raises(InputError, match=r"no scene\.yaml"):
@@ -291,8 +291,8 @@ def test_a_mesh_stands_on_its_underside_and_its_key_tells_how_it_was_read(mesh: 
     assert low[2] == 0.0
     np.testing.assert_allclose(high - low, mesh.solid.size, atol=1e-12)
     assert mesh.unit == "mm"
-    told = read_mesh(ring(), "other.stl", "mm")
-    assert told.key == mesh.key
+    stated = read_mesh(ring(), "other.stl", "mm")
+    assert stated.key == mesh.key
     others: list[Callable[[], Mesh]] = [
         lambda: read_mesh(ring(), "ring.stl", "cm"),
         lambda: read_mesh(ring(), "ring.stl", up=Up.Y),

@@ -204,7 +204,7 @@ def tetrahedron(size: float) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("size", "told", "unit", "said"),
+    ("size", "stated", "unit", "said"),
     [
         (1.5, None, 1.0, "assumed to be m, since 1.5 mm would be small"),
         (2.5, None, 1e-3, "assumed to be mm, since 2.5 m would be too large"),
@@ -214,9 +214,9 @@ def tetrahedron(size: float) -> bytes:
     ],
 )
 def test_unit_is_given_or_guessed_and_reported(
-    size: float, told: float | None, unit: float, said: str
+    size: float, stated: float | None, unit: float, said: str
 ) -> None:
-    shape = read_shape(tetrahedron(size), Format.OBJ, "a.obj", told)
+    shape = read_shape(tetrahedron(size), Format.OBJ, "a.obj", stated)
     assert shape.unit == unit
     assert volume(shape) == pytest.approx((size * unit) ** 3 / 6.0)
     assert said in shape.text
@@ -224,7 +224,7 @@ def test_unit_is_given_or_guessed_and_reported(
 
 
 @pytest.mark.parametrize(
-    ("size", "told", "said"),
+    ("size", "stated", "said"),
     [
         (3000.0, None, "no unit would fit"),
         (150.0, 1.0, "would fit with the unit mm or cm"),
@@ -235,9 +235,9 @@ def test_unit_is_given_or_guessed_and_reported(
         (1.0, float("inf"), "above 0"),
     ],
 )
-def test_an_invalid_size_is_refused(size: float, told: float | None, said: str) -> None:
+def test_an_invalid_size_is_refused(size: float, stated: float | None, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        read_shape(tetrahedron(size), Format.OBJ, "a.obj", told)
+        read_shape(tetrahedron(size), Format.OBJ, "a.obj", stated)
 
 
 def test_gltf_is_in_metres_even_where_that_is_too_large() -> None:

@@ -102,12 +102,12 @@ def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -
         start_new_session=True,
     )
     try:
-        printed, told = process.communicate(timeout=seconds)
+        printed, errors = process.communicate(timeout=seconds)
     finally:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-    assert process.returncode == 0, f"{words[0]} ended with {process.returncode}:\n{told[-4000:]}"
+    assert process.returncode == 0, f"{words[0]} ended with {process.returncode}:\n{errors[-4000:]}"
     return printed
 
 

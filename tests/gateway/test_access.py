@@ -202,7 +202,7 @@ def test_server_uses_https(tmp_path: Path) -> None:
     ("options", "message"),
     [
         (("--tls-cert", "/nowhere"), "both --tls-cert and --tls-key"),
-        (("--tls-cert", "/nowhere", "--tls-key", "/nowhere"), "no certificate"),
+        (("--tls-cert", "/nowhere", "--tls-key", "/nowhere"), "are not a certificate and its key"),
         (("--access", "/nowhere"), "access give"),
         (("--public-url", "arm"), "looks like"),
     ],

@@ -156,12 +156,12 @@ def test_cookies_are_sent_to_our_pages_alone(file: AccessFile) -> None:
     for address, secure in ((LOOPBACK, False), (OPEN, True), (PROXIED, True)):
         authenticator = Authenticator(file, 8080, address)
         response = Response()
-        assert authenticator.welcome(token, response)
+        assert authenticator.sign_in(token, response)
         cookie = response.headers["set-cookie"].lower()
         assert cookie.startswith(f"katana450-8080={token.lower()};")
         for part in ("httponly", "samesite=strict", "path=/", "max-age=3"):
             assert part in cookie
         assert ("secure" in cookie) is secure
         response = Response()
-        assert not authenticator.welcome("other", response)
+        assert not authenticator.sign_in("other", response)
         assert "set-cookie" not in response.headers

@@ -51,7 +51,7 @@ def test_flooding_client_does_not_delay_others() -> None:
     async def ask() -> list[int]:
         hub, torrent = Hub(time.monotonic), Torrent()
         program = ProgramChannel(hub, torrent, Budgets(hub.clock).of("a"))
-        window = hub.join(Identity("session", "Torrent", Role.OPERATOR), "a-page", program.tell)
+        window = hub.join(Identity("session", "Torrent", Role.OPERATOR), "a-page", program.notify)
         asking = asyncio.create_task(program.run(window))
         taken = [torrent.left]
         while torrent.left:
@@ -70,7 +70,7 @@ def test_unresponsive_flooder_is_disconnected() -> None:
         hub, deaf = Hub(time.monotonic), Deaf()
         deaf.left = 10**9
         program = ProgramChannel(hub, deaf, Budgets(hub.clock).of("a"))
-        window = hub.join(Identity("session", "Deaf", Role.OPERATOR), "a-page", program.tell)
+        window = hub.join(Identity("session", "Deaf", Role.OPERATOR), "a-page", program.notify)
         async with asyncio.timeout(10.0 * CLOSE_FRAME_TIMEOUT):
             await program.run(window)
 

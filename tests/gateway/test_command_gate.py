@@ -257,5 +257,5 @@ def test_event_of_a_browser_without_a_gesture_has_no_actor(
 ) -> None:
     gestures = Gestures(viser_server, Guard(viser_server), table.hub)
     for client_id in (None, CLIENT):
-        with pytest.raises(LeaseError, match="front page"):
+        with pytest.raises(LeaseError, match="start page"):
             gestures.actor(client_id)

@@ -15,7 +15,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
-from katana450.server.viser_bridge.proxy import BROWSERS, BROWSERS_EACH
+from katana450.server.viser_bridge.proxy import MAX_BROWSERS, MAX_BROWSERS_EACH
 from tests.browser.server import AppServer
 from tests.gateway.client import (
     QUIET,
@@ -54,7 +54,7 @@ def test_closed_browser_receives_no_more_frames(server: AppServer) -> None:
 
     asyncio.run(crowd())
     assert server.running
-    assert "sent too much" in server.output
+    assert "sent too many invalid messages" in server.output
     assert "Traceback" not in server.output
 
 
@@ -149,16 +149,16 @@ def test_number_of_browsers_is_limited() -> None:
                     line = websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL])
                     found_room.append(await stack.enter_async_context(line))
 
-            while len(found_room) < BROWSERS - BROWSERS_EACH:
+            while len(found_room) < MAX_BROWSERS - MAX_BROWSERS_EACH:
                 before = len(found_room)
                 with pytest.raises(InvalidStatus) as refused:
-                    await crowd_in(BROWSERS_EACH)
+                    await crowd_in(MAX_BROWSERS_EACH)
                 assert refused.value.response.status_code == 403
-                assert len(found_room) - before == BROWSERS_EACH
+                assert len(found_room) - before == MAX_BROWSERS_EACH
             with pytest.raises(InvalidStatus):
-                await crowd_in(BROWSERS_EACH)
+                await crowd_in(MAX_BROWSERS_EACH)
             # On a slow machine a connection that is still closing may hold its place.
-            assert BROWSERS - 3 <= len(found_room) <= BROWSERS - 1
+            assert MAX_BROWSERS - 3 <= len(found_room) <= MAX_BROWSERS - 1
             assert await moves_the_arm(good, 3.0)
 
     with AppServer() as server:

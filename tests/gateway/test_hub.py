@@ -124,7 +124,7 @@ class Table:
         self.t = 100.0
         self.hub = Hub(lambda: self.t, runner=runner)
         self.arm = self.hub.gate.arm = FakeArm(state)
-        self.told: dict[str, list[dict[str, Any]]] = {}
+        self.notices_of: dict[str, list[dict[str, Any]]] = {}
 
     def join(
         self,
@@ -133,7 +133,7 @@ class Table:
         name: str | None = None,
         heartbeat: LastHeartbeat | None = None,
     ) -> Window:
-        notices = self.told.setdefault(page, [])
+        notices = self.notices_of.setdefault(page, [])
         return self.hub.join(Identity("session", name, role), page, notices.append, heartbeat)
 
     def touch(self, key: str) -> Actor:
@@ -182,7 +182,7 @@ def test_window_without_control_socket_cannot_drive(table: Table) -> None:
     window = table.join(PAGES[0])
     table.touch(window.person.key)
     table.hub.leave(window)
-    with pytest.raises(LeaseError, match="front page"):
+    with pytest.raises(LeaseError, match="start page"):
         table.touch(window.person.key)
 
 

@@ -157,7 +157,7 @@ def test_stop_and_a_closed_page_end_a_program(table: Staged) -> None:
 
 def test_panel_request_is_executed_after_planning(table: Staged) -> None:
     window = table.join(PAGES[0])
-    with pytest.raises(LeaseError, match="front page"):
+    with pytest.raises(LeaseError, match="start page"):
         table.panel.plan(SCRIPT, ProgramOrder.RUN, replace(window.actor, person=NOBODY))
     table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
     with pytest.raises(LeaseError, match="being planned"):

@@ -43,11 +43,11 @@ def decoded(path: Path) -> tuple[Pixels, str]:
 def test_a_film_has_its_frames_size_and_length(tmp_path: Path) -> None:
     path = tmp_path / "film.mp4"
     assert write_film(path, frames(), (WIDTH, HEIGHT), 25.0) == COUNT
-    shown, told = decoded(path)
-    assert "Duration: 00:00:00.48" in told
-    assert "h264 (High) (avc1 / 0x31637661), yuv420p" in told
-    assert f"{WIDTH}x{HEIGHT}" in told
-    assert "25 fps" in told
+    shown, report = decoded(path)
+    assert "Duration: 00:00:00.48" in report
+    assert "h264 (High) (avc1 / 0x31637661), yuv420p" in report
+    assert f"{WIDTH}x{HEIGHT}" in report
+    assert "25 fps" in report
     assert shown.shape == (COUNT, HEIGHT, WIDTH, 3)
     for number, picture in enumerate(shown):
         red = picture[:, :, 0].mean(axis=0)

@@ -30,7 +30,8 @@ WORDS = {
     r"all the same": "'nevertheless', or a sentence of its own",
     r"nought|naught": "'zero' or 'nothing'",
     r"none the (less|worse)": "say what happens instead",
-    r"once more": "'again'",
+    r"once more|anew": "'again'",
+    r"front page": "'start page'",
 }
 """Pattern of words to avoid, and what to write instead."""
 

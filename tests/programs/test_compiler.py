@@ -166,13 +166,13 @@ def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: St
 @pytest.mark.usefixtures("untimed")
 def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
     text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
-    with pytest.raises(InputError, match="cannot be emptied into basin") as told:
+    with pytest.raises(InputError, match="cannot be emptied into basin") as refused:
         layout(stage, text)[1].all()
-    assert "other pitch" not in str(told.value)
+    assert "other pitch" not in str(refused.value)
 
 
 @pytest.mark.usefixtures("untimed")
 def test_pitches_that_were_tried_are_reported(stage: Stage) -> None:
-    with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as told:
+    with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as refused:
         layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].all()
-    assert "with a pitch of 30.0 deg" in str(told.value)
+    assert "with a pitch of 30.0 deg" in str(refused.value)

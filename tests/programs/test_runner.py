@@ -242,9 +242,9 @@ def test_speed_is_a_fraction_of_the_scripts_own(stage: Stage) -> None:
 def test_an_impossible_step_is_refused_with_its_line(
     stage: Stage, steps: str, line: int, said: str
 ) -> None:
-    with pytest.raises(ScriptError, match=said) as told:
+    with pytest.raises(ScriptError, match=said) as refused:
         compiled(parse("steps:\n" + steps), stage.plan_context, stage.begin())
-    assert told.value.problems[0].line == line
+    assert refused.value.problems[0].line == line
 
 
 def test_repetitions_are_planned_once(stage: Stage) -> None:

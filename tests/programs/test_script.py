@@ -96,16 +96,16 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
     ],
 )
 def test_error_is_reported_with_its_line(wrong: str, line: int, said: str) -> None:
-    with pytest.raises(ScriptError, match="line") as told:
+    with pytest.raises(ScriptError, match="line") as refused:
         parse(wrong)
-    assert said in str(told.value)
-    assert any(problem.line == line for problem in told.value.problems), str(told.value)
+    assert said in str(refused.value)
+    assert any(problem.line == line for problem in refused.value.problems), str(refused.value)
 
 
 def test_all_errors_are_reported_together() -> None:
-    with pytest.raises(ScriptError) as told:
+    with pytest.raises(ScriptError) as refused:
         parse("speed: 3\nframe: moon\nsteps:\n  - wait: x\n  - line: {too: 1}\n  - home\n  - fly")
-    assert [problem.line for problem in told.value.problems] == [1, 2, 4, 5, 7]
+    assert [problem.line for problem in refused.value.problems] == [1, 2, 4, 5, 7]
 
 
 def test_size_depth_and_repetitions_are_bounded() -> None:

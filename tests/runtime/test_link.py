@@ -22,6 +22,7 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import ArmEnd, FrontEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
+from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES
 from katana450.errors import InputError
 
 SILENCE = 0.3
@@ -207,6 +208,18 @@ def test_outcomes_return_with_the_tickets_of_the_front_end(ends: Ends) -> None:
     both = front.deliver(cmd.Batch((cmd.SetJoint(0, 0.2), cmd.SpeedScale(0.5))))
     assert outcomes.of(both).result(wait).verdict is Verdict.LIMITED
     assert outcomes.of(front.deliver(cmd.ClearStop())).result(wait).verdict is Verdict.ACCEPTED
+
+
+def test_numbers_of_displaced_outcomes_are_dropped(ends: Ends) -> None:
+    ends.loop.stop()
+    count = MAX_KEPT_OUTCOMES + 5
+    # Each command replaces the one before, so that one tick reports all outcomes.
+    tickets = [ends.front.deliver(cmd.SetJoint(0, 1e-4 * k)) for k in range(count)]
+    until(lambda: ends.mailbox.last_ticket == count)
+    ends.loop.tick()
+    newest = ends.front.state_publisher.outcomes.of(tickets[-1])
+    assert newest.result(5.0).verdict is Verdict.ACCEPTED
+    assert not ends.arm_end._number_of
 
 
 def test_command_for_a_full_mailbox_is_refused(ends: Ends) -> None:

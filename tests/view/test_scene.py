@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.robot.robot import Robot
-from katana450.server.view.scene import COAT, DETAIL, coarse, surface
+from katana450.server.view.scene import COAT_THICKNESS, DETAIL, coarse, surface
 
 
 @settings(deadline=None, max_examples=30)
@@ -42,5 +42,5 @@ def test_ghost_keeps_the_outline_of_the_arm(robot: Robot) -> None:
             after += len(faces)
             for end in (np.min, np.max):
                 gap = end(vertices, axis=0) - end(fine.vertices, axis=0)
-                assert np.abs(gap).max() < DETAIL + 2.0 * COAT
+                assert np.abs(gap).max() < DETAIL + 2.0 * COAT_THICKNESS
     assert after < 0.7 * before

@@ -8,7 +8,7 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
 from katana450.extensions.reachability import map as map_module
-from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import Survey
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.maths.kinematics.forward import forward
@@ -64,7 +64,7 @@ def test_invalid_numbers_are_refused_before_the_work(
 
 
 def test_colours_grow_lighter_with_the_fraction() -> None:
-    colors = share_colors(np.array([0.0, 0.1, 0.2, 0.3])).astype(int)
+    colors = fraction_colors(np.array([0.0, 0.1, 0.2, 0.3])).astype(int)
     assert (np.diff(colors.sum(axis=1)) > 0).all()
-    assert np.array_equal(colors, share_colors(2.0 * np.array([0.0, 0.1, 0.2, 0.3])))
-    assert share_colors(np.empty(0)).shape == (0, 3)
+    assert np.array_equal(colors, fraction_colors(2.0 * np.array([0.0, 0.1, 0.2, 0.3])))
+    assert fraction_colors(np.empty(0)).shape == (0, 3)

@@ -59,7 +59,7 @@ def build_frontend(
     view = _view(gateway, config, found, link, ViewOptions(layers, meshes))
     if config.options is not None:
         _add_folders(view, gateway, config.options, robot, link)
-    planning_worker.tell = gateway.announce
+    planning_worker.notify = gateway.announce
     planning_worker.redirected = guarded(gateway.hub.runner.redirected)
     link.start()
     gateway.attach(ArmHandle(robot, session, link, planning_worker, nodes))

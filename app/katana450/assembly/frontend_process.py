@@ -58,7 +58,7 @@ class FrontendConfig:
     meshes: tuple[Mesh, ...]
 
 
-class Front:
+class FrontendProcess:
     """One front end process, as its parent process sees it."""
 
     def __init__(self, config: FrontendConfig) -> None:

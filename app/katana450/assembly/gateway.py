@@ -145,7 +145,7 @@ class Gateway:
         self.hub.gate.arm = arm
 
     def announce(self, why: str) -> None:
-        """Tell all clients why a request is not executed. Can be called in any thread."""
+        """Notify all clients why a request is not executed. Can be called in any thread."""
         loop = self._loop
         if loop is not None:
             loop.call_soon_threadsafe(self.hub.announce, why)

@@ -113,7 +113,7 @@ class RunningArm:
         self._loop = ControlLoop(
             session, driver, self._mailbox, MonotonicClock(), settings.rate, settings.silence
         )
-        self._silence = settings.silence
+        self._silence_timeout = settings.silence
         self._link: ArmEnd | None = None
 
     def start(self) -> None:
@@ -125,7 +125,7 @@ class RunningArm:
         """Execute the commands from the other end of ``pipe``, in place of any previous pipe."""
         if self._link is not None:
             self._link.close()
-        self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence)
+        self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence_timeout)
         self._link.start()
 
     @property
@@ -134,9 +134,9 @@ class RunningArm:
         return self._loop.running
 
     @property
-    def unheard(self) -> float:
+    def silence(self) -> float:
         """[s] Time since the last message of the front end."""
-        return 0.0 if self._link is None else self._link.unheard
+        return 0.0 if self._link is None else self._link.silence
 
     def stop(self) -> None:
         """Close the pipe, and end the loop."""

@@ -90,7 +90,7 @@ def application(
         if not entry.token and authenticator.identity(request.cookies) is not None:
             return Response(status_code=204)
         response = Response(status_code=204)
-        if not authenticator.welcome(entry.token, response):
+        if not authenticator.sign_in(entry.token, response):
             # A valid link is accepted even while others guess.
             if entry.token and not bad_links.take(hub.clock()):
                 raise HTTPException(429, "Too many attempts. Wait a moment.")

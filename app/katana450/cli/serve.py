@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from katana450.assembly.frontend_process import OPEN, READY, Front, FrontendConfig
+from katana450.assembly.frontend_process import OPEN, READY, FrontendConfig, FrontendProcess
 from katana450.assembly.log_lines import start_log
 from katana450.extension import serve_extensions
 from katana450.platform_support import stop_signals
@@ -91,7 +91,7 @@ def serve(
 
     meshes = () if scene is None else scene.meshes
     config = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
-    front, arm = Front(config), None
+    front, arm = FrontendProcess(config), None
     try:
         # Importing the libraries that read the robot takes most of a second. The front end starts
         # meanwhile.
@@ -113,7 +113,7 @@ def serve(
         # A signal that another thread receives does not wake this one from its wait.
         while arm.running and not stopping.wait(WAKE_INTERVAL):
             if front.running:
-                if time.monotonic() - started > STABLE_SECONDS and arm.unheard > HANG_TIMEOUT:
+                if time.monotonic() - started > STABLE_SECONDS and arm.silence > HANG_TIMEOUT:
                     log.error("The page's server has sent nothing for %g s.", HANG_TIMEOUT)
                     front.kill()
                 continue
@@ -124,7 +124,7 @@ def serve(
             early_ends = 0 if time.monotonic() - started > STABLE_SECONDS else early_ends + 1
             stopping.wait(RESTART_DELAYS[min(early_ends, len(RESTART_DELAYS) - 1)])
             front.stop()
-            front, started = Front(config), time.monotonic()
+            front, started = FrontendProcess(config), time.monotonic()
             arm.attach(front.pipe)
         if not stopping.is_set():
             log.critical("The control loop has ended, so the server ends too. Start it again.")

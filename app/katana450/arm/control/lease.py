@@ -27,7 +27,7 @@ class Role(Enum):
     VIEWER = "viewer"
     """Watch, and stop the arm."""
     OPERATOR = "operator"
-    """Drive the arm if nobody else does."""
+    """Drive the arm if no other person does."""
     ADMIN = "admin"
     """Take the arm from the person who drives it."""
 
@@ -97,7 +97,7 @@ class Lease:
         """Return the lease with the request of ``person`` to the holder."""
         _check_may_drive(person)
         if self.holder is None:
-            raise LeaseError("Nobody holds the arm: you can have it at once.")
+            raise LeaseError("The arm is free: use it without a request.")
         if self.holder == person:
             raise LeaseError("You hold the arm already.")
         if person in self.waiting:

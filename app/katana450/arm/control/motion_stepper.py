@@ -217,7 +217,7 @@ class MotionStepper:
         fraction = min(state.speed, self._fraction(chain, state))
         rates = None
         if state.jogging is not None:
-            V = wished_twist(chain, motion.q, state.jogging)
+            V = jog_twist(chain, motion.q, state.jogging)
             bounds = self._any.stoppable(motion.q)
             rates = jog(chain, motion.q, V, JogFrame.BASE, dt, bounds=bounds)
         for _ in range(MAX_SLOWDOWNS):
@@ -361,7 +361,7 @@ def _bent(arm: ArmModel, elbow: str) -> Limits:
     return replace(limits, lower=lower, upper=upper)
 
 
-def wished_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
+def jog_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
     """Return the twist (6,) of the tool in {S} [rad/s, m/s] that a jog commands."""
     R = forward(chain, q)[:3, :3]
     pitched = pitched_frame(chain, q)

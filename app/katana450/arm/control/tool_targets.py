@@ -20,7 +20,7 @@ from katana450.arm.control.modes import (
     ToolTarget,
     Tracking,
 )
-from katana450.arm.control.motion_stepper import wished_twist
+from katana450.arm.control.motion_stepper import jog_twist
 from katana450.arm.control.state import GRIPPER_LIMITS, Reason, State
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch, branch_of
@@ -106,7 +106,7 @@ def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> S
     """
     chain = arm.chain_to(state.tool)
     kept = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
-    held = of_jog(chain, state.setpoint, wished_twist(chain, state.setpoint, jogging))
+    held = of_jog(chain, state.setpoint, jog_twist(chain, state.setpoint, jogging))
     aimed = replace(state, goal=rest, branch=branch_of(chain, rest), findings=kept + held)
     if state.t < jogging.until:
         return aimed

@@ -92,7 +92,7 @@ class ArmEnd:
     """
 
     def __init__(
-        self, pipe: Connection, loop: ControlLoop, mailbox: Mailbox, silence: float
+        self, pipe: Connection, loop: ControlLoop, mailbox: Mailbox, silence_timeout: float
     ) -> None:
         """Create the end; ``start`` runs it.
 
@@ -100,12 +100,12 @@ class ArmEnd:
             pipe: the pipe to the front end.
             loop: the control loop.
             mailbox: the mailbox of that loop.
-            silence: time without a message [s] after which a moving arm is stopped.
+            silence_timeout: time without a message [s] after which a moving arm is stopped.
         """
         self._pipe = pipe
         self._loop = loop
         self._mailbox = mailbox
-        self._silence = silence
+        self._silence_timeout = silence_timeout
         self._numbers: deque[tuple[int, int]] = deque([(mailbox.last_ticket, 0)])
         self._number_of: dict[int, int] = {}
         self._refused: list[TicketOutcome] = []
@@ -125,7 +125,7 @@ class ArmEnd:
             thread.start()
 
     @property
-    def unheard(self) -> float:
+    def silence(self) -> float:
         """Time since the last message from the front end [s]."""
         return time.monotonic() - self._heard
 
@@ -190,7 +190,10 @@ class ArmEnd:
                 last = fresh[-1] if fresh else last
                 self._send(
                     StateMessage(
-                        self._named(snapshot), fresh, state_publisher.loop_timing, self._outcomes()
+                        self._named(snapshot),
+                        fresh,
+                        state_publisher.loop_timing,
+                        self._outcomes(snapshot.ticket),
                     )
                 )
                 seen = snapshot
@@ -207,8 +210,12 @@ class ArmEnd:
                 self._numbers.popleft()
             return Snapshot(snapshot.state, self._numbers[0][1])
 
-    def _outcomes(self) -> tuple[TicketOutcome, ...]:
-        """Return the new outcomes, by the numbers of the front end."""
+    def _outcomes(self, executed: int) -> tuple[TicketOutcome, ...]:
+        """Return the new outcomes, by the numbers of the front end.
+
+        ``executed``: the last ticket of a published snapshot. The outcomes up to it were noted
+        before that snapshot; those that are missing now were displaced by newer ones.
+        """
         outcomes = self._loop.state_publisher.take_outcomes()
         with self._numbering:
             # Commands of other ends, and stops by this end, have no number here.
@@ -216,13 +223,15 @@ class ArmEnd:
             named = [(number, outcome) for number, outcome in new if number is not None]
             named += self._refused
             self._refused.clear()
+            while self._number_of and (oldest := next(iter(self._number_of))) <= executed:
+                del self._number_of[oldest]
         return tuple(named)
 
     def _watch(self) -> None:
-        while not self.cut.wait(self._silence / 4):
-            silent = self.unheard
+        while not self.cut.wait(self._silence_timeout / 4):
+            silent = self.silence
             state = self._loop.state_publisher.snapshot.state
-            if silent > self._silence and state.moving and state.stopped is None:
+            if silent > self._silence_timeout and state.moving and state.stopped is None:
                 log.error("The front end was silent for %.2f s: STOP.", silent)
                 self._mailbox.put(cmd.Stop())
 
@@ -249,7 +258,7 @@ class FrontEnd:
         first = _loaded(pipe.recv_bytes(), self._plans)
         self._heard = time.monotonic()
         self.state_publisher = StatePublisher(first.snapshot, first.loop_timing)
-        self.state_publisher.pin(first.snapshot, first.event_log)
+        self.state_publisher.publish(first.snapshot, first.event_log)
         self.cut = threading.Event()
         """Set once the arm's process has closed the pipe."""
         self._thread = threading.Thread(target=self._listen, name="link", daemon=True)
@@ -349,7 +358,7 @@ class FrontEnd:
         self.state_publisher.loop_timing = message.loop_timing
         seen = self.state_publisher.snapshot
         if message.snapshot.state.t != seen.state.t or message.snapshot.ticket != seen.ticket:
-            self.state_publisher.pin(_known(message.snapshot, seen), message.event_log)
+            self.state_publisher.publish(_known(message.snapshot, seen), message.event_log)
         # The state comes first: a client with an answer must find its command in the state.
         self.state_publisher.outcomes.note(message.outcomes)
 

@@ -109,7 +109,9 @@ class ControlLoop:
         # A state that differs only in its time is not published.
         if drained.commands or _differs(before, state):
             self.state_publisher.note(_outcomes(drained, state))
-            self.state_publisher.pin(Snapshot(state, drained.last), self._entries(before, state))
+            self.state_publisher.publish(
+                Snapshot(state, drained.last), self._entries(before, state)
+            )
         self.ticks += 1
 
     def _entries(self, before: State, after: State) -> tuple[LogEntry, ...]:

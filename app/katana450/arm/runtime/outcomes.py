@@ -23,16 +23,15 @@ class Outcomes:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._known: OrderedDict[int, Outcome] = OrderedDict()
-        self._awaited: OrderedDict[int, Future[Outcome]] = OrderedDict()
+        self._awaited: OrderedDict[int, list[Future[Outcome]]] = OrderedDict()
 
     def note(self, outcomes: Iterable[TicketOutcome]) -> None:
         """Record ``outcomes``, and wake the threads that wait for them."""
-        ready = []
+        ready: list[tuple[Future[Outcome], Outcome]] = []
         with self._lock:
             for ticket, outcome in outcomes:
                 self._known[ticket] = outcome
-                if ticket in self._awaited:
-                    ready.append((self._awaited.pop(ticket), outcome))
+                ready += [(future, outcome) for future in self._awaited.pop(ticket, ())]
             while len(self._known) > MAX_KEPT_OUTCOMES:
                 self._known.popitem(last=False)
         for future, outcome in ready:
@@ -41,12 +40,12 @@ class Outcomes:
                 future.set_result(outcome)
 
     def of(self, ticket: int) -> Future[Outcome]:
-        """Return a future of the outcome of ``ticket``, for one waiting caller per ticket."""
+        """Return a future of the outcome of ``ticket``; each caller may cancel its own."""
         future: Future[Outcome] = Future()
         with self._lock:
             known = self._known.get(ticket)
             if known is None:
-                self._awaited[ticket] = future
+                self._awaited.setdefault(ticket, []).append(future)
                 while len(self._awaited) > MAX_KEPT_OUTCOMES:
                     self._awaited.popitem(last=False)
         if known is not None:

@@ -36,7 +36,7 @@ class PlanningWorker:
         self._arm = arm
         self._lock = threading.Lock()
         self._work: threading.Event | None = None
-        self.tell: Callable[[str], None] = log.warning
+        self.notify: Callable[[str], None] = log.warning
         """Called with the reason if no path was found."""
         self.redirected: Callable[[], None] = lambda: None
         """Called, in any thread, when a command gives the arm another motion, a hold or a stop."""
@@ -90,10 +90,10 @@ class PlanningWorker:
                 plan = plan_to(arm, world, state, goal)
                 self._unless(cancelled, cmd.Follow(plan), actor)
         except KatanaError as error:
-            self.tell(str(error))
+            self.notify(str(error))
         except Exception:
             log.exception("The planning of a path failed.")
-            self.tell("Internal error while a path was planned: see the server's log.")
+            self.notify("Internal error while a path was planned: see the server's log.")
         finally:
             with self._lock:
                 if self._work is cancelled:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.state import State
 from katana450.arm.runtime.loop_timing import LoopTiming
-from katana450.arm.runtime.outcomes import Outcomes, TicketOutcome
+from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes, TicketOutcome
 
 MAX_KEPT_ENTRIES = 500
 """Maximum number of entries of the event log."""
@@ -30,8 +30,8 @@ class StatePublisher:
     def __init__(self, first: Snapshot, loop_timing: LoopTiming) -> None:
         self._snapshot = first
         self._event_log: deque[LogEntry] = deque(maxlen=MAX_KEPT_ENTRIES)
-        self._pinned = threading.Condition()
-        self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_ENTRIES)
+        self._published = threading.Condition()
+        self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_OUTCOMES)
         self.outcomes = Outcomes()
         """Outcomes of commands, by their tickets."""
         self.loop_timing = loop_timing
@@ -47,34 +47,34 @@ class StatePublisher:
         """The last entries of the event log, oldest first."""
         return tuple(self._event_log)
 
-    def pin(self, snapshot: Snapshot, entries: Sequence[LogEntry] = ()) -> None:
+    def publish(self, snapshot: Snapshot, entries: Sequence[LogEntry] = ()) -> None:
         """Publish ``snapshot``, and add ``entries`` to the event log."""
-        with self._pinned:
+        with self._published:
             self._event_log.extend(entries)
             self._snapshot = snapshot
-            self._pinned.notify_all()
+            self._published.notify_all()
 
     def note(self, outcomes: Iterable[TicketOutcome]) -> None:
-        """Record outcomes of commands; to be called before ``pin``."""
+        """Record outcomes of commands; to be called before ``publish``."""
         outcomes = tuple(outcomes)
         self.outcomes.note(outcomes)
-        with self._pinned:
+        with self._published:
             self._unsent.extend(outcomes)
 
     def take_outcomes(self) -> tuple[TicketOutcome, ...]:
-        """Return the outcomes that were noted since the last call."""
-        with self._pinned:
+        """Return the outcomes noted since the last call, at most the last MAX_KEPT_OUTCOMES."""
+        with self._published:
             outcomes = tuple(self._unsent)
             self._unsent.clear()
             return outcomes
 
     def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
         """Return the newest snapshot once it is another than ``seen``, or after ``timeout`` [s]."""
-        with self._pinned:
-            self._pinned.wait_for(lambda: self._snapshot is not seen, timeout)
+        with self._published:
+            self._published.wait_for(lambda: self._snapshot is not seen, timeout)
             return self._snapshot
 
     def wait_for_command(self, seen: Snapshot, timeout: float) -> None:
         """Return once a command newer than ``seen`` is published, or after ``timeout`` [s]."""
-        with self._pinned:
-            self._pinned.wait_for(lambda: self._snapshot.ticket != seen.ticket, timeout)
+        with self._published:
+            self._published.wait_for(lambda: self._snapshot.ticket != seen.ticket, timeout)

@@ -61,7 +61,7 @@ def _send(arm: Client, text: str, speed: float) -> None:
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
         time.sleep(1.0 / STATE_RATE)
     if now is None or now.status != "ready":
-        raise KatanaError(now.why if now is not None else "The server has forgotten the script.")
+        raise KatanaError(now.why if now is not None else "The server no longer knows the script.")
     print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
 
 
@@ -72,7 +72,7 @@ def _follow(arm: Client) -> int:
     for state in arm.states(STATE_RATE):
         now = state.program
         if now is None:
-            raise LostError("The server has forgotten the program.")
+            raise LostError("The server no longer knows the program.")
         line = f"step {now.step} of {now.steps}, line {now.line}: {now.task} {now.fraction:4.0%}"
         if now.status != "running":
             line += f" ({now.status})"
@@ -88,7 +88,7 @@ def _follow(arm: Client) -> int:
                 print("Done.")
                 return 0
             raise KatanaError(now.why)
-    raise LostError("The server has hung up.")
+    raise LostError("The server closed the connection.")
 
 
 @contextmanager

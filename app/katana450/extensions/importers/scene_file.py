@@ -31,7 +31,7 @@ FOLDER = "meshes"
 MAX_ZIP_BYTES = 60_000_000
 """[bytes] Maximum size of a .zip, and of its content."""
 
-MOST_FILES = 64
+MAX_FILES = 64
 """Maximum number of files in a .zip."""
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -57,8 +57,8 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = archive.namelist()
-            if len(names) > MOST_FILES:
-                raise InputError(f"A scene has at most {MOST_FILES} files.")
+            if len(names) > MAX_FILES:
+                raise InputError(f"A scene has at most {MAX_FILES} files.")
             if len(set(names)) < len(names):
                 raise InputError("Two files of the scene have the same name.")
             if SCENE not in names:

@@ -17,7 +17,7 @@ from katana450.maths.geometry.arrays import FloatArray, IntArray
 GREY = (204, 204, 204, 255)
 """Colour (RGBA bytes) of uncoloured parts beside coloured ones: the default of VRML97."""
 
-MOST_TRIANGLES = 200_000
+MAX_TRIANGLES = 200_000
 """Maximum number of triangles of a file."""
 
 MAX_COPIES = 20_000
@@ -129,10 +129,10 @@ class MeshBuilder:
 
 
 def check_triangles(count: int, name: str) -> None:
-    """Raise InputError if ``count`` exceeds MOST_TRIANGLES."""
-    if count > MOST_TRIANGLES:
+    """Raise InputError if ``count`` exceeds MAX_TRIANGLES."""
+    if count > MAX_TRIANGLES:
         raise InputError(
-            f"{name} has more than {MOST_TRIANGLES} triangles, the maximum. "
+            f"{name} has more than {MAX_TRIANGLES} triangles, the maximum. "
             "Save it coarser, or in parts."
         )
 

@@ -123,7 +123,7 @@ class Report:
         heads += [f"theta{axis}_deg_s" for axis in range(1, n + 1)]
         slides = self.arm.gripper.slides
         heads.append("fingers_mm" if slides else "fingers_deg")
-        rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_share"])
+        rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_fraction"])
         trace = self.trace
         for tick in range(len(trace.t)):
             task = self.program.tasks[int(trace.task[tick])]

@@ -52,8 +52,8 @@ expect:
   max_position_error_mm: {{at_most: 1.0e-12}}
   max_orientation_error_deg: {{at_most: 1.0e-9}}
   executed_position_error_mm: {{at_most: 1.0e-6}}
-  greatest_speed_share: {{at_most: 1.000001}}
-  greatest_acceleration_share: {{at_most: 1.000001}}
-  greatest_jerk_share: {{at_most: 1.000001}}
+  max_speed_fraction: {{at_most: 1.000001}}
+  max_acceleration_fraction: {{at_most: 1.000001}}
+  max_jerk_fraction: {{at_most: 1.000001}}
   margin_to_limits_deg: {{at_least: 0.1}}
 """

@@ -48,7 +48,7 @@ expect:
   emptied_percent: {{at_least: 99}}
   spilled_ml: {{at_most: 0}}
   carried_margin_to_rim_mm: {{at_least: 1}}
-  greatest_speed_share: {{at_most: 1.000001}}
-  greatest_acceleration_share: {{at_most: 1.000001}}
-  greatest_jerk_share: {{at_most: 1.000001}}
+  max_speed_fraction: {{at_most: 1.000001}}
+  max_acceleration_fraction: {{at_most: 1.000001}}
+  max_jerk_fraction: {{at_most: 1.000001}}
 """

@@ -11,7 +11,7 @@ _FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 _COLORS = np.array([(52, 16, 90), (46, 79, 148), (22, 138, 134), (106, 192, 82), (250, 230, 60)])
 
 
-def share_colors(fraction: FloatArray) -> npt.NDArray[np.uint8]:
+def fraction_colors(fraction: FloatArray) -> npt.NDArray[np.uint8]:
     """Return red, green, blue (N, 3) for ``fraction`` (N,), scaled to its maximum.
 
     Five axes give a third of all orientations at best, so a scale up to 1 would show little.

@@ -2,7 +2,7 @@
 
 Keys of the .npz, lengths in m, angles in rad, points in the base frame:
 
-    format           "katana450 reachability 1"
+    format           "katana450 reachability 2"
     points (N, 3)    centres of the voxels that the tool reaches
     fraction (N,)    fraction of orientations there, above 0 and up to 1
     cloud (K, 3)     tool points at random joint angles
@@ -24,12 +24,14 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
-FORMAT = "katana450 reachability 1"
+FORMAT = "katana450 reachability 2"
 """Value of the key `format`."""
+OLD_FORMATS = ("katana450 reachability 1",)
+"""Values of the key `format` in files of older versions."""
 ZIP = b"PK"
 """First bytes of an .npz, which is a .zip."""
 
@@ -78,7 +80,7 @@ def write_npz(
 def load_map(path: str | os.PathLike[str]) -> StoredMap:
     """Return the map in an .npz file, with read-only arrays.
 
-    Raises InputError for a file that is missing, corrupt, or not a map.
+    Raises InputError for a file that is missing, corrupt, of an older version, or not a map.
     """
     name = Path(path)
     try:
@@ -88,10 +90,18 @@ def load_map(path: str | os.PathLike[str]) -> StoredMap:
                 raise ValueError("it is not an .npz file")
             file.seek(0)
             arrays = np.load(file, allow_pickle=False)
-            if str(arrays["format"]) != FORMAT:
-                raise ValueError(f"its format is {arrays['format']}, not {FORMAT}")
+            version = str(arrays["format"])
+            if version in OLD_FORMATS:
+                raise InputError(
+                    f"{name} was made by an older version of katana450. "
+                    "Run `katana450 workspace` again to replace it."
+                )
+            if version != FORMAT:
+                raise ValueError(f"its format is {version}, not {FORMAT}")
             points, fraction = arrays["points"], arrays["fraction"]
             voxel, robot, tool = (arrays[key].item() for key in ("voxel", "robot", "tool"))
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{name} cannot be read: {error.strerror or error}.") from error
     except Exception as error:
@@ -126,13 +136,13 @@ def write_ply(file: BinaryIO, found: ReachabilityMap) -> None:
         f"element vertex {len(found.points)}\n"
         "property float x\nproperty float y\nproperty float z\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-        "property float share\nend_header\n"
+        "property float fraction\nend_header\n"
     )
     vertices = np.empty(
         len(found.points), dtype=[("xyz", "<f4", 3), ("color", "u1", 3), ("fraction", "<f4")]
     )
     vertices["xyz"] = found.points
-    vertices["color"] = share_colors(found.fraction)
+    vertices["color"] = fraction_colors(found.fraction)
     vertices["fraction"] = found.fraction
     file.write(header.encode("ascii"))
     file.write(vertices.tobytes())

@@ -12,7 +12,7 @@ import viser
 
 from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError
-from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.reachability_file import StoredMap, load_map
 
 FILL = 0.2
@@ -84,7 +84,7 @@ class ReachabilityCloud:
         self._stored = stored
         self._middle = middle
         self._node: viser.PointCloudHandle | None = None
-        self._colors = share_colors(stored.fraction)
+        self._colors = fraction_colors(stored.fraction)
 
     @property
     def legend(self) -> str:
@@ -92,7 +92,7 @@ class ReachabilityCloud:
         top = self._stored.fraction.max(initial=0.0)
         stops = ", ".join(
             f"rgb({red}, {green}, {blue})"
-            for red, green, blue in share_colors(np.linspace(0.0, 1.0, STOPS)).tolist()
+            for red, green, blue in fraction_colors(np.linspace(0.0, 1.0, STOPS)).tolist()
         )
         return (
             "<div class='k450'><p class='scale'>"

@@ -19,7 +19,7 @@ STEPS = 5
 
 
 def exact_member(chain: Chain, up: FloatArray) -> tuple[Chain, list[str]]:
-    """Return the exact arm for ``chain``, and notes that tell a person what the change moves.
+    """Return the exact arm for ``chain``, and notes on what the change moves.
 
     Axes within FAMILY_ANGLE of perpendicular, parallel or upright become so, and a tool point
     within FAMILY_LENGTH of axis 5 is put on it. A chain that is exact within FAMILY_EXACT is

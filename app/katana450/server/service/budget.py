@@ -1,8 +1,8 @@
 """Processor time that questions may take, so that answering them never delays STOP.
 
 An answer costs the time of its computation, and a fixed amount for its transfer. All sockets and
-HTTP requests of one identity pay from one account. All who do not drive also pay from a shared
-one. The driver pays from a separate account, which no other client can empty.
+HTTP requests of one identity pay from one account. All clients that do not drive also pay from a
+shared account. The driver pays from a separate account, which no other client can empty.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ IDENTITY_BUDGET = 0.25
 """Budget of one identity, and of the driver [s of processor time per second]."""
 
 SHARED_BUDGET = 0.5
-"""Budget of all who do not drive together [s of processor time per second]."""
+"""Budget of all clients that do not drive, together [s of processor time per second]."""
 
 REQUEST_COST = 2e-4
 """Fixed cost of a request on a socket [s]: to read and decode it, and to send the answer."""
@@ -120,8 +120,8 @@ class Budget:
         """Charge the processor time of the ``with`` block to the budget.
 
         ``driver``: key of the window that asks if it drives; else empty. ``question``: whether
-        the shared account of all who do not drive pays too. ``fixed``: cost in addition to the
-        block itself [s]. Raises BusyError, which costs ``fixed``, when an account is empty.
+        the shared account of all clients that do not drive pays too. ``fixed``: cost in addition
+        to the block itself [s]. Raises BusyError, which costs ``fixed``, when an account is empty.
         """
         t, processor = self._budgets.clock(), self._budgets.processor
         accounts = self._budgets.accounts(self._identity, driver, question=question)

@@ -40,14 +40,14 @@ class Window:
     Attributes:
         person: Person and role.
         number: Number, counted up from 1.
-        tell: Function that queues a notice to the client.
+        notify: Function that queues a notice to the client.
         heartbeat: Newest heartbeat.
         channel: Channel of its commands.
     """
 
     person: Person
     number: int
-    tell: Callable[[dict[str, Any]], None]
+    notify: Callable[[dict[str, Any]], None]
     heartbeat: LastHeartbeat
     channel: CommandChannel
 
@@ -117,7 +117,7 @@ class Hub:
         self,
         identity: Identity,
         page: str,
-        tell: Callable[[dict[str, Any]], None],
+        notify: Callable[[dict[str, Any]], None],
         heartbeat: LastHeartbeat | None = None,
         channel: CommandChannel = CommandChannel.PAGE,
     ) -> Window:
@@ -128,7 +128,7 @@ class Hub:
         """
         key = key_of(identity, page)
         person, number = self._known(key, identity)
-        window = Window(person, number, tell, heartbeat or LastHeartbeat(self.clock), channel)
+        window = Window(person, number, notify, heartbeat or LastHeartbeat(self.clock), channel)
         self._windows[key] = window
         self.heartbeat(window)
         return window
@@ -168,7 +168,7 @@ class Hub:
         """
         window = self._windows.get(key)
         if window is None:
-            raise LeaseError("Open the front page to drive the arm.")
+            raise LeaseError("Open the start page to drive the arm.")
         return Actor(window.person, CommandChannel.SCENE, seen)
 
     def show(self, key: str, picture: MeasuresAge) -> None:
@@ -197,7 +197,7 @@ class Hub:
     def announce(self, why: str) -> None:
         """Send all windows the reason for which a request is refused. For any thread."""
         for window in self.windows:
-            window.tell({"is": "refused", "why": why})
+            window.notify({"is": "refused", "why": why})
 
     # Requests
 
@@ -256,7 +256,7 @@ class Hub:
         """Decline the request of the window of ``number`` for the lease, and notify it."""
         requester = self._numbered(number)
         self.gate.change(lambda lease, _: lease.decline(self.giver(window), requester.person))
-        requester.tell({"is": "refused", "why": f"{window.person.name} declined your request."})
+        requester.notify({"is": "refused", "why": f"{window.person.name} declined your request."})
 
     def giver(self, window: Window) -> Person:
         """Return the person as which ``window`` may hand over: its running program, or itself."""

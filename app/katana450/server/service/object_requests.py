@@ -36,7 +36,7 @@ class ObjectRequests:
             case requests.Attach():
                 return self._attached(request)
             case requests.Load(scene=key):
-                return self._hub.scenes.furnishing(key, self._hub.present())
+                return self._hub.scenes.load_command(key, self._hub.present())
             case requests.Fill(ml=ml):
                 return cmd.Fill(ML * ml)
             case requests.Remove(name=name):

@@ -43,7 +43,7 @@ class Scenes:
         while len(self._waiting) > MAX_WAITING_SCENES:
             self._waiting.pop(next(iter(self._waiting)))
 
-    def furnishing(self, key: str, arm: ArmInterface) -> cmd.ReplaceScene:
+    def load_command(self, key: str, arm: ArmInterface) -> cmd.ReplaceScene:
         """Return the command that loads the scene.
 
         Raises InputError for an unknown key, and LeaseError while an object is held.

@@ -17,7 +17,7 @@ class StopRecord:
     """A stop and its reason.
 
     Attributes:
-        by: Name of the participant who pressed STOP; None when the gateway itself stopped the arm.
+        by: Name of the participant that pressed STOP; None when the gateway itself stopped the arm.
         why: Reason in words.
         ticket: Ticket of the newest stop sent to the arm; None before one was sent.
         confirmed: Whether a state of the arm that is newer than the request is stopped.

@@ -28,7 +28,7 @@ COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (2
 OPACITY = 0.25
 
 NONE, OTHERS = "None", "All others"
-"""Choices of the ghosts that are shown, besides each single branch."""
+"""Choices of the ghosts that are shown, in addition to each single branch."""
 
 INTERVAL = 1.0
 """Time [s] between two updates while the arm moves and no ghost is shown.

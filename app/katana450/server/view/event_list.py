@@ -14,7 +14,7 @@ MAX_SHOWN_ENTRIES = 12
 """Maximum number of entries in the panel. The log itself also has older ones and the driver."""
 
 
-class LedgerList:
+class EventList:
     """The newest entries of the event log, newest first."""
 
     def __init__(self, gui: viser.GuiApi) -> None:

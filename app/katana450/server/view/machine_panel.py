@@ -21,7 +21,7 @@ from katana450.server.view.controls import (
     set_slider,
 )
 from katana450.server.view.display_options import add_themes
-from katana450.server.view.event_list import LedgerList
+from katana450.server.view.event_list import EventList
 from katana450.server.view.readout import style
 from katana450.server.view.view_updater import READOUT_INTERVAL
 
@@ -62,7 +62,7 @@ class MachinePanel:
         with gui.add_folder("Show", expand_by_default=False):
             add_themes(gui)
         with gui.add_folder("Why", expand_by_default=False):
-            self._why = LedgerList(gui)
+            self._why = EventList(gui)
 
     def follow(
         self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool

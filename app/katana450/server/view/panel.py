@@ -35,7 +35,7 @@ from katana450.server.view.controls import (
     set_value,
 )
 from katana450.server.view.display_options import DisplayOptions, add_shows, add_views
-from katana450.server.view.event_list import LedgerList
+from katana450.server.view.event_list import EventList
 from katana450.server.view.view_updater import READOUT_INTERVAL
 
 MAX_TYPED_POSITION = 1000.0
@@ -98,7 +98,7 @@ class Panel:
         with self._gui.add_folder("Show", expand_by_default=False):
             add_shows(self._gui, shows)
         with self._gui.add_folder("Why", expand_by_default=False):
-            self._why = LedgerList(self._gui)
+            self._why = EventList(self._gui)
         # At the end of the panel, because the element takes an empty line.
         self._gui.add_html(readout.style())
 

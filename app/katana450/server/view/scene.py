@@ -154,7 +154,7 @@ def _as_made(
     )
 
 
-COAT = 2e-3
+COAT_THICKNESS = 2e-3
 """Distance [m] of the ghost's surface from the arm's, so that they do not flicker in one place."""
 
 
@@ -231,7 +231,9 @@ def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     mesh = visual.mesh.copy()
     # One vertex per corner halves the data that is sent.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    return coarse(mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces), DETAIL)
+    return coarse(
+        mesh.vertices + COAT_THICKNESS * mesh.vertex_normals, np.asarray(mesh.faces), DETAIL
+    )
 
 
 def coarse(

@@ -34,14 +34,14 @@ HANDLE = 0.09
 COLOUR = (148, 163, 184)
 """Colour of an object without a colour of its own."""
 
-COAT = 1.005
+COAT_SCALE = 1.005
 """Scale of a contact coat relative to its object, so that the two do not flicker."""
 
 FACETS = 48
 """Number of facets of a cylinder."""
 
 
-class ThingNodes:
+class SceneObjectNodes:
     """One frame per scene object with its shape, which is made again when it changes."""
 
     def __init__(
@@ -231,7 +231,7 @@ class _Shape:
             surface = _of(body)
             self._coat = self._scene.add_mesh_simple(
                 self._coat_path,
-                (COAT * surface.vertices).astype(np.float32),
+                (COAT_SCALE * surface.vertices).astype(np.float32),
                 surface.faces.astype(np.uint32),
                 color=Tint.COLOUR,
                 opacity=Tint.OPACITY,

@@ -14,7 +14,7 @@ from katana450.server.view.conduit import Conduits
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
-from katana450.server.view.scene_objects import ThingNodes
+from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.water import WaterNodes
 from katana450.server.view.workcell import Workcell
 
@@ -46,7 +46,7 @@ class Scenery:
         self._session = session
         set_up_room(server)
         Workcell(server, props)
-        self.objects = ThingNodes(server, props, session.environment, gestures, meshes)
+        self.objects = SceneObjectNodes(server, props, session.environment, gestures, meshes)
         self.arm = ArmNodes(server, robot)
         self._conduits = Conduits(server, robot.require_arm(), self.arm)
         # Made on the first state with water.

@@ -70,7 +70,7 @@ class Gestures:
         """
         browser = None if client_id is None else self._browsers.get(client_id)
         if browser is None or browser.actor is None:
-            raise LeaseError("Open the front page to drive the arm.")
+            raise LeaseError("Open the start page to drive the arm.")
         return browser.actor
 
     def submit(self, command: cmd.Command, actor: Actor) -> int:

@@ -37,7 +37,7 @@ FRAME_INTERVAL = 1.0 / 60.0
 RECHECK_INTERVAL = 0.1
 """Time [s] after which the backlog of a browser is checked again if it reports nothing."""
 
-BROWSERS, BROWSERS_EACH = 64, 16
+MAX_BROWSERS, MAX_BROWSERS_EACH = 64, 16
 """Maximum number of browsers with the scene at one time, in total and per identity."""
 
 REFUSAL_INTERVAL = 0.5
@@ -56,7 +56,7 @@ class Proxy:
         self._guard = guard
         self._port = port
         self._key = key
-        self._places = ConnectionLimit(BROWSERS, BROWSERS_EACH)
+        self._places = ConnectionLimit(MAX_BROWSERS, MAX_BROWSERS_EACH)
 
     async def serve(self, browser: WebSocket) -> None:
         """Answer a request for viser's socket."""
@@ -87,7 +87,7 @@ class Proxy:
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
-                if not await self._authenticator.while_welcome(
+                if not await self._authenticator.run_while_authorised(
                     lambda: self._authenticator.identity(browser.cookies), line.run(upstream)
                 ):
                     await browser.close(SIGN_IN_CLOSE_CODE, "Your link is invalid or has expired.")
@@ -191,7 +191,7 @@ class _Line:
         window, t = self._hub.window(self._key), self._hub.clock()
         if window is not None and t - self._refused_at >= REFUSAL_INTERVAL:
             self._refused_at = t
-            window.tell({"is": "refused", "why": why})
+            window.notify({"is": "refused", "why": why})
 
     async def _send(self, frame: bytes) -> None:
         await self._browser.send_bytes(frame)

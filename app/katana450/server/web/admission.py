@@ -39,11 +39,11 @@ def identity(authenticator: Authenticator, connection: HTTPConnection) -> str | 
     Return None for an unknown client where the server requires a link.
     """
     found = authenticator.identity(connection.cookies)
-    if found is None and authenticator.asks:
+    if found is None and authenticator.requires_link:
         found = authenticator.program("", connection.headers.get("authorization", ""))
     if found is not None:
         return found.session
-    return None if authenticator.asks else address_of(connection)
+    return None if authenticator.requires_link else address_of(connection)
 
 
 def address_of(connection: HTTPConnection) -> str:

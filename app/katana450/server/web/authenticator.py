@@ -98,7 +98,7 @@ class Authenticator:
         self._cookie = f"katana450-{port}"
 
     @property
-    def asks(self) -> bool:
+    def requires_link(self) -> bool:
         """True if the server requires an access link."""
         return self._access is not None
 
@@ -131,7 +131,7 @@ class Authenticator:
             found = self.identity(cookies or {})
         return None if found is None else replace(found, name=f"{found.name}, {name}")
 
-    async def while_welcome(
+    async def run_while_authorised(
         self, identity: Callable[[], Identity | None], work: Coroutine[Any, Any, None]
     ) -> bool:
         """Run ``work`` as long as ``identity`` returns one; return whether it ended by itself."""
@@ -149,7 +149,7 @@ class Authenticator:
             with suppress(asyncio.CancelledError):
                 await task
 
-    def welcome(self, token: str, response: Response) -> bool:
+    def sign_in(self, token: str, response: Response) -> bool:
         """Set the cookie of the bearer of ``token``; return whether the token is accepted."""
         max_age = None
         if self._access is None:

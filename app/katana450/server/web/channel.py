@@ -111,7 +111,7 @@ class Channel(ABC):
         self._news = asyncio.Event()
         self._concluding: set[asyncio.Task[None]] = set()
 
-    def tell(self, notice: Any) -> None:
+    def notify(self, notice: Any) -> None:
         """Queue ``notice``, any JSON value; send it as soon as the connection allows."""
         self._notices.append(notice)
         self._news.set()
@@ -129,13 +129,13 @@ class Channel(ABC):
             self._concluding.add(task)
             task.add_done_callback(self._concluding.discard)
         elif wanted:
-            self.tell(answer)
+            self.notify(answer)
 
     async def _conclude(self, pending: answers.Answer, *, wanted: bool) -> None:
         """Send the outcome of a command; if no answer is ``wanted``, only a refusal."""
         answer = await self._dispatcher.concluded(pending)
         if wanted or isinstance(answer, answers.Refused):
-            self.tell(answer)
+            self.notify(answer)
 
     async def run(self, window: Window) -> None:
         """Receive and send until one side closes the connection."""
@@ -186,7 +186,7 @@ class Channel(ABC):
 
     def refuse(self, why: str, request_id: Id, **more: float) -> None:
         """Send a refusal of the request of ``request_id``. ``more``: fields of ``Refused``."""
-        self.tell({"is": "refused", "why": why, "id": request_id, **more})
+        self.notify({"is": "refused", "why": why, "id": request_id, **more})
 
     def wake(self) -> None:
         """Wake the sender, because there may be a message to send."""

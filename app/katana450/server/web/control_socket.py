@@ -52,7 +52,7 @@ class ControlSocket(Channel):
         """Execute ``request``, send its answer, and confirm the receipt of a stop."""
         super().answer(window, request)
         if isinstance(request, requests.Stop):
-            self.tell({"is": "stopped"})
+            self.notify({"is": "stopped"})
         if not isinstance(request, requests.Heartbeat | requests.Jog):
             self.wake()
 
@@ -82,9 +82,9 @@ async def serve(
         return
     line = WebSocketJsonChannel(socket)
     control = ControlSocket(hub, line, budgets.of(identity.session))
-    control.window = window = hub.join(identity, page, control.tell, line.arrival)
+    control.window = window = hub.join(identity, page, control.notify, line.arrival)
     try:
-        if not await authenticator.while_welcome(
+        if not await authenticator.run_while_authorised(
             lambda: authenticator.identity(socket.cookies), control.run(window)
         ):
             await line.close(SIGN_IN_CLOSE_CODE, "Your link has expired or was revoked.")

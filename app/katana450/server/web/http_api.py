@@ -48,7 +48,7 @@ MAX_PAUSE = 0.5
 
 
 class RouteContext(NamedTuple):
-    """Context that a route of an extension can use.
+    """Context of the routes of an extension.
 
     Attributes:
         hub: The hub with the arm and the lease.
@@ -185,7 +185,7 @@ class Api:
 
     def _key(self, request: Request, identity: Identity) -> str:
         """Return the key that the requests of one program have in common."""
-        session = identity.session if self._authenticator.asks else "programs"
+        session = identity.session if self._authenticator.requires_link else "programs"
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:

@@ -121,7 +121,7 @@ class ProgramChannel(Channel):
     def greet(self, window: Window) -> None:
         """Send the name, number and role of the program."""
         self._window, person = window, window.person
-        self.tell(
+        self.notify(
             answers.Welcome(
                 name=person.name,
                 number=window.number,
@@ -209,7 +209,7 @@ class LineServer:
         found = current_identity()
         session = "" if found is None else found.session
         # Without links all programs of this machine share one budget, but not their places.
-        budget = self._budgets.of(session if self._authenticator.asks else client[0])
+        budget = self._budgets.of(session if self._authenticator.requires_link else client[0])
         acceptor = self._acceptor
         kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
         with self._places.taken(session) as free, kept:
@@ -249,10 +249,10 @@ async def _serve(
         return
     program = ProgramChannel(hub, line, budget)
     page = secrets.token_hex(16)
-    window = hub.join(found, page, program.tell, line.arrival, CommandChannel.API)
+    window = hub.join(found, page, program.notify, line.arrival, CommandChannel.API)
     program.greet(window)
     try:
-        if not await authenticator.while_welcome(current_identity, program.run(window)):
+        if not await authenticator.run_while_authorised(current_identity, program.run(window)):
             await line.close(SIGN_IN_CLOSE_CODE, "The token has expired or was revoked.")
     finally:
         hub.leave(window, for_good=True)

@@ -56,5 +56,5 @@ class PanelAccess:
         self._hub.gate.check_current(actor)
         window = self._hub.window(actor.key)
         if window is None:
-            raise LeaseError("Open the front page to run programs.")
+            raise LeaseError("Open the start page to run programs.")
         return window

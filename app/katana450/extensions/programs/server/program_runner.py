@@ -137,7 +137,7 @@ class ProgramRunner(Runner):
         self._plan(window, text, speed, changed)
 
     def _plan(self, window: Window, text: str, speed: float, changed: str) -> None:
-        """Plan ``text`` from the present state; ``changed`` tells why an earlier plan is void."""
+        """Plan ``text`` from the present state; ``changed``: why an earlier plan is void."""
         arm = self.hub.present()
         note = f"Planned again: {changed}." if changed else ""
         context = PlanContext(arm.session, arm.arm.T_base_shoulder)
