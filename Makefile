@@ -11,7 +11,8 @@ install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
 servers := tests/gateway tests/extensions tests/cli/test_serve.py tests/robot/test_other_arms.py \
            tests/docs tests/examples tests/library/test_run.py
-heavy   := tests/control tests/kinematics tests/robot_description
+heavy   := tests/control tests/kinematics tests/robot_description tests/collision tests/planning tests/robot \
+           tests/water tests/motion tests/geometry
 lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
 patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
@@ -63,7 +64,7 @@ tests: $(dev_ok)
 	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) \
 	      > $(VENV)/computed.log 2>&1 ) & beside=$$!; \
 	  $(lane)-browser $(browser) || echo browser >> $(VENV)/again; \
-	  $(patient) $(heavy); status=$$?; \
+	  $(patient) $(heavy) $(servers:%=--ignore=%); status=$$?; \
 	  wait $$beside || status=1; cat $(VENV)/servers.log $(VENV)/computed.log; \
 	  for which in $$(cat $(VENV)/again 2> $(VENV)/again-none); do \
 	    $(lane)-$$which --last-failed --last-failed-no-failures none || status=1; done; \

@@ -1,4 +1,4 @@
-"""The only path of a command to the arm. Only this module checks the lease and the stop."""
+"""The only path of a command to the arm. It checks lease and stop before they go there."""
 
 from __future__ import annotations
 
