@@ -1,4 +1,4 @@
-"""The only path of a command to the arm. It checks lease and stop before they go there."""
+"""The only path of a command to the arm, on which lease and stop are checked."""
 
 from __future__ import annotations
 
