@@ -389,7 +389,7 @@ def test_server_uses_https(tmp_path: Path) -> None:
     ("options", "message"),
     [
         (("--tls-cert", "/nowhere"), "both --tls-cert and --tls-key"),
-        (("--tls-cert", "/nowhere", "--tls-key", "/nowhere"), "no certificate"),
+        (("--tls-cert", "/nowhere", "--tls-key", "/nowhere"), "not a certificate"),
         (("--access", "/nowhere"), "access give"),
         (("--public-url", "arm"), "looks like"),
     ],
