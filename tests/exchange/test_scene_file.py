@@ -275,7 +275,7 @@ def test_mesh_store_drops_only_unused_meshes() -> None:
     store.put([made("d", 10)], {"a"})
     assert store.get("a") is not None
     assert store.get("b") is None
-    with pytest.raises(InputError, match="upload its file again"):
+    with pytest.raises(InputError, match="Upload its file again"):
         store.need("b")
     for refused, used in ((made("e", 95), {"a"}), (made("e", 1), {"a", "c", "d"})):
         with pytest.raises(InputError, match="There is room for 3 meshes"):
