@@ -124,6 +124,7 @@ bench-pictures: $(dev_ok)     ## pictures by our renderer beside VTK; installs t
 
 pictures: $(dev_ok) browser   ## take the pictures of the documentation again
 	$(bin)/python -m docs.pictures
+	$(bin)/python -m docs.films
 
 bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and beside C; installs those
 	$(bin)/python -m benchmarks.kinematics $(ARGS)
