@@ -58,10 +58,13 @@
 
   // A person who turns the camera meanwhile keeps that view.
   for (const kind of ["pointerdown", "wheel"])
-    window.addEventListener(kind, ({ target }) => tries && target?.tagName === "CANVAS" && (kept = null), {
-      capture: true,
-      passive: true,
-    });
+    window.addEventListener(
+      kind,
+      ({ target }) => {
+        if (tries && target instanceof HTMLCanvasElement) kept = null;
+      },
+      { capture: true, passive: true },
+    );
 
   // The server sends every window the light theme. It is changed to the window's theme here, before
   // viser gets it. This needs no answer of the server, which a slow page would miss.

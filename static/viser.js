@@ -51,8 +51,8 @@ const Viser = (() => {
           this.dispatchEvent(new MessageEvent("message", { data: { type: BATCH, messages, ours: true } })),
       };
 
-      constructor(...args) {
-        super(...args);
+      constructor(url, options) {
+        super(url, options);
         // This listener runs before viser's own, which is set later.
         this.addEventListener("message", ({ data }) => {
           if (data?.type === CONNECTED) {

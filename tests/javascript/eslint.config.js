@@ -2,7 +2,9 @@ import js from "@eslint/js";
 import globals from "globals";
 
 // Defined at the top of one script of a document and used by the others.
-const shared = { Fields: "readonly", Fit: "readonly", Jog: "readonly", Objects: "readonly", Theme: "readonly" };
+const shared = {
+  Fields: "readonly", Fit: "readonly", Jog: "readonly", Objects: "readonly", Theme: "readonly", Viser: "readonly",
+};
 
 export default [
   js.configs.recommended,
