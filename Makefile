@@ -12,7 +12,7 @@ browser := tests/browser
 servers := tests/gateway tests/extensions tests/cli/test_serve.py tests/robot/test_other_arms.py \
            tests/docs tests/examples tests/library/test_run.py
 heavy   := tests/control tests/kinematics tests/robot_description tests/collision tests/planning tests/robot \
-           tests/water tests/motion tests/geometry
+           tests/water tests/motion tests/geometry tests/exchange tests/packaging
 lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
 patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
