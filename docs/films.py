@@ -16,7 +16,7 @@ from PIL import Image
 from docs.pictures import IMAGES, MOVE, at_rest
 from tests.browser.camera import Camera, Drawing
 from tests.browser.chromium import launched
-from tests.browser.page import ViserPage
+from tests.browser.page import Axis, ViserPage
 from tests.browser.server import AppServer
 
 WINDOW = (1100, 690)
@@ -26,6 +26,9 @@ WIDTH = 720
 FRAMES_PER_SECOND = 12
 
 VIEW = Camera((0.95, -1.10, 0.62), (0.26, -0.02, 0.26), 0.72)
+
+STROKES: tuple[tuple[Axis, tuple[float, float]], ...] = (("z", (0.12, 0.0)), ("x", (0.26, 0.0)))
+"""Arrow of the gizmo, and the values [m] to which the mouse moves it, one after the other."""
 
 POUR_REGION = (400, 260, 1136, 790)
 """Left, top, right and bottom [pixels] of the part of the drawn frames that is shown."""
@@ -40,7 +43,7 @@ addEventListener("pointermove", (event) => {
   cursor.style.top = event.clientY + "px";
 }, true);
 """
-"""Draws the position of the mouse, which is no part of a screenshot."""
+"""Draws the mouse pointer, because a screenshot does not contain it."""
 
 
 def drag() -> Iterable[Image.Image]:
@@ -49,7 +52,7 @@ def drag() -> Iterable[Image.Image]:
         page = ViserPage.open(browser, server.url, camera=VIEW, drawing=Drawing.BEST, window=WINDOW)
         at_rest(page)
         page.frame.evaluate(CURSOR)
-        for axis, ends in (("z", (0.12, 0.0)), ("x", (0.26, 0.0))):
+        for axis, ends in STROKES:
             with page.grip_arrow(MOVE, axis) as grip:
                 start = 0.0
                 for end in ends:

@@ -177,7 +177,8 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
     x, y = (width - across) // 2, (height - down) // 2
     shown = picture[y : y + down, x : x + across].astype(np.uint16)
     quarters = shown.reshape(down // 2, 2, across // 2, 2, 3)
-    return (quarters.sum(axis=(1, 3)) // 4).astype(np.uint8)
+    smaller: NDArray[np.uint8] = (quarters.sum(axis=(1, 3)) // 4).astype(np.uint8)
+    return smaller
 
 
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {

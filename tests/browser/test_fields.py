@@ -10,31 +10,12 @@ import pytest
 from playwright.sync_api import Locator
 
 from katana450.settings import Settings
-from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
-from tests.browser.server import AppServer
 from tests.browser.session import Truth, clear_stop, prepare
 
 MOVE = "/target/move"
 READY = Settings().ready
 BETWEEN_KEYS = 300.0  # ms; viser alone sends a keystroke after at most 50
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture
-def truth(server: AppServer) -> Truth:
-    return Truth(server)
-
-
-@pytest.fixture(scope="module")
-def window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
-    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
-        yield page
 
 
 @pytest.fixture

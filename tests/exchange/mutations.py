@@ -5,13 +5,17 @@ from __future__ import annotations
 import os
 import random
 import struct
+import time
 
 import numpy as np
+import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.importers.shape_file import (
+    MAX_MEMORY_BYTES,
     MAX_SIZE,
     MIN_SIZE,
+    SECONDS,
     Format,
     ShapeFile,
     read_shape,
@@ -65,3 +69,17 @@ def looked_at(data: bytes, format: Format) -> ShapeFile | None:
     assert shape.colours is None or shape.colours.shape == (len(shape.faces), 4)
     assert MIN_SIZE <= np.ptp(shape.vertices, axis=0).max() <= MAX_SIZE
     return shape
+
+
+def check_mutations(name: str, data: bytes) -> None:
+    """Check that mutations of the file ``name`` are read or refused within time and memory."""
+    resource = pytest.importorskip("resource")
+    format, chance = Format.of(name), random.Random(name)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    read = 0
+    for _ in range(MUTATIONS):
+        start = time.process_time()
+        read += looked_at(mutated(data, chance), format) is not None
+        assert time.process_time() - start < SECONDS
+    assert read < MUTATIONS
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MAX_MEMORY_BYTES

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import os
-import random
 import subprocess
 import sys
 import time
@@ -19,12 +18,11 @@ from katana450.errors import InputError
 from katana450.extensions.export.vrml_text import HEADER
 from katana450.extensions.importers.reading import bind
 from katana450.extensions.importers.shape_file import (
-    MAX_MEMORY_BYTES,
     SECONDS,
     Format,
     read_shape_guarded,
 )
-from tests.exchange.mutations import MUTATIONS, looked_at, mutated
+from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 
 resource = pytest.importorskip("resource")
@@ -42,16 +40,7 @@ SEEDS = {
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_mutated_files_are_read_or_refused(seed: str) -> None:
-    data, format = SEEDS[seed], Format.of(seed)
-    chance = random.Random(seed)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    read = 0
-    for _ in range(MUTATIONS):
-        start = time.process_time()
-        read += looked_at(mutated(data, chance), format) is not None
-        assert time.process_time() - start < SECONDS
-    assert read < MUTATIONS
-    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MAX_MEMORY_BYTES
+    check_mutations(seed, SEEDS[seed])
 
 
 @settings(max_examples=MUTATIONS, deadline=None)

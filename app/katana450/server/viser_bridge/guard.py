@@ -110,7 +110,7 @@ class Guard:
 
     def _handle(self, message: Any) -> str | None:
         is_one = isinstance(self._node(message), viser.TransformControlsHandle)
-        return None if is_one else "there is no gizmo of that name"
+        return None if is_one else "no gizmo has that name"
 
     def _gizmo(self, message: Any) -> str | None:
         if len(message.wxyz) != 4 or len(message.position) != 3:
