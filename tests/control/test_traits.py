@@ -84,6 +84,14 @@ def test_only_stop_is_a_safety_command() -> None:
     assert [kind for kind in KINDS if kind.traits.safety] == [cmd.Stop]
 
 
+def test_no_command_of_the_server_itself_moves_the_arm(session: Session, state: State) -> None:
+    protective = [each for each in examples(session, state) if each.traits.protective]
+    assert {type(each) for each in protective} == {cmd.Stop, cmd.Hold, cmd.SpeedScale}
+    for each in protective:
+        after = session.step(state, [each], state.t)
+        assert not after.moving, each
+
+
 def test_stopped_arm_accepts_exactly_the_declared_commands(session: Session, state: State) -> None:
     stopped = session.step(state, [cmd.Stop()], state.t)
     given: list[cmd.Command] = examples(session, state)

@@ -226,7 +226,7 @@ class GoToZero(BaseCommand):
 class Hold(BaseCommand):
     """Come to rest and drop the targets of arm and gripper."""
 
-    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(protective=True, joints_only=True)
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ class Stop(BaseCommand):
     """Come to rest as fast as the arm can, and accept no motion until ClearStop."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(
-        while_stopped=True, joints_only=True, safety=True
+        while_stopped=True, protective=True, joints_only=True, safety=True
     )
 
 
@@ -294,7 +294,12 @@ class SpeedScale(BaseCommand):
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(
-        pacing=True, while_stopped=True, supersedes=False, passive=True, joints_only=True
+        pacing=True,
+        protective=True,
+        while_stopped=True,
+        supersedes=False,
+        passive=True,
+        joints_only=True,
     )
 
     value: float

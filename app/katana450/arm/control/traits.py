@@ -20,6 +20,7 @@ class CommandTraits:
         supersedes: ends the motion or the program that is under way or being planned.
         passive: leaves a path that is being planned as it is; all others end the planning.
         pacing: may also be given by the owner of the running program, which holds the lease itself.
+        protective: may also be given by the server itself, which never moves the arm.
         joints_only: possible for a mechanism that has joints and no tool.
         planned: a path is planned first, so the command takes effect later than its ticket.
         safety: may be given by every participant at any time, also without the lease. It is never
@@ -32,6 +33,7 @@ class CommandTraits:
     supersedes: bool = True
     passive: bool = False
     pacing: bool = False
+    protective: bool = False
     joints_only: bool = False
     planned: bool = False
     safety: bool = False

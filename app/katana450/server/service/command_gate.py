@@ -18,9 +18,6 @@ from katana450.server.service.stop_state import StopRecord
 
 log = logging.getLogger(__name__)
 
-PROTECTIVE = (cmd.Stop, cmd.Hold, cmd.SpeedScale)
-"""Commands that the server itself may give."""
-
 
 class RunningProgram(NamedTuple):
     """Participant as which a program holds the lease, and the key of the program's owner."""
@@ -66,7 +63,7 @@ class CommandGate:
                 return self._stop(StopRecord(actor.name, f"{actor.name} pressed STOP."), actor)
             if not all(each.traits.while_stopped for each in command.parts):
                 self.check_runs()
-            if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
+            if actor.channel is CommandChannel.SERVER and not command.traits.protective:
                 raise LeaseError("The server itself may not move the arm.")
             granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
             clears = isinstance(command, cmd.ClearStop)
