@@ -63,7 +63,7 @@ def test_impossible_exports_are_reported(
 def test_an_existing_file_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("")
     assert main(["export", "glb", "--out", str(tmp_path / "file")]) == 1
-    assert "cannot be made" in capsys.readouterr().err
+    assert "cannot be created" in capsys.readouterr().err
 
 
 def test_an_invalid_pose_is_refused(tmp_path: Path) -> None:
