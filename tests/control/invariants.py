@@ -39,8 +39,8 @@ ROUNDING = 1e-6
 """[1] Tolerance, as a fraction of a limit."""
 
 STILL = 1e-12
-"""[rad, m] Largest step of an arm at rest: a brake can end one rounding beside its predicted end, and
-the next command takes the setpoint there."""
+"""[rad, m] Largest step of an arm at rest: a brake can end one rounding beside its predicted end,
+and the next command takes the setpoint there."""
 
 REST_SECONDS = 4.0
 """[s] Maximum time of the slowest brake: a pause along a plan at the lowest speed."""
