@@ -38,10 +38,6 @@ DT = 0.01
 ROUNDING = 1e-6
 """[1] Tolerance, as a fraction of a limit."""
 
-STILL = 1e-12
-"""[rad, m] Largest step of an arm at rest: a brake can end one rounding beside its predicted end,
-and the next command takes the setpoint there."""
-
 REST_SECONDS = 4.0
 """[s] Maximum time of the slowest brake: a pause along a plan at the lowest speed."""
 
@@ -231,7 +227,7 @@ class JointRules(RuleBasedStateMachine):
         """Check that nothing moves after the brake of a stop, or without a newer command."""
         resting = state.stopped is not None or state.paused
         self.braking = self.braking + 1 if resting else 0
-        same = (np.abs(state.setpoint - before.setpoint) <= STILL).all()
+        same = (state.setpoint == before.setpoint).all()
         if resting:
             assert state.gripper_setpoint == before.gripper_setpoint
             assert not before.motion.at_rest or (same and state.motion.at_rest)

@@ -123,3 +123,17 @@ def test_modes_in_random_order_all_end(session: Session, state: State) -> None:
     over = run(session, state, None, 600)
     assert isinstance(over.mode, Idle | Positioning)
     assert not over.moving
+
+
+def test_resume_moves_nothing_where_a_pause_ended_the_brake_of_a_hold(
+    session: Session, state: State
+) -> None:
+    random = np.random.default_rng(450)
+    for _ in range(20):
+        away = cmd.SetJoints(session.ready + random.uniform(-0.5, 0.5, 5))
+        braking = run(session, run(session, state, away), None, int(random.integers(5, 40)))
+        braking = run(session, run(session, braking, cmd.Hold()), None, int(random.integers(1, 8)))
+        rested = run(session, run(session, braking, cmd.Pause()), None, 150)
+        assert rested.motion.at_rest
+        resumed = run(session, run(session, rested, cmd.Resume()), None, 5)
+        assert resumed.setpoint.tobytes() == rested.setpoint.tobytes()

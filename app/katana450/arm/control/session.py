@@ -206,6 +206,9 @@ class Session:
             state = self._at_rest_soon(state)
         dt = min(t - state.t, MAX_STEP_TIME)
         state = self._stepper(state).step(replace(state, t=max(t, state.t)), dt)
+        if state.mode is IDLE and state.motion.at_rest and state.goal is not state.setpoint:
+            # A brake can end one rounding beside its predicted end.
+            state = replace(state, goal=state.setpoint)
         state = gripped(self.environment, self.world_at(state), state)
         if self.pouring is not None and state.poured is not None:
             x = state.x_setpoint
