@@ -101,7 +101,9 @@ class Gateway:
                     keep_alive(each)
             self.address = _address(settings, self._listening)
             self.hub = Hub(time.monotonic, settings.silence, meshes, runner)
-            authenticator = Authenticator(access, self.port, self.address)
+            people = self.hub.people
+            people.revoke = None if access is None else access.revoke
+            authenticator = Authenticator(access, self.port, self.address, people)
             guard = Guard(self.viser)
             self.gestures = Gestures(self.viser, guard, self.hub)
             proxy = Proxy(self.hub, authenticator, guard, self.viser.get_port(), key)

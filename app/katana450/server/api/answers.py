@@ -9,6 +9,7 @@ import msgspec
 
 from katana450.server.api.fields import VERSION, Answer, Numbers
 from katana450.server.api.outcome_answers import Done, Finding, PartRefusal, Refused
+from katana450.server.api.people_answers import ConnectedPerson, People, PersonConnection
 from katana450.server.api.scene_answers import (
     Field,
     Link,
@@ -29,6 +30,7 @@ __all__ = [
     "Arm",
     "BranchOption",
     "Branches",
+    "ConnectedPerson",
     "Done",
     "Echo",
     "EventLog",
@@ -44,6 +46,8 @@ __all__ = [
     "Numbers",
     "Objects",
     "PartRefusal",
+    "People",
+    "PersonConnection",
     "Progress",
     "Refused",
     "Scene",
@@ -373,6 +377,7 @@ AnyAnswer = (
     | Links
     | Mesh
     | Scene
+    | People
 )
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)
