@@ -29,7 +29,8 @@ SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 def made(hub: Hub) -> ProgramRunner:
     """Make the runner as ``katana450 serve`` does."""
-    return ProgramRunner(hub, Namespace(owner_silence=OWNER_SILENCE))
+    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=False)
+    return ProgramRunner(hub, options)
 
 
 class Staged(Table):

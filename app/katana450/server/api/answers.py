@@ -144,6 +144,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         fraction: Fraction of the task that is done, or of all planning.
         seconds: Duration of all motions at full speed [s].
         why: What is wrong with the program, or why it was planned again or not run.
+        unattended: Whether it runs without heartbeats of its owner.
+        began: Time at which the run began, in UTC, in ISO 8601; null before that.
     """
 
     name: str
@@ -156,6 +158,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     fraction: float = 0.0
     seconds: float = 0.0
     why: str = ""
+    unattended: bool = False
+    began: str | None = None
 
 
 class State(Answer, frozen=True, kw_only=True):

@@ -183,4 +183,3 @@ class People:
             self._away.add(session)
             self._away.count_stop(session)
         self.mutes.count_stop(session)
-
