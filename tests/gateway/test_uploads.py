@@ -59,7 +59,7 @@ def slow_scene() -> bytes:
     """Return a scene of files within the limits, each of which takes too long to read."""
     names = [f"star{number}.obj" for number in range(SLOW_MESHES)]
     rows = [
-        f"  - {{name: s{number}, shape: mesh, mesh: {{file: {name}}}, at: [0, 0, 0]}}"
+        f"  - {{name: s{number}, shape: mesh, mesh: {{file: {name}}}, pose: [0, 0, 0, 0, 0, 0]}}"
         for number, name in enumerate(names)
     ]
     packed, content = io.BytesIO(), star(50_000)
