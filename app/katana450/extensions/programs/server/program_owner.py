@@ -109,6 +109,21 @@ class ProgramOwner:
         if window is not None and not self.is_person(person) and not person.role.may_take:
             raise LeaseError(f"The program belongs to {window.person.name}.")
 
+    def superseded_by(self, sender: Window) -> str:
+        """Return why the program that is being planned gives way to a new one of ``sender``.
+
+        Raises LeaseError if it does not: planning may take two minutes, and then blocks all but the
+        driver.
+        """
+        if self.is_silent(self._hub.clock()):
+            return "Its owner sends no heartbeats."
+        owner, drives = self.window, self._hub.lease.holder == sender.person
+        if owner is None or owner.person == sender.person or not drives:
+            raise LeaseError("Another program is being planned. Cancel it, or wait for it.")
+        why = f"{sender.person.name}, who drives, has sent another program."
+        owner.notify({"is": "refused", "why": f"Your program is not planned any more. {why}"})
+        return why
+
     @property
     def _connected(self) -> Window | None:
         """The present window of the owner, a new one after a page has reloaded."""

@@ -112,11 +112,13 @@ class ProgramRunner(Runner):
         if more:
             self._parts[key] = text
             return
-        self._check_free()
+        if self.running:
+            raise LeaseError("A program is running. End it first.")
         arm = self.hub.present()
         if arm.state.moving:
             raise LeaseError("The arm is moving. Plan the program when it is at rest.")
         self._check_may_drive(window.person)
+        self._supersede(window)
         before = self._planning
         if before is not None and before.fits(text, speed, arm.state):
             before.refused, before.note = None, ""
@@ -383,15 +385,11 @@ class ProgramRunner(Runner):
         self.hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
 
-    def _check_free(self) -> None:
-        if self.running:
-            raise LeaseError("A program is running. End it first.")
+    def _supersede(self, window: Window) -> None:
+        """Cancel the planning of another program. Raises LeaseError if ``window`` may not."""
         planning = self._planning
-        if planning is None or not planning.busy:
-            return
-        if not self._owner.is_silent(self.hub.clock()):
-            raise LeaseError("Another program is being planned. Cancel it, or wait for it.")
-        planning.cancel("Its owner sends no heartbeats.")
+        if planning is not None and planning.busy:
+            planning.cancel(self._owner.superseded_by(window))
 
     def _check_may_drive(self, person: Person) -> None:
         if not person.role.may_drive:
