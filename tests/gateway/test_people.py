@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
@@ -16,7 +21,7 @@ from katana450.client import Client, connect
 from katana450.client.files import LostError, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
-from tests.browser.server import APP, AppServer
+from tests.browser.server import APP, ROOT, AppServer
 from tests.gateway.client import (
     HOUR,
     SUBPROTOCOL,
@@ -249,6 +254,91 @@ def test_flooding_viewer_is_muted_and_others_still_stop(site: Site) -> None:
             await cleared(admin)
 
     asyncio.run(act())
+
+
+def test_mute_outlasts_the_server(tmp_path: Path) -> None:
+    path = tmp_path / "access.json"
+    file = AccessFile.create(path)
+    boss, bad = (
+        file.give(role.value.title(), role, time.time() + HOUR)
+        for role in (Role.ADMIN, Role.VIEWER)
+    )
+    with AppServer((*APP, "--access", str(path))) as server:
+        with connect(server.url, "Guard", boss) as guard, connect(server.url, "Bad", bad):
+            person = next(each.person for each in guard.people() if each.name == "Viewer")
+            guard.mute(person, 30.0)
+            due = time.monotonic() + 5.0
+            while AccessFile.open(path).grants[number_of(file, bad)].muted != 30.0:
+                assert time.monotonic() < due
+                time.sleep(0.02)
+        server.restart()
+        with connect(server.url, "Guard", boss) as guard, connect(server.url, "Bad", bad) as viewer:
+            (muted,) = (each for each in guard.people() if each.name == "Viewer")
+            assert muted.muted == 30.0
+            viewer.ask(requests.Stop())
+            clear(guard)
+            with pytest.raises(RefusedError, match="this STOP does not count"):
+                viewer.ask(requests.Stop())
+            guard.unmute(muted.person)
+            viewer.ask(requests.Stop())
+
+
+def number_of(file: AccessFile, token: str) -> str:
+    found = file.check(token, time.time())
+    assert found is not None
+    return found[0]
+
+
+def clear(admin: Client) -> None:
+    """Clear the stop, as often as it takes."""
+    due = time.monotonic() + 10.0
+    while admin.query(answers.State).stopped is not None:
+        with suppress(RefusedError):
+            admin.ask(requests.ClearStop())
+        assert time.monotonic() < due
+        time.sleep(0.1)
+
+
+def test_command_lists_mutes_and_kicks(site: Site, tmp_path: Path) -> None:
+    boss, viewer = site.link("Ada", Role.ADMIN), site.link("Cleo", Role.VIEWER)
+    secret = tmp_path / "token"
+    secret.write_text(f"{site.server.url}/#{boss}\n")
+
+    def people(*words: str, token: str = boss) -> tuple[int, str]:
+        environment = os.environ | {"KATANA450_TOKEN": token}
+        done = subprocess.run(
+            [sys.executable, "-m", "katana450", "people", *words, "--url", site.server.url],
+            capture_output=True,
+            text=True,
+            env=environment,
+            cwd=ROOT,
+            timeout=60,
+            check=False,
+        )
+        assert "Traceback" not in done.stderr
+        return done.returncode, done.stdout + done.stderr
+
+    with connect(site.server.url, "Watch", viewer) as watch:
+        status, text = people("list")
+        assert status == 0
+        (line,) = (line for line in text.splitlines() if "Cleo" in line)
+        number = line.split()[0]
+        assert "viewer" in line
+        assert "program" in line
+        assert people("mute", number, "--seconds", "20")[0] == 0
+        assert "muted" in people("list")[1]
+        assert people("unmute", number)[0] == 0
+        assert people("list", token=viewer) == (1, "katana450: Only an admin may do this.\n")
+        assert people("kick", number, "--seconds", "30")[0] == 0
+        with pytest.raises(LostError, match="disconnected"):
+            poll(watch)
+        assert "kept out" in people("list")[1]
+        assert people("let-in", number)[0] == 0
+    assert people("kick", "999")[0] == 1
+    # The token can also be in a file, as part of its link.
+    assert people("list", "--token-file", str(secret), token="")[0] == 0
+    with connect(site.server.url, "Watch", viewer):
+        assert people("kick", number, "--revoke")[0] == 0
 
 
 def poll(program: Client) -> None:

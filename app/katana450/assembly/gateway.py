@@ -104,7 +104,10 @@ class Gateway:
             self.address = _address(settings, self._listening)
             self.hub = Hub(time.monotonic, settings.silence, meshes, runner)
             people = self.hub.people
-            people.revoke = None if access is None else access.revoke
+            people.links = access
+            for number, grant in {} if access is None else access.grants.items():
+                if grant.muted is not None:
+                    people.mutes.add(number, grant.muted)
             authenticator = Authenticator(access, self.port, self.address, people)
             guard = Guard(self.viser)
             self.gestures = Gestures(self.viser, guard, self.hub)

@@ -7,6 +7,7 @@ An identity is an access link; without links it is the cookie of a browser, or o
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import time
 from collections import Counter
@@ -14,9 +15,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Protocol
 
+from katana450.errors import KatanaError
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import Mutes
+
+log = logging.getLogger(__name__)
 
 MAX_REMEMBERED = 1024
 """Maximum number of identities whose numbers and refusals are remembered."""
@@ -35,6 +40,16 @@ class ConnectionKind(Enum):
     """A program on the TCP port."""
     POSTS = "posts"
     """A program that sends single requests over HTTP."""
+
+
+class LinkStore(Protocol):
+    """Interface of the access links, which ``AccessFile`` implements. Its methods may block."""
+
+    def revoke(self, number: str) -> object:
+        """Delete the link of ``number``. Raises KatanaError or OSError."""
+
+    def mute(self, number: str, interval: float | None) -> None:
+        """Store the interval of a mute [s], or its end. Raises KatanaError or OSError."""
 
 
 @dataclass(eq=False)
@@ -67,14 +82,16 @@ class People:
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
         self.mutes = Mutes(clock)
-        self.revoke: Callable[[str], object] | None = None
-        """Revokes an access link by its number; None on a server without links. May block."""
+        self.links: LinkStore | None = None
+        """The access links; None on a server without them."""
         self._connections: dict[Connection, None] = {}
         self._known: dict[str, tuple[int, Identity]] = {}
         self._counted = 0
         self._refusals: Counter[str] = Counter()
         self._kept_out: dict[str, float] = {}
         self._away = Mutes(clock)
+        self._writing = asyncio.Lock()
+        self._tasks: set[asyncio.Task[None]] = set()
 
     # Connections
 
@@ -167,6 +184,25 @@ class People:
         if left <= 0.0:
             del self._kept_out[session]
         return max(left, 0.0)
+
+    # Links
+
+    def write(self, change: Callable[[], object], failed: Callable[[str], None]) -> None:
+        """Call ``change`` of the links in a thread, because a disk can be slow.
+
+        ``failed`` is called with the reason if it fails.
+        """
+        task = asyncio.ensure_future(self._write(change, failed))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _write(self, change: Callable[[], object], failed: Callable[[str], None]) -> None:
+        async with self._writing:
+            try:
+                await asyncio.to_thread(change)
+            except (KatanaError, OSError) as error:
+                log.error("The access file cannot be changed: %s", error)
+                failed(str(error))
 
     # STOP
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
 from datetime import UTC, datetime
 
 from katana450.arm.control.lease import Role
-from katana450.errors import InputError, KatanaError, LeaseError
+from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
 from katana450.server.service.hub import Hub, Window, session_of
 from katana450.server.service.identity import Identity
@@ -26,7 +25,6 @@ class PeopleRequests:
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
         self._people = hub.people
-        self._revoking: set[asyncio.Task[None]] = set()
 
     def answer(self, window: Window, request: requests.Request) -> answers.Answer | None:
         """Execute ``request`` and return its answer; None for a request about something else."""
@@ -41,6 +39,7 @@ class PeopleRequests:
             case requests.Unmute(person=number):
                 found = self._person(window, number)
                 self._people.mutes.remove(found.session)
+                self._store_mute(window, found, None)
                 log.warning("%s ended the mute of %s.", window.person.name, self._name(found))
             case _:
                 return None
@@ -58,28 +57,17 @@ class PeopleRequests:
                 log.warning("%s let %s in again.", by, name)
                 people.let_in(person.session)
             return
-        if people.revoke is None:
+        links = people.links
+        if links is None:
             raise InputError("This server has no links that could be revoked.")
         if person.role is Role.ADMIN:
             raise LeaseError("Revoke the link of an admin with `katana450 access revoke`.")
         people.kick(person, math.inf)
         log.warning("%s revoked the link of %s.", by, name)
-        task = asyncio.ensure_future(self._revoke(window, person))
-        self._revoking.add(task)
-        task.add_done_callback(self._revoking.discard)
-
-    async def _revoke(self, window: Window, person: Identity) -> None:
-        """Revoke the link in the access file, in a thread: a disk can be slow."""
-        assert self._people.revoke is not None
-        try:
-            await asyncio.to_thread(self._people.revoke, person.session)
-        except (KatanaError, OSError) as error:
-            log.error("The access file cannot be changed: %s", error)
-            why = (
-                f"The link of {person.name} works again once the server is restarted, because the "
-                f"access file cannot be changed: {error}"
-            )
-            window.notify({"is": "refused", "why": why})
+        people.write(
+            lambda: links.revoke(person.session),
+            lambda why: _report(window, f"The link of {name} works again after a restart. {why}"),
+        )
 
     def _mute(self, window: Window, person: Identity, seconds: float) -> None:
         if person.role is Role.ADMIN:
@@ -87,6 +75,15 @@ class PeopleRequests:
         self._people.mutes.add(person.session, seconds)
         name = self._name(person)
         log.warning("%s muted %s: one STOP per %g s.", window.person.name, name, seconds)
+        self._store_mute(window, person, seconds)
+
+    def _store_mute(self, window: Window, person: Identity, interval: float | None) -> None:
+        links = self._people.links
+        if links is not None:
+            self._people.write(
+                lambda: links.mute(person.session, interval),
+                lambda why: _report(window, f"The server forgets this when it restarts. {why}"),
+            )
 
     def _person(self, window: Window, number: int) -> Identity:
         self._check_admin(window)
@@ -123,7 +120,7 @@ class PeopleRequests:
             person=number,
             name=self._name(identity),
             role=identity.role.value,
-            link=None if people.revoke is None else session,
+            link=None if people.links is None else session,
             you=you,
             drives=hub.drives(session),
             asks=any(session_of(each.key) == session for each in hub.lease.waiting),
@@ -154,3 +151,8 @@ class PeopleRequests:
             address=connection.address,
             since=datetime.fromtimestamp(connection.since, UTC).isoformat(timespec="seconds"),
         )
+
+
+def _report(window: Window, why: str) -> None:
+    """Show ``why`` in ``window`` as the reason of a refusal."""
+    window.notify({"is": "refused", "why": why})

@@ -29,12 +29,20 @@ MAX_NAME_LENGTH = 40
 MAX_TOKEN_LENGTH = 400
 
 
-class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Rights of one link. ``expires``: seconds since the epoch."""
+class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Rights of one link.
+
+    Attributes:
+        name: Name of the person.
+        role: Role of the person.
+        expires: End of the validity [s since the epoch].
+        muted: Interval [s] in which one STOP counts; None unless an admin has muted the person.
+    """
 
     name: str
     role: Role
     expires: float
+    muted: float | None = None
 
 
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -102,6 +110,17 @@ class AccessFile:
         grant = grants.pop(number)
         self._write(_Content(self._content.secret, grants))
         return grant
+
+    def mute(self, number: str, interval: float | None) -> None:
+        """Store the mute of the link of ``number``; see ``Grant``. Raises InputError if unknown.
+
+        So it lasts when the server is started again, and each process that admits STOP knows it.
+        """
+        grants = self.grants
+        if number not in grants:
+            raise InputError(f"There is no link {number!r}.")
+        grants[number] = msgspec.structs.replace(grants[number], muted=interval)
+        self._write(_Content(self._content.secret, grants))
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
         """Return number and grant of a token valid at ``now`` [s since the epoch], or None."""

@@ -225,4 +225,4 @@ class Authenticator:
 
 
 def _of_link(number: str, grant: Grant) -> Identity:
-    return Identity(number, grant.name, grant.role, grant.name)
+    return Identity(number, grant.name, grant.role, grant.name, grant.muted)
