@@ -76,8 +76,14 @@ const People = (() => {
   }
 
   function heard({ people }) {
-    const key = JSON.stringify(people.map((each) => [each, about(each)]));
-    if (key === drawn) return;
+    const parts = (each) => [each.person, each.name, each.role, each.muted === null, each.kept_out === null];
+    const key = JSON.stringify(people.map(parts));
+    // Buttons are not replaced while they may be pressed.
+    if (key === drawn) {
+      const lines = byId("people-list").querySelectorAll("span");
+      people.forEach((each, number) => (lines[number].textContent = about(each)));
+      return;
+    }
     drawn = key;
     /** @type {HTMLElement | null} */
     const focused = document.activeElement?.closest("#people-list button");

@@ -134,7 +134,7 @@ def test_admin_gets_in_while_viewers_hold_the_tcp_port(site: Site) -> None:
         stack.enter_context(lines.socket)
         stack.enter_context(lines.reader)
         lines.say(do="hello", name="Crowd", token=token)
-        return lines.hear()["is"] == "welcome"
+        return bool(lines.hear()["is"] == "welcome")
 
     with ExitStack() as stack:
         for _ in range(LINES // LINES_EACH):

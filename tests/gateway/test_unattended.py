@@ -17,6 +17,8 @@ from katana450.extensions.programs.extension import OWNER_SILENCE
 from katana450.extensions.programs.requests import AllowUnattended, ProgramOrder, Steer
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.service import status
+from katana450.server.service.budget import Budgets
+from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub, Window, actor_of
 from katana450.server.service.identity import Identity
 from tests.gateway.test_hub import PAGES
@@ -103,8 +105,9 @@ def test_admin_forbids_unattended_programs(table: Staged) -> None:
     owner, admin = table.join(PAGES[0], Role.OPERATOR), table.join(PAGES[1], Role.ADMIN)
     run(table, owner)
     table.wait(LONG, admin)
+    dispatcher, budget = Dispatcher(table.hub), Budgets(table.hub.clock).of("owner")
     with pytest.raises(LeaseError, match="Only an admin"):
-        table.programs.handle(owner, AllowUnattended(allowed=False))
+        dispatcher.handle(owner, AllowUnattended(allowed=False), budget)
     table.programs.handle(admin, AllowUnattended(allowed=False))
     table.wait(0.1, admin)
     assert table.status == "stopped"

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import COMMAND, MAX_REQUEST_BYTES, Request, RequestTraits
+from katana450.server.api.fields import ADMIN, COMMAND, MAX_REQUEST_BYTES, Request, RequestTraits
 
 SLOWEST_SPEED = 0.01
 """Minimum fraction of its own speed at which a program can run."""
@@ -65,6 +65,6 @@ class AllowUnattended(Request, frozen=True, kw_only=True):
     If forbidden, a running one ends unless its owner sends heartbeats.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True)
+    traits: ClassVar[RequestTraits] = ADMIN
 
     allowed: bool

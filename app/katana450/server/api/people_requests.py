@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import Request, RequestTraits
+from katana450.server.api.fields import ADMIN, Request, RequestTraits
 
 MAX_TIME_OUT = 86_400.0
 """Maximum time [s] for which an admin keeps somebody out without revoking the link."""
@@ -15,7 +15,7 @@ MAX_TIME_OUT = 86_400.0
 class ListPeople(Request, frozen=True):
     """List everybody who is connected, muted or kept out. For admins only."""
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True, answered=True)
+    traits: ClassVar[RequestTraits] = RequestTraits(admin=True, answered=True)
 
 
 class Kick(Request, frozen=True, kw_only=True):
@@ -31,7 +31,7 @@ class Kick(Request, frozen=True, kw_only=True):
             ``katana450 access revoke`` alone.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True)
+    traits: ClassVar[RequestTraits] = ADMIN
 
     person: int
     seconds: Annotated[float, Meta(ge=0.0, le=MAX_TIME_OUT)] = 60.0
@@ -48,7 +48,7 @@ class Mute(Request, frozen=True, kw_only=True):
         seconds: Interval [s].
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True)
+    traits: ClassVar[RequestTraits] = ADMIN
 
     person: int
     seconds: Annotated[float, Meta(ge=1.0, le=60.0)] = 10.0
@@ -61,6 +61,6 @@ class Unmute(Request, frozen=True, kw_only=True):
         person: Number of the person in ``people``.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True)
+    traits: ClassVar[RequestTraits] = ADMIN
 
     person: int

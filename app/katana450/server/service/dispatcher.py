@@ -9,7 +9,9 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
 from katana450.arm.control.state import Verdict
+from katana450.errors import LeaseError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
@@ -69,7 +71,8 @@ class Dispatcher:
         """
         question, driver = request.traits.question, driver_key(self._hub, window)
         self._check_muted(window, request)
-        free = request.traits.free or (driver and not question)
+        admin = request.traits.admin and window.person.role is Role.ADMIN
+        free = request.traits.free or admin or (driver and not question)
         with nullcontext() if free else budget.charged(driver, question=question):
             return msgspec.structs.replace(self._execute(window, request), id=request.id)
 
@@ -83,6 +86,8 @@ class Dispatcher:
     def _execute(self, window: Window, request: requests.Request) -> answers.Answer:
         hub = self._hub
         hub.heartbeat(window)
+        if request.traits.admin and window.person.role is not Role.ADMIN:
+            raise LeaseError("Only an admin may do this.")
         match request:
             case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)
