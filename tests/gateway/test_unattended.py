@@ -108,6 +108,8 @@ def test_admin_forbids_unattended_programs(table: Staged) -> None:
     dispatcher, budget = Dispatcher(table.hub), Budgets(table.hub.clock).of("owner")
     with pytest.raises(LeaseError, match="Only an admin"):
         dispatcher.handle(owner, AllowUnattended(allowed=False), budget)
+    table.wait(2.0 * OWNER_SILENCE, admin)
+    assert table.status == "running"
     table.programs.handle(admin, AllowUnattended(allowed=False))
     table.wait(0.1, admin)
     assert table.status == "stopped"
