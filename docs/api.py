@@ -94,6 +94,9 @@ scene, and `arm.load_scene(data)` restores it.
 raises `RefusedError`, whose text has the reason and what to do. No call waits for ever: if the server
 does not answer, the call raises `LostError`.
 
+With the token of an admin, `arm.people()` lists everybody who is connected, and `arm.kick(person)`,
+`arm.mute(person)` and `arm.unmute(person)` act on them ([access](access.md#admins)).
+
 Questions cost processor time, of which each person has a [budget](access.md#limits). A question beyond
 the budget is refused with `retry`, the seconds until there is time again. Over HTTP the status is 429,
 with `Retry-After`.
@@ -144,6 +147,7 @@ def page() -> str:
             *(answers.Finding, answers.PartRefusal, answers.Margins, answers.Water),
             *(answers.Progress, answers.LogLine, answers.BranchOption, answers.SceneObject),
             *(answers.Value, answers.Node, answers.Field, answers.Link),
+            *(answers.ConnectedPerson, answers.PersonConnection),
         )
     ]
     return "\n".join(parts)

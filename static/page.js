@@ -6,7 +6,9 @@
   const QUIET = 1000; // ms without a message after which a connection counts as bad
   const ANSWER = 250; // ms without an answer after which a STOP is also sent over HTTP
   const TOAST = 4000; // ms
+  const KEPT_OUT = 403; // status of a sign-in of somebody whom an admin has disconnected
   const SIGN_IN = 4401; // close code: the page has to sign in again
+  const MUTED = 429; // status of a STOP that does not count
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
@@ -51,7 +53,7 @@
   // message may arrive after the stop was cleared.
   function stop() {
     press = randomName();
-    say({ do: "stop", press });
+    say({ do: "stop", press, id: press });
     Jog.quiet();
     stopButton.classList.add("asked");
     clearTimeout(asking);
@@ -60,10 +62,19 @@
 
   function insist() {
     fetch(`stop?press=${press}&page=${page}`, { method: "POST", keepalive: true }).then(
-      ({ ok }) => ok && stopped(),
+      async (answer) => {
+        if (answer.ok) stopped();
+        else if (answer.status === MUTED) notCounted(await answer.text());
+      },
       () => {},
     );
     asking = setTimeout(insist, 2 * ANSWER);
+  }
+
+  // A press of a muted person that does not count is not sent again.
+  function notCounted(why) {
+    stopped();
+    toast(why);
   }
 
   function stopped() {
@@ -84,7 +95,7 @@
     const ends = event.key === " " || event.key === "Escape";
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
-      if (byId("help").open && event.key === "Escape" && event.type === "keydown") byId("help").close();
+      if (event.key === "Escape" && event.type === "keydown") for (const id of ["help", "people"]) byId(id).close();
     } else if (typing(event.target) || !Jog.key(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
@@ -164,7 +175,8 @@
     const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
     // Programs are included.
-    const connected = windows > 1 ? `, ${windows} connected` : "";
+    const connected = windows > 1 && status.role !== "admin" ? `, ${windows} connected` : "";
+    People.draw(status);
     text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
     const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
     if (key !== drawnActs) {
@@ -237,10 +249,13 @@
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
+    else if (data.heard?.is === "people") People.heard(data.heard);
+    else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
       // The message has only the changes.
       status = { ...status, ...data.heard };
+      byId("gate").hidden = true;
       draw();
     }
     drawLink();
@@ -275,6 +290,7 @@
   });
   Jog.begin({ say, stop });
   Objects.begin({ say });
+  People.begin({ say });
 
   // The instruments, which are loaded on first use
 
@@ -313,7 +329,8 @@
     if (token) history.replaceState(null, "", location.pathname + location.search);
     const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
     byId("gate").hidden = answer.ok;
-    if (token && !answer.ok) byId("gate-why").textContent = await answer.text();
+    const because = token || answer.status === KEPT_OUT;
+    if (because && !answer.ok) byId("gate-why").textContent = await answer.text();
     return answer.ok;
   }
 

@@ -52,3 +52,11 @@ def test_lease_requests_and_heartbeats_cost_no_budget() -> None:
         *("Acquire", "Take", "Ask", "Withdraw", "Give", "Decline", "ReleaseLease"),
     }
     assert not any(kind.traits.question for kind in kinds)
+
+
+def test_requests_for_admins_alone() -> None:
+    kinds = [kind for kind in EVERY_REQUEST if kind.traits.admin]
+    assert {kind.__name__ for kind in kinds} == {
+        *("ListPeople", "Kick", "Mute", "Unmute"),
+        "AllowUnattended",
+    }

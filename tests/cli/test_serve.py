@@ -119,3 +119,73 @@ def test_the_command_prints_its_version_and_its_commands() -> None:
             check=True,
         )
         assert done.stdout.startswith(("katana450 ", "usage: katana450"))
+
+
+def limited(limit: str, *options: str) -> subprocess.CompletedProcess[str]:
+    """Start the server with a limit of the shell, as ``ulimit`` sets it."""
+    command = [sys.executable, "-m", "katana450", "serve", "--port", str(free_port()), *options]
+    return subprocess.run(
+        ["sh", "-c", f'ulimit {limit}; exec "$0" "$@"', *command],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have other limits")
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [("-n 20", "Only 20 files can be open at once"), ("-v 950000", "Only 927 MiB of memory")],
+)
+def test_too_low_limit_of_the_system_is_reported(limit: str, message: str) -> None:
+    done = limited(limit)
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert "ulimit" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
+def test_full_disk_for_the_output_does_not_stop_the_server() -> None:
+    port = free_port()
+    command = [sys.executable, "-m", "katana450", "serve", "--port", str(port)]
+    with Path("/dev/full").open("w") as full:
+        process = subprocess.Popen(
+            command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=ROOT
+        )
+    try:
+        due = time.monotonic() + 60.0
+        while True:
+            try:
+                with urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=10) as page:
+                    assert page.status == 200
+                break
+            except OSError:
+                assert process.poll() is None
+                assert time.monotonic() < due
+                time.sleep(0.1)
+    finally:
+        process.send_signal(signal.SIGINT)
+        errors = process.communicate(timeout=20)[1]
+    assert process.returncode == 0
+    assert "The output cannot be written: No space left on device." in errors
+    assert "Traceback" not in errors
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
+def test_full_disk_for_the_output_of_a_command_is_reported() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "katana450", "fk"],
+            input='{"q": [0, 0, 0, 0, 0]}\n',
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+            timeout=60,
+            check=False,
+        )
+    assert done.returncode == 1
+    assert done.stderr == "katana450: The output cannot be written: No space left on device.\n"

@@ -48,6 +48,17 @@ def mesh() -> Mesh:
     return read_mesh(ring(), "ring.stl")
 
 
+def test_directory_of_a_zip_is_counted_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A million entries fit in 60 MB, and reading them takes seconds."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for number in range(scene_file.MAX_ENTRIES + 1):
+            archive.writestr(f"{number:x}", "")
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(InputError, match="at most 64 files"):
+        read_scene_zip(packed.getvalue(), None)
+
+
 SOLID = Solid("ab12", (0.1, 0.2, 0.05), np.random.default_rng(3).normal(size=(20, 3)))
 
 

@@ -29,7 +29,8 @@ SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 def made(hub: Hub) -> ProgramRunner:
     """Make the runner as ``katana450 serve`` does."""
-    return ProgramRunner(hub, Namespace(owner_silence=OWNER_SILENCE))
+    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=False)
+    return ProgramRunner(hub, options)
 
 
 class Staged(Table):
@@ -187,3 +188,21 @@ def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> N
     table.wait(1.0, window)
     assert table.status == "ready"
     assert not program_runner.running
+
+
+def test_program_of_the_driver_supersedes_the_planning_of_another(table: Staged) -> None:
+    planner, driver = (table.join(page, Role.OPERATOR) for page in PAGES)
+    long = "steps:\n  - repeat: {times: 300, steps: [{arc: {centre: {x: 300, y: 0, z: 0}, axis: x"
+    long += ", angle: 3600}}]}\n"
+    table.programs.script(planner, long, more=False, speed=1.0)
+    with pytest.raises(LeaseError, match="being planned"):
+        table.plan(driver)
+    table.touch(driver.person.key)
+    with pytest.raises(LeaseError, match="being planned"):
+        table.programs.script(planner, SCRIPT, more=False, speed=1.0)
+    table.plan(driver)
+    progress = table.programs.progress()
+    assert progress is not None
+    assert (progress.status, progress.by) == ("ready", "Window 2")
+    (notice,) = table.notices_of[PAGES[0]]
+    assert "Window 2, who drives, has sent another program." in notice["why"]

@@ -22,6 +22,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.http11 import Request
 
 from katana450.arm.robot.object_meshes import Meshes
+from katana450.assembly.memory_limit import check_memory_limit
 from katana450.assembly.routes import application
 from katana450.errors import ConfigurationError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
@@ -88,6 +89,7 @@ class Gateway:
         """
         _check_tls(settings)
         raise_descriptor_limit()
+        check_memory_limit()
         self._listening = listening
         self._lines_socket = lines
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -101,7 +103,12 @@ class Gateway:
                     keep_alive(each)
             self.address = _address(settings, self._listening)
             self.hub = Hub(time.monotonic, settings.silence, meshes, runner)
-            authenticator = Authenticator(access, self.port, self.address)
+            people = self.hub.people
+            people.links = access
+            for number, grant in {} if access is None else access.grants.items():
+                if grant.muted is not None:
+                    people.mutes.add(number, grant.muted)
+            authenticator = Authenticator(access, self.port, self.address, people)
             guard = Guard(self.viser)
             self.gestures = Gestures(self.viser, guard, self.hub)
             proxy = Proxy(self.hub, authenticator, guard, self.viser.get_port(), key)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,13 +22,14 @@ from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub, actor_of
 from katana450.server.service.identity import Identity
+from katana450.server.service.mutes import MutedError
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web import control_socket, security, static_files
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission
 from katana450.server.web.authenticator import Address, Authenticator
-from katana450.server.web.bodies import body_of
+from katana450.server.web.bodies import TOO_MANY, body_of
 from katana450.server.web.control_socket import PAGE
 from katana450.server.web.http_api import Api, RouteProvider
 from katana450.server.web.token_bucket import TokenBucket
@@ -89,6 +91,7 @@ def application(
             raise HTTPException(400, "A token is required.") from error
         if not entry.token and authenticator.identity(request.cookies) is not None:
             return Response(status_code=204)
+        _check_admitted(authenticator, request, entry.token)
         response = Response(status_code=204)
         if not authenticator.sign_in(entry.token, response):
             # A valid link is accepted even while others guess.
@@ -100,7 +103,7 @@ def application(
 
     async def stop(request: Request) -> Response:
         """Stop the arm, like the button, for a page whose socket is closed."""
-        identity = _signed_in(authenticator, request)
+        identity = _signed_in(authenticator, request, stopping=True)
         press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
         actor = actor_of(identity, CommandChannel.PAGE)
         if PAGE.fullmatch(name := request.query_params.get("page", "")):
@@ -128,12 +131,29 @@ def application(
         WebSocketRoute("/control", control),
         *Api(hub, authenticator, budgets, provided).routes(),
     ]
-    admission = Admission(Starlette(routes=routes), authenticator, acceptor)
+    app = Starlette(routes=routes, exception_handlers={MutedError: _muted})
+    admission = Admission(app, hub, authenticator, acceptor)
     return security.SecurityMiddleware(admission, address)
 
 
-def _signed_in(authenticator: Authenticator, request: Request) -> Identity:
-    identity = authenticator.identity(request.cookies)
+async def _muted(_request: Request, error: Exception) -> Response:
+    """Answer a STOP that does not count, because its sender is muted."""
+    assert isinstance(error, MutedError)
+    retry = {"Retry-After": str(math.ceil(error.retry))}
+    return PlainTextResponse(str(error), TOO_MANY, retry)
+
+
+def _check_admitted(authenticator: Authenticator, request: Request, token: str) -> None:
+    """Raise HTTPException if an admin keeps out the bearer of ``token`` or of the cookie."""
+    why = authenticator.refusal(request.cookies, f"Bearer {token}" if token else "")
+    if why is not None:
+        raise HTTPException(403, why)
+
+
+def _signed_in(
+    authenticator: Authenticator, request: Request, *, stopping: bool = False
+) -> Identity:
+    identity = authenticator.identity(request.cookies, stopping=stopping)
     if identity is None:
         raise HTTPException(401, "Sign in at the start page first.")
     return identity

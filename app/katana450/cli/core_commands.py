@@ -6,6 +6,7 @@ from argparse import Namespace
 
 from katana450.cli.access_options import add_access_options
 from katana450.cli.lines_options import add_fk_options, add_ik_options
+from katana450.cli.people_options import add_people_options
 from katana450.cli.serve_options import add_serve_options
 from katana450.extension import CliCommand
 
@@ -43,6 +44,12 @@ def _access(options: Namespace) -> int:
     return access(options)
 
 
+def _people(options: Namespace) -> int:
+    from katana450.cli.people import people
+
+    return people(options)
+
+
 CORE_COMMANDS = (
     CliCommand("serve", "start the app and print its address", add_serve_options, _serve),
     CliCommand(
@@ -60,4 +67,5 @@ CORE_COMMANDS = (
         _ik,
     ),
     CliCommand("access", "give people links with which they sign in", add_access_options, _access),
+    CliCommand("people", "list who is connected, disconnect and mute", add_people_options, _people),
 )

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import sys
 from collections.abc import Sequence
 
 from katana450.cli.core_commands import CORE_COMMANDS
+from katana450.cli.output import drop_output
 from katana450.cli.version import version
 from katana450.errors import KatanaError
 from katana450.extension import CliCommand, extensions, missing_extension
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+"""Errors of a full or broken disk to which the output is written."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,6 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader has closed the pipe; write nothing more, not even at exit.
         sys.stderr.close()
         return 0
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            raise
+        drop_output(error)
+        return 1
     except KeyboardInterrupt:
         return 130
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from katana450.assembly.frontend_process import OPEN, READY, FrontendConfig, FrontendProcess
 from katana450.assembly.log_lines import start_log
+from katana450.cli.output import say
 from katana450.extension import serve_extensions
 from katana450.platform_support import stop_signals
 from katana450.resources import URDF_PATH
@@ -102,13 +103,13 @@ def serve(
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr)
         front.wait_for(OPEN)
-        print(f"Open {url} in a browser.", flush=True)
+        say(f"Open {url} in a browser.")
         arm.start()
         arm.attach(front.pipe)
         front.wait_for(READY)
         if lines is not None:
-            print(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.", flush=True)
-        print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
+            say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
+        say(f"katana450 is ready: {url} (Ctrl-C stops)")
         early_ends, started = 0, time.monotonic()
         # A signal that another thread receives does not wake this one from its wait.
         while arm.running and not stopping.wait(WAKE_INTERVAL):
@@ -159,7 +160,7 @@ def _with_scene(
         if scene is None and part.initial_scene is not None:
             scene = part.initial_scene(options, session)
     for note in () if scene is None else scene.notes:
-        print(f"katana450: {note}", flush=True)
+        say(f"katana450: {note}")
     return (found_robots[0] if found_robots else None), scene
 
 

@@ -166,6 +166,28 @@ class AsyncClient:
         await self.ask(requests.Load(scene=scene.key))
         return scene
 
+    async def people(self) -> tuple[answers.ConnectedPerson, ...]:
+        """Return everybody who is connected, muted or kept out. For admins only."""
+        answer = await self.ask(requests.ListPeople())
+        assert isinstance(answer, answers.People)
+        return answer.people
+
+    async def kick(self, person: int, seconds: float = 60.0, *, revoke: bool = False) -> None:
+        """Disconnect ``person``, the number in ``people``. For admins only.
+
+        ``seconds``: time [s] after which the person may come back; 0 lets the person in at once.
+        ``revoke``: whether to revoke the access link for good.
+        """
+        await self.ask(requests.Kick(person=person, seconds=seconds, revoke=revoke))
+
+    async def mute(self, person: int, seconds: float = 10.0) -> None:
+        """Let one STOP and one request of ``person`` count per ``seconds``. For admins only."""
+        await self.ask(requests.Mute(person=person, seconds=seconds))
+
+    async def unmute(self, person: int) -> None:
+        """End the mute of ``person``. For admins only."""
+        await self.ask(requests.Unmute(person=person))
+
     async def _send(self, request: requests.Request) -> None:
         if self._lost is not None:
             raise LostError(self._lost)

@@ -66,6 +66,22 @@ class Client:
         """See ``AsyncClient.load_scene``."""
         return self._wait(self._client.load_scene(data))
 
+    def people(self) -> tuple[answers.ConnectedPerson, ...]:
+        """See ``AsyncClient.people``."""
+        return self._wait(self._client.people())
+
+    def kick(self, person: int, seconds: float = 60.0, *, revoke: bool = False) -> None:
+        """See ``AsyncClient.kick``."""
+        self._wait(self._client.kick(person, seconds, revoke=revoke))
+
+    def mute(self, person: int, seconds: float = 10.0) -> None:
+        """See ``AsyncClient.mute``."""
+        self._wait(self._client.mute(person, seconds))
+
+    def unmute(self, person: int) -> None:
+        """See ``AsyncClient.unmute``."""
+        self._wait(self._client.unmute(person))
+
     def states(self, hz: float = FOLLOW_RATE) -> Iterator[answers.State]:
         """See ``AsyncClient.states``."""
         states = self._client.states(hz)

@@ -94,6 +94,11 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         "one is started",
     )
     parser.add_argument(
+        "--unattended",
+        action="store_true",
+        help="let the program run on when this command is ended or loses its connection",
+    )
+    parser.add_argument(
         "--token", default="", help="token of an access link, if the server needs one"
     )
     parser.add_argument(

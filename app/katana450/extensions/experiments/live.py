@@ -39,14 +39,25 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
     with _server(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             _send(arm, text, options.speed)
-            arm.ask(Steer(order=ProgramOrder.RUN))
+            arm.ask(Steer(order=ProgramOrder.RUN, unattended=options.unattended))
             return _follow(arm)
         except KeyboardInterrupt:
+            if options.unattended and _runs(arm):
+                print(
+                    "\nkatana450: the program runs on, unattended. STOP ends it.", file=sys.stderr
+                )
+                return 0
             # Refused if the script is not completely sent, because then no program exists.
             with suppress(RefusedError):
                 arm.ask(Steer(order=ProgramOrder.END))
             print("\nkatana450: the program has ended; the arm holds.", file=sys.stderr)
             return 130
+
+
+def _runs(arm: Client) -> bool:
+    """Return whether the program has begun and runs unattended."""
+    program = arm.query(answers.State).program
+    return program is not None and program.unattended
 
 
 def _send(arm: Client, text: str, speed: float) -> None:

@@ -34,6 +34,16 @@ MAX_ZIP_BYTES = 60_000_000
 MAX_FILES = 64
 """Maximum number of files in a .zip."""
 
+MAX_ENTRIES = 4096
+"""Maximum number of directory entries in the bytes of a .zip, those of packed .zip files included.
+`zipfile` reads them all at once, and a million takes seconds."""
+
+ENTRY = b"PK\x01\x02"
+"""Beginning of a directory entry."""
+
+SEARCHED_BYTES = 1_000_000
+"""Bytes that are searched at once: other threads wait meanwhile."""
+
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """Time stamp of all files, the earliest of the format: the same scene gives the same bytes."""
 
@@ -54,6 +64,8 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
     """
     if len(data) > MAX_ZIP_BYTES:
         raise InputError(f"A scene has at most {MAX_ZIP_BYTES // 1_000_000} MB.")
+    if _entries(data) > MAX_ENTRIES:
+        raise InputError(f"A scene has at most {MAX_FILES} files.")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = archive.namelist()
@@ -86,6 +98,12 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
         if isinstance(error, InputError):
             raise
         raise InputError(f"The .zip is corrupt: {error}.") from error
+
+
+def _entries(data: bytes) -> int:
+    """Return the number of directory entries in ``data``."""
+    starts = range(0, len(data), SEARCHED_BYTES)
+    return sum(data.count(ENTRY, start, start + SEARCHED_BYTES) for start in starts)
 
 
 def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene:

@@ -12,6 +12,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
@@ -29,6 +30,7 @@ from katana450.extensions.importers.surface import MeshReading, MeshSurface
 from katana450.extensions.importers.vrml_file import read_wrl
 from katana450.maths.collision.convex_body import ConvexBody
 from katana450.maths.geometry.arrays import FloatArray, IntArray, frozen
+from katana450.maths.planning.checkpoint import checkpoint
 
 MAX_FILE_BYTES = 20_000_000
 """[bytes] Maximum size of a file."""
@@ -46,6 +48,9 @@ LONGEST_NAME = 40
 
 SECONDS = 5.0
 """[s] Timeout of reading a file."""
+
+CHECK_EVERY = 0.1
+"""[s] Interval of the checks whether the reading was cancelled."""
 
 MAX_MEMORY_BYTES = 1 << 30
 """[bytes] Maximum memory for reading a file."""
@@ -162,7 +167,8 @@ def read_shape_guarded(
     """Return the result of `read_shape`, and its convex body, from a subprocess.
 
     The subprocess has `SECONDS` and, where the system supports it, `MAX_MEMORY_BYTES`. Raises
-    InputError as `read_shape`, at these limits, and after a crash.
+    InputError as `read_shape`, at these limits, and after a crash; and the error of a `checkpoint`,
+    which ends the subprocess.
     """
     file = label(name)
     _check(data, file, unit)
@@ -174,27 +180,26 @@ def read_shape_guarded(
     ]
     # One thread, because a pool for every core would take address space, which is limited.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
-            # The parent folder of the package.
-            cwd=Path(__file__).resolve().parents[3],
-            env=environment,
-            input=data,
-            capture_output=True,
-            timeout=SECONDS,
-            check=False,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise InputError(
-            f"{file} takes longer than {SECONDS:g} s to read. Try a simpler export."
-        ) from error
-    if done.returncode:
+    with subprocess.Popen(
+        [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
+        # The parent folder of the package.
+        cwd=Path(__file__).resolve().parents[3],
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        try:
+            output = _output(process, data, file)
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode:
         raise InputError(
             f"{file} cannot be read: it needs more than {SECONDS:g} s or {MAX_MEMORY_BYTES >> 20} "
             "MiB, or the file is corrupt. Try a simpler export."
         )
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
+    with np.load(io.BytesIO(output), allow_pickle=False) as found:
         if "error" in found:
             raise InputError(str(found["error"]))
         shape = ShapeFile(
@@ -212,6 +217,22 @@ def read_shape_guarded(
             float(found["volume"]),
         )
         return shape, body
+
+
+def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:
+    """Return the output of ``process`` for ``data``. Raises InputError after `SECONDS`."""
+    due, given = time.monotonic() + SECONDS, data
+    while True:
+        checkpoint()
+        try:
+            return process.communicate(given, CHECK_EVERY)[0]
+        except subprocess.TimeoutExpired as error:
+            # What is given once is sent to its end.
+            given = b""
+            if time.monotonic() > due:
+                raise InputError(
+                    f"{file} takes longer than {SECONDS:g} s to read. Try a simpler export."
+                ) from error
 
 
 def label(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
@@ -11,16 +12,17 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.errors import InputError, LeaseError
+from katana450.errors import CancelledError, InputError, LeaseError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import MAX_ZIP_BYTES, read_scene_zip
 from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene, zipped
 from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES
+from katana450.maths.planning.checkpoint import checked_by
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.web.admission import identity
+from katana450.server.web.admission import client_of, reserved
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import (
     NOT_NOW,
@@ -34,13 +36,20 @@ from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.token_bucket import TokenBucket
 
 RATE, UPLOAD_BURST = 0.5, 10.0
-"""Uploads per second, and maximum burst, of all clients together."""
+"""Uploads per second, and maximum burst, of one identity."""
 
-WAITING, WAITING_EACH = 4, 2
-"""Maximum number of uploads in progress or waiting: of all clients, and of one identity."""
+MAX_SENDERS = 256
+"""Maximum number of identities whose uploads are counted."""
+
+WAITING, WAITING_EACH, RESERVED = 4, 2, 1
+"""Maximum number of uploads in progress or waiting, of all clients and of one identity, and number
+reserved for the driver and for each admin."""
 
 UPLOAD_TIMEOUT = 60.0
 """[s] Timeout of receiving and reading a file."""
+
+MIN_RATE = 20_000.0
+"""Minimum mean rate of an upload [bytes/s], so that nobody keeps a place by dripping."""
 
 NOT_ALLOWED = 403
 """HTTP status of a refusal for lack of rights."""
@@ -61,7 +70,7 @@ class Uploads:
         self._hub = hub
         self._authenticator = authenticator
         self._identity = identity
-        self._often = TokenBucket(RATE, UPLOAD_BURST, hub.clock())
+        self._often: dict[str, TokenBucket] = {}
         self._reading = asyncio.Lock()
         self._places = ConnectionLimit(WAITING, WAITING_EACH)
 
@@ -82,8 +91,8 @@ class Uploads:
         async def keep() -> answers.Answer:
             if len(name) > 4 * LONGEST_NAME:
                 raise InputError("The name of the file is too long.")
-            data = await body_of(request, MAX_FILE_BYTES, UPLOAD_TIMEOUT)
-            mesh = await self._in_thread(lambda: read_mesh(data, name, unit or None))
+            data = await body_of(request, MAX_FILE_BYTES, UPLOAD_TIMEOUT, MIN_RATE)
+            mesh = await self._in_thread(request, lambda: read_mesh(data, name, unit or None))
             return keep_mesh(self._hub, mesh)
 
         return await self._answered(request, keep)
@@ -91,10 +100,10 @@ class Uploads:
     async def _load(self, request: Request) -> Response:
         async def keep() -> answers.Answer:
             arm = self._hub.present()
-            data = await body_of(request, MAX_ZIP_BYTES, UPLOAD_TIMEOUT)
+            data = await body_of(request, MAX_ZIP_BYTES, UPLOAD_TIMEOUT, MIN_RATE)
             hand = arm.environment.hand
             T_palm_tool = None if hand is None else hand.T_palm_tool
-            stored = await self._in_thread(lambda: read_scene_zip(data, T_palm_tool))
+            stored = await self._in_thread(request, lambda: read_scene_zip(data, T_palm_tool))
             return keep_scene(self._hub, data, stored, arm)
 
         return await self._answered(request, keep)
@@ -115,8 +124,11 @@ class Uploads:
         """Return the answer of ``keep`` as a response, if role and limits allow the upload."""
         if not self._identity(request).role.may_drive:
             raise HTTPException(NOT_ALLOWED, "Your role may watch, but not upload files.")
-        with self._places.taken(identity(self._authenticator, request) or "") as free:
-            if not free or not self._often.take(self._hub.clock()):
+        client = client_of(self._authenticator, request)
+        assert client is not None
+        places = reserved(self._hub, self._authenticator, client, RESERVED)
+        with self._places.taken(client.session, places) as free:
+            if not free or not self._is_due(client.session):
                 why = "Too many files at once. Wait a moment."
                 return as_json(answers.Refused(why=why), TOO_MANY)
             try:
@@ -127,13 +139,47 @@ class Uploads:
                 return as_json(answers.Refused(why=why), TOO_SLOW)
             except InputError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
-            except LeaseError as error:
+            except (LeaseError, CancelledError) as error:
                 return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
-    async def _in_thread(self, read: Callable[[], T]) -> T:
-        """Return the result of ``read``, run in a thread.
+    def _is_due(self, session: str) -> bool:
+        """Count an upload of ``session``; return whether the identity may upload again."""
+        t = self._hub.clock()
+        often = self._often.pop(session, None) or TokenBucket(RATE, UPLOAD_BURST, t)
+        self._often[session] = often
+        while len(self._often) > MAX_SENDERS:
+            del self._often[next(iter(self._often))]
+        return often.take(t)
+
+    async def _in_thread(self, request: Request, read: Callable[[], T]) -> T:
+        """Return the result of ``read``, run in a thread, or cancel it if the client leaves.
 
         One at a time: each may take a process and a gigabyte.
         """
+        cancelled = threading.Event()
+
+        def check() -> None:
+            if cancelled.is_set():
+                raise CancelledError("The upload was cancelled.")
+
+        def checked() -> T:
+            with checked_by(check):
+                return read()
+
         async with self._reading:
-            return await asyncio.to_thread(read)
+            reading = asyncio.create_task(asyncio.to_thread(checked))
+            gone = asyncio.create_task(_disconnected(request))
+            try:
+                await asyncio.wait((reading, gone), return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                cancelled.set()
+                gone.cancel()
+                # The next file is read after this thread has ended, at its next checkpoint.
+                await asyncio.wait((reading,))
+            return reading.result()
+
+
+async def _disconnected(request: Request) -> None:
+    """Wait until the client of ``request``, which is read to its end, has left."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import COMMAND, MAX_REQUEST_BYTES, Request, RequestTraits
+from katana450.server.api.fields import ADMIN, COMMAND, MAX_REQUEST_BYTES, Request, RequestTraits
 
 SLOWEST_SPEED = 0.01
 """Minimum fraction of its own speed at which a program can run."""
@@ -44,7 +44,9 @@ class Program(Request, frozen=True, kw_only=True):
 class Steer(Request, frozen=True, kw_only=True):
     """Run, step, pause, resume or end the planned program.
 
-    A program drives as a participant of its own; its owner must stay connected. During planning,
+    A program drives as a participant of its own. Its owner must stay connected unless ``run`` or
+    ``step`` begins it with ``unattended``; then it ends by itself, by STOP, by ``end`` of its owner
+    or an admin, or when an admin takes the lease or forbids unattended programs. During planning,
     ``run`` and ``step`` take effect afterwards, unless the arm is commanded to move, hold or stop
     in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program that is
     to run from another posture or scene than it was planned for is planned again first. An arm that
@@ -54,3 +56,15 @@ class Steer(Request, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
     order: ProgramOrder
+    unattended: bool = False
+
+
+class AllowUnattended(Request, frozen=True, kw_only=True):
+    """Allow or forbid programs that run without their owner. For admins only.
+
+    If forbidden, a running one ends unless its owner sends heartbeats.
+    """
+
+    traits: ClassVar[RequestTraits] = ADMIN
+
+    allowed: bool

@@ -9,6 +9,7 @@ import msgspec
 
 from katana450.server.api.fields import VERSION, Answer, Numbers
 from katana450.server.api.outcome_answers import Done, Finding, PartRefusal, Refused
+from katana450.server.api.people_answers import ConnectedPerson, People, PersonConnection
 from katana450.server.api.scene_answers import (
     Field,
     Link,
@@ -29,6 +30,7 @@ __all__ = [
     "Arm",
     "BranchOption",
     "Branches",
+    "ConnectedPerson",
     "Done",
     "Echo",
     "EventLog",
@@ -44,6 +46,8 @@ __all__ = [
     "Numbers",
     "Objects",
     "PartRefusal",
+    "People",
+    "PersonConnection",
     "Progress",
     "Refused",
     "Scene",
@@ -140,6 +144,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         fraction: Fraction of the task that is done, or of all planning.
         seconds: Duration of all motions at full speed [s].
         why: What is wrong with the program, or why it was planned again or not run.
+        unattended: Whether it runs without heartbeats of its owner.
+        began: Time at which the run began, in UTC, in ISO 8601; null before that.
     """
 
     name: str
@@ -152,6 +158,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     fraction: float = 0.0
     seconds: float = 0.0
     why: str = ""
+    unattended: bool = False
+    began: str | None = None
 
 
 class State(Answer, frozen=True, kw_only=True):
@@ -373,6 +381,7 @@ AnyAnswer = (
     | Links
     | Mesh
     | Scene
+    | People
 )
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)

@@ -98,6 +98,7 @@ class RequestTraits:
             process has taken it.
         for_program: Whether the request goes to the running program if the sender is its owner.
         safety: Whether the request is exempt from the rate limit.
+        admin: Whether the request is for admins only, whom it costs nothing of the budget.
     """
 
     free: bool = False
@@ -106,10 +107,14 @@ class RequestTraits:
     stream: bool = False
     for_program: bool = False
     safety: bool = False
+    admin: bool = False
 
 
 COMMAND = RequestTraits()
 """Traits of a request for one command of the arm. It costs the processor time that it takes."""
+
+ADMIN = RequestTraits(admin=True)
+"""Traits of a request for admins, which works whatever others ask for."""
 
 LEASE = RequestTraits(free=True)
 """Traits of a request about the lease."""

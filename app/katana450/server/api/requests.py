@@ -55,6 +55,7 @@ from katana450.server.api.motion_requests import (
     Servo,
     Turn,
 )
+from katana450.server.api.people_requests import Kick, ListPeople, Mute, Unmute
 from katana450.server.api.scene_requests import (
     Attach,
     FieldName,
@@ -94,7 +95,10 @@ __all__ = [
     "Jog",
     "Joint",
     "Joints",
+    "Kick",
+    "ListPeople",
     "Load",
+    "Mute",
     "Nudge",
     "Pause",
     "Place",
@@ -115,6 +119,7 @@ __all__ = [
     "Take",
     "Tool",
     "Turn",
+    "Unmute",
     "Watch",
     "Withdraw",
     "id_of",
@@ -326,6 +331,10 @@ AnyRequest = (
     | Get
     | Watch
     | Query
+    | ListPeople
+    | Kick
+    | Mute
+    | Unmute
 )
 
 

@@ -9,7 +9,9 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
 from katana450.arm.control.state import Verdict
+from katana450.errors import LeaseError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
@@ -17,9 +19,10 @@ from katana450.server.api import answers, requests
 from katana450.server.service import serialize
 from katana450.server.service.budget import Budget
 from katana450.server.service.derived import once
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub, Window, session_of
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.object_requests import ObjectRequests
+from katana450.server.service.people_requests import PeopleRequests
 
 COMMANDS: dict[type[requests.Request], cmd.Command] = {
     requests.EndDrag: cmd.EndDrag(),
@@ -55,6 +58,7 @@ class Dispatcher:
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
         self._objects = ObjectRequests(hub)
+        self._people = PeopleRequests(hub)
 
     def handle(self, window: Window, request: requests.Request, budget: Budget) -> answers.Answer:
         """Execute ``request`` and return its answer. Counts as a heartbeat of ``window``.
@@ -62,16 +66,28 @@ class Dispatcher:
         The outcome of a command may still be pending, see ``is_pending``.
 
         The processor time is charged to ``budget``; raises BusyError when that is used up. A
-        ``free`` request and a command of the driver cost nothing.
+        ``free`` request and a command of the driver cost nothing. Raises MutedError for a request
+        of a muted identity that does not count.
         """
         question, driver = request.traits.question, driver_key(self._hub, window)
-        free = request.traits.free or (driver and not question)
+        self._check_muted(window, request)
+        admin = request.traits.admin and window.person.role is Role.ADMIN
+        free = request.traits.free or admin or (driver and not question)
         with nullcontext() if free else budget.charged(driver, question=question):
             return msgspec.structs.replace(self._execute(window, request), id=request.id)
+
+    def _check_muted(self, window: Window, request: requests.Request) -> None:
+        """Raise MutedError if ``request`` does not count. ``Hub.stop`` counts the STOPs."""
+        session = session_of(window.person.key)
+        if isinstance(request, requests.Stop | requests.Heartbeat) or self._hub.drives(session):
+            return
+        self._hub.people.mutes.count_request(session)
 
     def _execute(self, window: Window, request: requests.Request) -> answers.Answer:
         hub = self._hub
         hub.heartbeat(window)
+        if request.traits.admin and window.person.role is not Role.ADMIN:
+            raise LeaseError("Only an admin may do this.")
         match request:
             case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)
@@ -83,6 +99,9 @@ class Dispatcher:
             case requests.Stop(press=press):
                 # Answered at once: later states confirm the stop.
                 return _done(hub.stop(window.actor, press), REQUESTED)
+        about_people = self._people.answer(window, request)
+        if about_people is not None:
+            return about_people
         if isinstance(request, hub.runner.request_types):
             return hub.runner.handle(window, request)
         command = self._command(request)

@@ -21,6 +21,7 @@ from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
+from katana450.server.service.people import People
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_state import Presses, StopRecord
@@ -84,6 +85,7 @@ class Hub:
         self._hold_after = hold_after
         self.gate = CommandGate(clock)
         self.event_log = EventLog()
+        self.people = People(clock)
         self.runner = Runner(self, Namespace()) if runner is None else runner(self)
         self.requests = RequestDecoder(self.runner.request_types)
         self.gate.on_stop = guarded(self.runner.stopped)
@@ -204,9 +206,27 @@ class Hub:
     def stop(self, actor: Actor, press: str | None = None) -> int:
         """Stop the arm for ``actor``, which needs no right to drive; return the ticket.
 
-        A repeated ``press`` counts once: it changes nothing, and the ticket is 0.
+        A repeated ``press`` counts once: it changes nothing, and the ticket is 0. Raises MutedError
+        for a muted identity whose STOP does not count. The driver's always counts.
         """
-        return self.gate.submit(cmd.Stop(), actor) if self._presses.is_new(press) else 0
+        if self._presses.is_known(press):
+            return 0
+        session = session_of(actor.key)
+        if not self.drives(session) and self.people.is_muted(session):
+            if self.stopped is not None:
+                # It changes nothing, and must not use up the next one.
+                return 0
+            self.people.count_stop(session)
+        self._presses.count(press)
+        return self.gate.submit(cmd.Stop(), actor)
+
+    def drives(self, session: str) -> bool:
+        """Return whether a window of ``session`` drives, or owns the program that drives."""
+        holder, program = self.lease.holder, self.gate.program
+        if holder is None:
+            return False
+        owner = program.owner if program is not None and program.person == holder else ""
+        return session in (session_of(holder.key), session_of(owner))
 
     def may_clear_stop(self, window: Window) -> bool:
         """Return whether ``window`` may clear a stop."""
@@ -353,3 +373,8 @@ def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
 def key_of(identity: Identity, page: str) -> str:
     """Return the key that the sockets of one page have in common."""
     return f"{identity.session}/{page}"
+
+
+def session_of(key: str) -> str:
+    """Return the session in the ``key`` of a window, or of an actor without a window."""
+    return key.rpartition("/")[0] or key

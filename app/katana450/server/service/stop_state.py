@@ -50,11 +50,11 @@ class Presses:
     def __init__(self) -> None:
         self._counted: deque[str] = deque(maxlen=REMEMBERED)
 
-    def is_new(self, press: str | None) -> bool:
-        """Count ``press``; return whether it is new. A press without a name is always new."""
-        if press is None:
-            return True
-        if press in self._counted:
-            return False
-        self._counted.append(press)
-        return True
+    def is_known(self, press: str | None) -> bool:
+        """Return whether ``press`` was counted. A press without a name is always new."""
+        return press is not None and press in self._counted
+
+    def count(self, press: str | None) -> None:
+        """Count ``press``."""
+        if press is not None:
+            self._counted.append(press)

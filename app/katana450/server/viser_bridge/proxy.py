@@ -14,11 +14,13 @@ from websockets.typing import Subprotocol
 
 from katana450.server.service.hub import Hub, key_of
 from katana450.server.service.identity import Identity
+from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.viser_bridge.flow import FlowControl
 from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import FilterResult, MessageFilter, Ruling
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
+from katana450.server.web.admission import address_of, reserved
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.control_socket import PAGE
@@ -37,8 +39,9 @@ FRAME_INTERVAL = 1.0 / 60.0
 RECHECK_INTERVAL = 0.1
 """Time [s] after which the backlog of a browser is checked again if it reports nothing."""
 
-MAX_BROWSERS, MAX_BROWSERS_EACH = 64, 16
-"""Maximum number of browsers with the scene at one time, in total and per identity."""
+MAX_BROWSERS, MAX_BROWSERS_EACH, RESERVED_BROWSERS = 64, 16, 2
+"""Maximum number of browsers with the scene at one time, in total and per identity, and number
+reserved for the driver and for each admin."""
 
 REFUSAL_INTERVAL = 0.5
 """Minimum time [s] between two shown refusals: a drag sends 20 messages a second."""
@@ -64,7 +67,8 @@ class Proxy:
         if identity is None or SUBPROTOCOL not in browser.scope["subprotocols"]:
             await browser.close(1008)
             return
-        with self._places.taken(identity.session) as free:
+        places = reserved(self._hub, self._authenticator, identity, RESERVED_BROWSERS)
+        with self._places.taken(identity.session, places) as free:
             if free:
                 await self._serve(browser, identity)
             else:
@@ -87,10 +91,13 @@ class Proxy:
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
-                if not await self._authenticator.run_while_authorised(
-                    lambda: self._authenticator.identity(browser.cookies), line.run(upstream)
-                ):
-                    await browser.close(SIGN_IN_CLOSE_CODE, "Your link is invalid or has expired.")
+                why = await self._authenticator.run_while_authorised(
+                    lambda: self._authenticator.identity(browser.cookies),
+                    line.run(upstream),
+                    Connection(identity, ConnectionKind.SCENE, address_of(browser), key=key),
+                )
+                if why is not None:
+                    await browser.close(SIGN_IN_CLOSE_CODE, why)
         except OSError as error:
             log.warning("viser does not answer: %s", str(error) or type(error).__name__)
             # A browser that has left needs no close frame.

@@ -7,6 +7,7 @@ and an expiry. The grant of the number is in the file, so deleting it there ends
 from __future__ import annotations
 
 import logging
+import math
 import secrets
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,17 +22,27 @@ from katana450.platform_support import readable_by_others
 
 log = logging.getLogger(__name__)
 
-SALT = "katana450 access link"
+SALT, SESSION_SALT = "katana450 access link", "katana450 session of a browser"
+"""Purposes of the signatures: a cookie is no link, and a link is no cookie."""
+
 MAX_NAME_LENGTH = 40
 MAX_TOKEN_LENGTH = 400
 
 
-class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Rights of one link. ``expires``: seconds since the epoch."""
+class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Rights of one link.
+
+    Attributes:
+        name: Name of the person.
+        role: Role of the person.
+        expires: End of the validity [s since the epoch].
+        muted: Interval [s] in which one STOP counts; None unless an admin has muted the person.
+    """
 
     name: str
     role: Role
     expires: float
+    muted: float | None = None
 
 
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -84,6 +95,13 @@ class AccessFile:
         self._write(_Content(self._content.secret, grants))
         return str(self._signer().dumps([number, expires]))
 
+    def session(self, number: str) -> str:
+        """Return the cookie of a browser that signs in with the link of ``number``.
+
+        It is valid as long as the link, and is no link itself: it cannot be passed on as one.
+        """
+        return str(self._signer(SESSION_SALT).dumps([number, secrets.token_hex(8)]))
+
     def revoke(self, number: str) -> Grant:
         """Delete the link of ``number``; return its grant. Raises InputError if there is none."""
         grants = self.grants
@@ -92,6 +110,17 @@ class AccessFile:
         grant = grants.pop(number)
         self._write(_Content(self._content.secret, grants))
         return grant
+
+    def mute(self, number: str, interval: float | None) -> None:
+        """Store the mute of the link of ``number``; see ``Grant``. Raises InputError if unknown.
+
+        So it lasts when the server is started again, and each process that admits STOP knows it.
+        """
+        grants = self.grants
+        if number not in grants:
+            raise InputError(f"There is no link {number!r}.")
+        grants[number] = msgspec.structs.replace(grants[number], muted=interval)
+        self._write(_Content(self._content.secret, grants))
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
         """Return number and grant of a token valid at ``now`` [s since the epoch], or None."""
@@ -104,13 +133,30 @@ class AccessFile:
             number, expires = msgspec.convert(payload, tuple[str, float])
         except (BadSignature, msgspec.ValidationError):
             return None
+        return self._granted(number, now, expires)
+
+    def check_session(self, cookie: str, now: float) -> tuple[str, Grant] | None:
+        """Return number and grant of the link of a ``cookie``, as ``check`` does of a token."""
+        if len(cookie) > MAX_TOKEN_LENGTH:
+            return None
+        self._refresh_or_keep()
+        try:
+            payload = self._signer(SESSION_SALT).loads(cookie)
+            number, _ = msgspec.convert(payload, tuple[str, str])
+        except (BadSignature, msgspec.ValidationError):
+            return None
+        return self._granted(number, now)
+
+    def _granted(
+        self, number: str, now: float, expires: float = math.inf
+    ) -> tuple[str, Grant] | None:
         grant = self._content.grants.get(number)
         if grant is None or not now < min(expires, grant.expires):
             return None
         return number, grant
 
-    def _signer(self) -> URLSafeSerializer:
-        return URLSafeSerializer(self._content.secret, salt=SALT)
+    def _signer(self, salt: str = SALT) -> URLSafeSerializer:
+        return URLSafeSerializer(self._content.secret, salt=salt)
 
     def _refresh_or_keep(self) -> None:
         """Read the file again. If that fails, log it once; the last links read stay valid."""

@@ -11,16 +11,21 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.lease import Role
 from katana450.server.api.fields import ROOT
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
 
-SOCKETS, SOCKETS_EACH = 256, 32
-"""Maximum of open websockets, in total and of one identity. A page has two, a program one."""
+SOCKETS, SOCKETS_EACH, RESERVED_SOCKETS = 256, 32, 6
+"""Maximum of open websockets, in total and of one identity, and number reserved for the driver and
+for each admin. A page has two, a program one."""
 
-REQUESTS, REQUESTS_EACH = 128, 16
-"""Maximum of concurrent HTTP requests, in total and of one identity."""
+REQUESTS, REQUESTS_EACH, RESERVED_REQUESTS = 128, 16, 8
+"""Maximum of concurrent HTTP requests, in total and of one identity, and number reserved for the
+driver and for each admin."""
 
 STOP_PATHS = ("/stop", f"{ROOT}/stop")
 """Paths that are always answered. They read no body, so they end at once."""
@@ -33,17 +38,32 @@ LIMIT_CLOSE_CODE = 4429
 RETRY = {"Retry-After": "1"}
 
 
-def identity(authenticator: Authenticator, connection: HTTPConnection) -> str | None:
-    """Return the link, cookie or address to whose limits ``connection`` counts.
+def client_of(authenticator: Authenticator, connection: HTTPConnection) -> Identity | None:
+    """Return the identity to whose limits ``connection`` counts: a link, a cookie or an address.
 
     Return None for an unknown client where the server requires a link.
     """
     found = authenticator.identity(connection.cookies)
-    if found is None and authenticator.requires_link:
-        found = authenticator.program("", connection.headers.get("authorization", ""))
     if found is not None:
-        return found.session
-    return None if authenticator.requires_link else address_of(connection)
+        return found
+    if authenticator.requires_link:
+        return authenticator.program("", connection.headers.get("authorization", ""))
+    return Identity(address_of(connection), None, Role.ADMIN)
+
+
+def identity(authenticator: Authenticator, connection: HTTPConnection) -> str | None:
+    """Return the session of ``client_of``."""
+    found = client_of(authenticator, connection)
+    return None if found is None else found.session
+
+
+def reserved(hub: Hub, authenticator: Authenticator, client: Identity, places: int) -> int:
+    """Return ``places`` for the driver and for an admin with a link, else 0.
+
+    Without links everybody is an admin, so only the driver has places reserved.
+    """
+    admin = authenticator.requires_link and client.role is Role.ADMIN
+    return places if admin or hub.drives(client.session) else 0
 
 
 def address_of(connection: HTTPConnection) -> str:
@@ -64,8 +84,11 @@ async def refuse(socket: WebSocket, why: str) -> None:
 class Admission:
     """Middleware that limits concurrent requests and websockets."""
 
-    def __init__(self, app: ASGIApp, authenticator: Authenticator, acceptor: Acceptor) -> None:
+    def __init__(
+        self, app: ASGIApp, hub: Hub, authenticator: Authenticator, acceptor: Acceptor
+    ) -> None:
         self._app = app
+        self._hub = hub
         self._authenticator = authenticator
         self._acceptor = acceptor
         self._requests = ConnectionLimit(REQUESTS, REQUESTS_EACH)
@@ -74,18 +97,24 @@ class Admission:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on, or refuse it if a limit is reached."""
         connection = HTTPConnection(scope)
-        who = identity(self._authenticator, connection)
+        who = client_of(self._authenticator, connection)
         socket = scope["type"] == "websocket"
         if who is None or (not socket and scope["path"] in STOP_PATHS):
             await self._app(scope, receive, send)
             return
         peer = connection.client
         client = None if peer is None else (peer.host, peer.port)
-        with (self._sockets if socket else self._requests).taken(who) as free:
+        limit, places = self._requests, RESERVED_REQUESTS
+        if socket:
+            limit, places = self._sockets, RESERVED_SOCKETS
+        places = reserved(self._hub, self._authenticator, who, places)
+        with limit.taken(who.session, places) as free:
             if free:
                 with self._acceptor.kept(client):
                     await self._app(scope, receive, send)
-            elif socket:
+                return
+            self._hub.people.refused(who.session)
+            if socket:
                 why = "You have too many open connections. Close some windows or programs."
                 await refuse(WebSocket(scope, receive, send), why)
             else:

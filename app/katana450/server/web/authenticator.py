@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import secrets
 import time
 from collections.abc import Callable, Coroutine, Mapping
@@ -17,7 +18,8 @@ from starlette.responses import Response
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
-from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile
+from katana450.server.service.people import Connection, People
+from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile, Grant
 
 SESSION_SIZE = 22
 """Length of a session's name in characters: 16 random bytes."""
@@ -27,6 +29,12 @@ CHECK_EVERY = 1.0
 
 SIGN_IN_CLOSE_CODE = 4401
 """Close code for a client that must sign in (again) at the start page."""
+
+EXPIRED = "Your link has expired or was revoked."
+KICKED = "An admin has disconnected you."
+"""Reasons for which a connection is closed."""
+
+TOKEN_REQUIRED = "A token is required. `katana450 access give` makes one."
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
@@ -90,9 +98,19 @@ def public_origin(url: str) -> str:
 class Authenticator:
     """Identifies clients by their cookies and tokens."""
 
-    def __init__(self, access: AccessFile | None, port: int, address: Address) -> None:
-        """Check clients against ``access``; None makes every client an admin."""
+    def __init__(
+        self,
+        access: AccessFile | None,
+        port: int,
+        address: Address,
+        people: People | None = None,
+    ) -> None:
+        """Check clients against ``access``; None makes every client an admin.
+
+        ``people``: everybody who is connected or kept out.
+        """
         self._access = access
+        self._people = People(time.monotonic) if people is None else people
         self._secure = address.cookies_are_secure
         # Browsers send cookies to all ports of a host.
         self._cookie = f"katana450-{port}"
@@ -102,23 +120,48 @@ class Authenticator:
         """True if the server requires an access link."""
         return self._access is not None
 
-    def identity(self, cookies: Mapping[str, str]) -> Identity | None:
-        """Return the identity of the sender of ``cookies``; None if it is not authorised."""
+    def identity(self, cookies: Mapping[str, str], *, stopping: bool = False) -> Identity | None:
+        """Return the identity of the sender of ``cookies``; None if it is not authorised.
+
+        ``stopping``: whether the request is a STOP, which an identity may send that is kept out.
+        """
         value = cookies.get(self._cookie, "")
         if self._access is not None:
-            known = self._access.check(value, time.time())
-            return None if known is None else Identity(known[0], known[1].name, known[1].role)
-        if len(value) != SESSION_SIZE:
+            known = self._access.check_session(value, time.time())
+            found = None if known is None else _of_link(*known)
+        else:
+            found = Identity(value, None, Role.ADMIN) if len(value) == SESSION_SIZE else None
+        return self._admitted(found, stopping=stopping)
+
+    def refusal(self, cookies: Mapping[str, str], authorization: str = "") -> str | None:
+        """Return why an admin keeps out the sender of these headers; None if no admin does."""
+        found = self.program("", authorization, cookies, stopping=True)
+        if self._access is None:
+            found = self.identity(cookies, stopping=True)
+        seconds = 0.0 if found is None else self._people.kept_out(found.session)
+        if not seconds:
             return None
-        return Identity(value, None, Role.ADMIN)
+        again = f" Come back in {math.ceil(seconds)} s." if seconds < math.inf else ""
+        return f"{KICKED}{again} Your STOP still works."
+
+    def _admitted(self, found: Identity | None, *, stopping: bool) -> Identity | None:
+        """Return ``found``, or None if it is kept out and not ``stopping`` the arm."""
+        if found is None or stopping or not self._people.kept_out(found.session):
+            return found
+        return None
 
     def program(
-        self, name: str, authorization: str = "", cookies: Mapping[str, str] | None = None
+        self,
+        name: str,
+        authorization: str = "",
+        cookies: Mapping[str, str] | None = None,
+        *,
+        stopping: bool = False,
     ) -> Identity | None:
         """Return the identity of the program that sends this Authorization header or ``cookies``.
 
         ``name``: the program's own name; it follows the name of the link where one is required.
-        Return None if the program is not authorised.
+        ``stopping``: see ``identity``. Return None if the program is not authorised.
         """
         name = name if name.isprintable() and 0 < len(name) <= MAX_NAME_LENGTH else "Program"
         if self._access is None:
@@ -126,26 +169,41 @@ class Authenticator:
         scheme, _, token = authorization.partition(" ")
         if scheme.lower() == "bearer":
             known = self._access.check(token.strip(), time.time())
-            found = None if known is None else Identity(known[0], known[1].name, known[1].role)
+            found = None if known is None else _of_link(*known)
+            found = self._admitted(found, stopping=stopping)
         else:
-            found = self.identity(cookies or {})
+            found = self.identity(cookies or {}, stopping=stopping)
         return None if found is None else replace(found, name=f"{found.name}, {name}")
 
     async def run_while_authorised(
-        self, identity: Callable[[], Identity | None], work: Coroutine[Any, Any, None]
-    ) -> bool:
-        """Run ``work`` as long as ``identity`` returns one; return whether it ended by itself."""
+        self,
+        identity: Callable[[], Identity | None],
+        work: Coroutine[Any, Any, None],
+        connection: Connection,
+    ) -> str | None:
+        """Run ``work`` as long as ``identity`` returns one and nobody is kicked.
+
+        ``connection`` is listed meanwhile. Returns the reason for an end from outside; None if
+        ``work`` ended by itself.
+        """
         task = asyncio.create_task(work)
+        kicked = asyncio.create_task(connection.kicked.wait())
         try:
-            while True:
-                done, _ = await asyncio.wait([task], timeout=CHECK_EVERY)
-                if done:
-                    await task
-                    return True
-                if identity() is None:
-                    return False
+            with self._people.connected(connection):
+                while True:
+                    done, _ = await asyncio.wait(
+                        [task, kicked], timeout=CHECK_EVERY, return_when=asyncio.FIRST_COMPLETED
+                    )
+                    if task in done:
+                        await task
+                        return None
+                    if kicked in done:
+                        return KICKED
+                    if identity() is None:
+                        return EXPIRED
         finally:
-            task.cancel()
+            for each in (task, kicked):
+                each.cancel()
             with suppress(asyncio.CancelledError):
                 await task
 
@@ -153,13 +211,18 @@ class Authenticator:
         """Set the cookie of the bearer of ``token``; return whether the token is accepted."""
         max_age = None
         if self._access is None:
-            token = secrets.token_urlsafe(16)
+            value = secrets.token_urlsafe(16)
         else:
             known = self._access.check(token, time.time())
             if known is None:
                 return False
             max_age = int(known[1].expires - time.time())
+            value = self._access.session(known[0])
         response.set_cookie(
-            self._cookie, token, max_age, secure=self._secure, httponly=True, samesite="strict"
+            self._cookie, value, max_age, secure=self._secure, httponly=True, samesite="strict"
         )
         return True
+
+
+def _of_link(number: str, grant: Grant) -> Identity:
+    return Identity(number, grant.name, grant.role, grant.name, grant.muted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -17,20 +18,27 @@ BODY_SECONDS = 5.0
 """Timeout for receiving a small body [s]."""
 
 
-async def body_of(request: Request, largest: int, seconds: float = BODY_SECONDS) -> bytes:
+async def body_of(
+    request: Request, largest: int, seconds: float = BODY_SECONDS, rate: float = math.inf
+) -> bytes:
     """Return the body of ``request``.
 
-    Raises HTTPException for more than ``largest`` bytes, or after ``seconds``.
+    Raises HTTPException for more than ``largest`` bytes, and after ``seconds``, or after
+    ``BODY_SECONDS`` if less than ``rate`` [bytes/s] arrives in the mean of the time beyond.
     """
-    body = bytearray()
+    body, began = bytearray(), asyncio.get_running_loop().time()
+    slow = min(began + BODY_SECONDS, began + seconds)
     try:
-        async with asyncio.timeout(seconds):
+        async with asyncio.timeout_at(slow) as limit:
             async for chunk in request.stream():
                 body += chunk
                 if len(body) > largest:
                     raise HTTPException(TOO_LONG, f"The body is larger than {largest} bytes.")
+                limit.reschedule(min(slow + len(body) / rate, began + seconds))
     except TimeoutError as error:
         why = f"The request was not received within {seconds:g} s."
+        if rate < math.inf:
+            why = f"A file must be received within {seconds:g} s, and at {rate:g} bytes/s at least."
         raise HTTPException(TOO_SLOW, why, {"Connection": "close"}) from error
     return bytes(body)
 

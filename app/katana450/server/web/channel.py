@@ -21,7 +21,8 @@ from katana450.server.api.fields import Id
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import Arrival
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub, Window, session_of
+from katana450.server.service.mutes import MutedError
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.token_bucket import TokenBucket
 
@@ -103,6 +104,7 @@ class Channel(ABC):
         """
         self.hub = hub
         self.budget = budget
+        self.window: Window | None = None
         self._dispatcher = Dispatcher(hub)
         self._line = line
         self._often = often
@@ -176,6 +178,8 @@ class Channel(ABC):
                     await self._disconnect(LIMIT_CLOSE_CODE, str(error))
                     return
                 self.refuse(str(error), request.id, retry=error.retry)
+            except MutedError as error:
+                self.refuse(str(error), request.id, retry=error.retry)
             except (LeaseError, InputError) as error:
                 self.refuse(str(error), request.id)
 
@@ -186,6 +190,8 @@ class Channel(ABC):
 
     def refuse(self, why: str, request_id: Id, **more: float) -> None:
         """Send a refusal of the request of ``request_id``. ``more``: fields of ``Refused``."""
+        if self.window is not None:
+            self.hub.people.refused(session_of(self.window.person.key))
         self.notify({"is": "refused", "why": why, "id": request_id, **more})
 
     def wake(self) -> None:

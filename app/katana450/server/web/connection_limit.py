@@ -1,4 +1,4 @@
-"""Limit on concurrent connections, in total and per identity."""
+"""Limit on concurrent connections, in total and per identity, with places reserved."""
 
 from __future__ import annotations
 
@@ -17,9 +17,13 @@ class ConnectionLimit:
         self._taken: Counter[str] = Counter()
 
     @contextmanager
-    def taken(self, identity: str) -> Iterator[bool]:
-        """Take a place inside the ``with`` block; yield False if there is none left."""
-        free = self._taken.total() < self._maximum and self._taken[identity] < self._each
+    def taken(self, identity: str, reserved: int = 0) -> Iterator[bool]:
+        """Take a place inside the ``with`` block; yield False if there is none left.
+
+        ``reserved``: number of places that ``identity`` has even if all others are taken.
+        """
+        own = self._taken[identity]
+        free = own < reserved or (own < self._each and self._taken.total() < self._maximum)
         if not free:
             yield False
             return

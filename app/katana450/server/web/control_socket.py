@@ -14,6 +14,8 @@ from katana450.server.api import requests
 from katana450.server.service import status
 from katana450.server.service.budget import Budget, Budgets
 from katana450.server.service.hub import Hub, Window
+from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
 from katana450.server.web.token_bucket import TokenBucket
@@ -46,7 +48,6 @@ class ControlSocket(Channel):
         )
         self._sent: dict[str, Any] = {}
         self._checked_at = float("-inf")
-        self.window: Window | None = None
 
     def answer(self, window: Window, request: requests.Request) -> None:
         """Execute ``request``, send its answer, and confirm the receipt of a stop."""
@@ -83,10 +84,14 @@ async def serve(
     line = WebSocketJsonChannel(socket)
     control = ControlSocket(hub, line, budgets.of(identity.session))
     control.window = window = hub.join(identity, page, control.notify, line.arrival)
+    connection = Connection(
+        identity, ConnectionKind.PAGE, address_of(socket), key=window.person.key
+    )
     try:
-        if not await authenticator.run_while_authorised(
-            lambda: authenticator.identity(socket.cookies), control.run(window)
-        ):
-            await line.close(SIGN_IN_CLOSE_CODE, "Your link has expired or was revoked.")
+        why = await authenticator.run_while_authorised(
+            lambda: authenticator.identity(socket.cookies), control.run(window), connection
+        )
+        if why is not None:
+            await line.close(SIGN_IN_CLOSE_CODE, why)
     finally:
         hub.leave(window)

@@ -24,9 +24,11 @@ from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, 
 from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub, Window, actor_of
 from katana450.server.service.identity import Identity
+from katana450.server.service.mutes import MutedError
+from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
-from katana450.server.web.authenticator import Authenticator
+from katana450.server.web.authenticator import TOKEN_REQUIRED, Authenticator
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
 
 log = logging.getLogger(__name__)
@@ -65,6 +67,14 @@ RouteProvider = Callable[[RouteContext], list[BaseRoute]]
 """Function that returns the routes of an extension."""
 
 
+class _Posting(NamedTuple):
+    """A program that sends requests by POST; ``timer`` closes its window."""
+
+    window: Window
+    connection: Connection
+    timer: asyncio.TimerHandle
+
+
 class Api:
     """The HTTP routes of the API."""
 
@@ -82,7 +92,7 @@ class Api:
         self._dispatcher = Dispatcher(hub)
         context = RouteContext(hub, authenticator, self._identity)
         self._provided = [route for provider in provided for route in provider(context)]
-        self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
+        self._posting: dict[str, _Posting] = {}
 
     def routes(self) -> list[BaseRoute]:
         """Return all routes of the API and of the extensions."""
@@ -112,19 +122,23 @@ class Api:
                 driver = driver_key(self._hub, window)
                 self._hub.heartbeat(window)
             try:
+                if not driver:
+                    self._hub.people.mutes.count_request(identity.session)
                 with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
                     return as_json(self._dispatcher.query(at))
+            except (BusyError, MutedError) as error:
+                self._refused(request)
+                return await _too_much(error)
             except LeaseError as error:
                 raise HTTPException(RETRY_STATUS, str(error)) from error
-            except BusyError as error:
-                return await _too_much(error)
             except InputError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
         return read
 
     async def _stop(self, request: Request) -> Response:
-        self._hub.stop(actor_of(self._identity(request), CommandChannel.API))
+        found = self._identity(request, stopping=True)
+        self._hub.stop(actor_of(found, CommandChannel.API))
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:
@@ -145,25 +159,36 @@ class Api:
             if self._dispatcher.is_pending(answer):
                 answer = await self._dispatcher.concluded(answer)
             return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
-        except BusyError as error:
+        except (BusyError, MutedError) as error:
+            self._refused(request)
             return await _too_much(error, requests.id_of(body))
         except InputError as error:
+            self._refused(request)
             refused = answers.Refused(why=str(error), id=requests.id_of(body))
             return as_json(refused, NOT_UNDERSTOOD)
         except LeaseError as error:
+            self._refused(request)
             return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
+
+    def _refused(self, request: Request) -> None:
+        """Count a refused request of the sender."""
+        self._hub.people.refused(identity(self._authenticator, request) or address_of(request))
 
     def _budget(self, request: Request) -> Budget:
         return self._budgets.of(identity(self._authenticator, request) or address_of(request))
 
-    def _identity(self, request: Request) -> Identity:
+    def _identity(self, request: Request, *, stopping: bool = False) -> Identity:
         headers = request.headers
-        identity = self._authenticator.program(
-            headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
+        found = self._authenticator.program(
+            headers.get(NAME, ""),
+            headers.get("authorization", ""),
+            request.cookies,
+            stopping=stopping,
         )
-        if identity is None:
-            raise HTTPException(401, "A token is required. `katana450 access give` makes one.")
-        return identity
+        if found is None:
+            why = self._authenticator.refusal(request.cookies, headers.get("authorization", ""))
+            raise HTTPException(401, TOKEN_REQUIRED) if why is None else HTTPException(403, why)
+        return found
 
     def _window(self, request: Request, identity: Identity) -> Window:
         """Return the window of the program; it closes after ``LEASE_TIMEOUT`` without a request."""
@@ -176,11 +201,14 @@ class Api:
                 identity, page, lambda _notice: None, channel=CommandChannel.API
             )
             assert window.person.key == key
+            kind, address = ConnectionKind.POSTS, address_of(request)
+            connection = Connection(identity, kind, address, key=key)
+            self._hub.people.add(connection)
         else:
-            window, timer = known
+            window, connection, timer = known
             timer.cancel()
         timer = asyncio.get_running_loop().call_later(LEASE_TIMEOUT, self._forget, key)
-        self._posting[key] = (window, timer)
+        self._posting[key] = _Posting(window, connection, timer)
         return window
 
     def _key(self, request: Request, identity: Identity) -> str:
@@ -189,11 +217,12 @@ class Api:
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:
-        window, _ = self._posting.pop(key)
+        window, connection, _ = self._posting.pop(key)
+        self._hub.people.remove(connection)
         self._hub.leave(window, for_good=True)
 
 
-async def _too_much(error: BusyError, id: Id = None) -> Response:
+async def _too_much(error: BusyError | MutedError, id: Id = None) -> Response:
     # The delay slows down immediate repetitions. STOP has a route of its own.
     await asyncio.sleep(min(error.retry, MAX_PAUSE))
     answer = as_json(answers.Refused(why=str(error), id=id, retry=error.retry), TOO_MANY)

@@ -9,7 +9,7 @@ import secrets
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, nullcontext, suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 from starlette.websockets import WebSocket
@@ -25,9 +25,10 @@ from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub, Window
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.admission import address_of, identity, refuse
-from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
+from katana450.server.web.admission import address_of, identity, refuse, reserved
+from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED, Authenticator
 from katana450.server.web.channel import (
     BAD_REQUEST_CLOSE_CODE,
     Channel,
@@ -55,8 +56,9 @@ HELLO_SECONDS = 5.0
 MAX_UNSENT_BYTES = 4096
 """Maximum of bytes that wait to be sent: one or two states, so that a slow client gets new ones."""
 
-LINES, LINES_EACH = 16, 8
-"""Maximum of TCP connections, of all together and of one identity."""
+LINES, LINES_EACH, RESERVED_LINES = 16, 8, 2
+"""Maximum of TCP connections, of all together and of one identity, and number reserved for the
+driver and for each admin."""
 
 BUDGET_EXHAUSTED = "Your programs together send too many requests. Wait, and send fewer requests."
 
@@ -71,7 +73,6 @@ class ProgramChannel(Channel):
             TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, t),
         )
         super().__init__(hub, line, budget, often=often, bad=bad)
-        self._window: Window | None = None
         self._complained = -math.inf
         self._period: float | None = None
         self._due = 0.0
@@ -97,7 +98,7 @@ class ProgramChannel(Channel):
         if t < self._due:
             return None, self._due - t
         self._due = max(self._due + self._period, t)
-        driver = "" if self._window is None else driver_key(self.hub, self._window)
+        driver = "" if self.window is None else driver_key(self.hub, self.window)
         try:
             with self.budget.charged(driver):
                 return self._state(self.hub.arm), self._due - t
@@ -120,7 +121,7 @@ class ProgramChannel(Channel):
 
     def greet(self, window: Window) -> None:
         """Send the name, number and role of the program."""
-        self._window, person = window, window.person
+        self.window, person = window, window.person
         self.notify(
             answers.Welcome(
                 name=person.name,
@@ -145,7 +146,11 @@ async def serve_socket(
         await refuse(socket, BUDGET_EXHAUSTED)
         return
     await socket.accept()
-    await _serve(hub, authenticator, budget, WebSocketJsonChannel(socket), current_identity)
+    line, kind = WebSocketJsonChannel(socket), ConnectionKind.PROGRAM
+    token = socket.headers.get("authorization", "")
+    why = authenticator.refusal(socket.cookies, token) or TOKEN_REQUIRED
+    client = _Client(current_identity, kind, address_of(socket), why)
+    await _serve(hub, authenticator, budget, line, client)
 
 
 class LineServer:
@@ -207,14 +212,19 @@ class LineServer:
             return self._authenticator.program(hello.name, f"Bearer {hello.token}")
 
         found = current_identity()
-        session = "" if found is None else found.session
+        session, places = "", 0
+        if found is not None:
+            session = found.session
+            places = reserved(self._hub, self._authenticator, found, RESERVED_LINES)
         # Without links all programs of this machine share one budget, but not their places.
         budget = self._budgets.of(session if self._authenticator.requires_link else client[0])
         acceptor = self._acceptor
         kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
-        with self._places.taken(session) as free, kept:
+        with self._places.taken(session, places) as free, kept:
             if free:
-                await _serve(self._hub, self._authenticator, budget, line, current_identity)
+                why = self._authenticator.refusal({}, f"Bearer {hello.token}") or TOKEN_REQUIRED
+                program = _Client(current_identity, ConnectionKind.LINES, client[0], why)
+                await _serve(self._hub, self._authenticator, budget, line, program)
             else:
                 why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
                 await line.close(0, why)
@@ -234,26 +244,33 @@ class LineServer:
         return None
 
 
+class _Client(NamedTuple):
+    """The other side of a connection. ``why``: why it is refused unless authorised."""
+
+    identity: Callable[[], Identity | None]
+    kind: ConnectionKind
+    address: str
+    why: str
+
+
 async def _serve(
-    hub: Hub,
-    authenticator: Authenticator,
-    budget: Budget,
-    line: JsonChannel,
-    current_identity: Callable[[], Identity | None],
+    hub: Hub, authenticator: Authenticator, budget: Budget, line: JsonChannel, client: _Client
 ) -> None:
-    found = current_identity()
+    found = client.identity()
     if found is None:
-        await line.close(
-            SIGN_IN_CLOSE_CODE, "A token is required. `katana450 access give` makes one."
-        )
+        await line.close(SIGN_IN_CLOSE_CODE, client.why)
         return
     program = ProgramChannel(hub, line, budget)
     page = secrets.token_hex(16)
     window = hub.join(found, page, program.notify, line.arrival, CommandChannel.API)
     program.greet(window)
+    connection = Connection(found, client.kind, client.address, key=window.person.key)
     try:
-        if not await authenticator.run_while_authorised(current_identity, program.run(window)):
-            await line.close(SIGN_IN_CLOSE_CODE, "The token has expired or was revoked.")
+        why = await authenticator.run_while_authorised(
+            client.identity, program.run(window), connection
+        )
+        if why is not None:
+            await line.close(SIGN_IN_CLOSE_CODE, why)
     finally:
         hub.leave(window, for_good=True)
 

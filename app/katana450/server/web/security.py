@@ -13,6 +13,8 @@ from katana450.server.web.authenticator import Address
 SAFE_METHODS = ("GET", "HEAD")
 
 EVERYWHERE = {
+    # Static files say otherwise.
+    "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",

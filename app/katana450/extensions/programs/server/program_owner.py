@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
+import logging
+from datetime import UTC, datetime
+
 from katana450.arm.control.lease import Person
 from katana450.errors import LeaseError
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.heartbeats import LastHeartbeat
+from katana450.server.service.hub import Hub, Window, session_of
+
+log = logging.getLogger(__name__)
+
+
+class AlwaysAlive(LastHeartbeat):
+    """The heartbeat of a program, always up to date because it runs in this thread.
+
+    The heartbeat of the owner is monitored instead.
+    """
+
+    @property
+    def newest(self) -> float:
+        """Present time [s]."""
+        return self._clock()
 
 
 class ProgramOwner:
@@ -12,23 +30,56 @@ class ProgramOwner:
 
     Attributes:
         window: the window of the owner; None before the first program.
+        unattended: whether the program runs, or is to run, without heartbeats of the owner.
+        began: time at which the run began; None before that.
     """
 
-    def __init__(self, hub: Hub, timeout: float) -> None:
-        """Begin without an owner. ``timeout`` is the heartbeat timeout of the owner [s]."""
+    def __init__(self, hub: Hub, timeout: float, *, may_be_unattended: bool = True) -> None:
+        """Begin without an owner.
+
+        ``timeout`` is the heartbeat timeout of the owner [s]. ``may_be_unattended``: whether
+        programs may run unattended.
+        """
         self.window: Window | None = None
+        self.unattended = False
+        self.began: datetime | None = None
+        self._allowed = may_be_unattended
         self._hub = hub
         self._timeout = timeout
         self._seen = 0.0
 
     def change_to(self, window: Window, t: float) -> None:
-        """Make ``window`` the owner at the time ``t`` [s]."""
+        """Make ``window`` the owner of a program that has not begun, at the time ``t`` [s]."""
         self.window, self._seen = window, t
+        self.unattended, self.began = False, None
+
+    def begin(self, window: Window, t: float, *, unattended: bool) -> None:
+        """Make ``window`` the owner of a run that begins at the time ``t`` [s]."""
+        self.change_to(window, t)
+        self.unattended, self.began = unattended, datetime.now(UTC)
+
+    def check_unattended(self, *, unattended: bool) -> None:
+        """Raise LeaseError if an ``unattended`` run is not allowed."""
+        if unattended and not self._allowed:
+            raise LeaseError("Unattended programs are not allowed on this server.")
+
+    def allow_unattended(self, by: Person, *, allowed: bool) -> None:
+        """Allow or forbid unattended programs. A running one needs its owner again if forbidden.
+
+        ``by`` is the admin who does so.
+        """
+        self._allowed = allowed
+        self.unattended = self.unattended and allowed
+        log.warning("%s %s unattended programs.", by.name, "allowed" if allowed else "forbade")
 
     @property
     def is_here(self) -> bool:
         """True if the owner is connected."""
         return self._connected is not None
+
+    def is_missing(self, t: float) -> bool:
+        """Return whether the owner has to be present at ``t`` [s] and sends no heartbeats."""
+        return self.is_silent(t) and not self.unattended
 
     def is_silent(self, t: float) -> bool:
         """Return whether no heartbeat was received for the heartbeat timeout before ``t`` [s]."""
@@ -38,14 +89,38 @@ class ProgramOwner:
         return t - self._seen > self._timeout
 
     def is_person(self, person: Person) -> bool:
-        """Return whether ``person`` is the owner."""
-        return self.window is not None and self.window.person.key == person.key
+        """Return whether ``person`` is the owner.
+
+        Another window of the owner's link or browser is so once the owner of an unattended program
+        has left.
+        """
+        if self.window is None:
+            return False
+        owner = self.window.person.key
+        if self.unattended and not self.is_here:
+            return session_of(person.key) == session_of(owner)
+        return person.key == owner
 
     def check_may_steer(self, person: Person) -> None:
         """Raise LeaseError if ``person`` is not the owner and may not take the lease from it."""
         window = self.window
         if window is not None and not self.is_person(person) and not person.role.may_take:
             raise LeaseError(f"The program belongs to {window.person.name}.")
+
+    def superseded_by(self, sender: Window) -> str:
+        """Return why the program that is being planned gives way to a new one of ``sender``.
+
+        Raises LeaseError if it does not: planning may take two minutes, and then blocks all but the
+        driver.
+        """
+        if self.is_silent(self._hub.clock()):
+            return "Its owner sends no heartbeats."
+        owner, drives = self.window, self._hub.lease.holder == sender.person
+        if owner is None or owner.person == sender.person or not drives:
+            raise LeaseError("Another program is being planned. Cancel it, or wait for it.")
+        why = f"{sender.person.name}, who drives, has sent another program."
+        owner.notify({"is": "refused", "why": f"Your program is not planned any more. {why}"})
+        return why
 
     @property
     def _connected(self) -> Window | None:

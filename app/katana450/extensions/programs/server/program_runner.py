@@ -20,13 +20,12 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
-from katana450.extensions.programs.server.program_owner import ProgramOwner
+from katana450.extensions.programs.server.program_owner import AlwaysAlive, ProgramOwner
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
-from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub, Window
 from katana450.server.service.identity import Identity
 from katana450.server.service.runner import Runner, StatusLine
@@ -34,31 +33,21 @@ from katana450.server.service.runner import Runner, StatusLine
 log = logging.getLogger(__name__)
 
 
-class _AlwaysAlive(LastHeartbeat):
-    """The heartbeat of a program, always up to date because it runs in this thread.
-
-    The heartbeat of the owner is monitored instead.
-    """
-
-    @property
-    def newest(self) -> float:
-        return self._clock()
-
-
 class ProgramRunner(Runner):
     """The runner of at most one program at a time."""
 
-    request_types = (requests.Program, requests.Steer)
+    request_types = (requests.Program, requests.Steer, requests.AllowUnattended)
     controls = ("Script", "Program", "Look at", "Teach", "Name")
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
         """Prepare to run programs of ``hub``.
 
         ``options.owner_silence`` is the heartbeat timeout of the owner [s], after which a program
-        ends. A page that reloads returns sooner.
+        ends. A page that reloads returns sooner. ``options.no_unattended``: see ``ProgramOwner``.
         """
         super().__init__(hub, options)
-        self._owner = ProgramOwner(hub, options.owner_silence)
+        allowed = not options.no_unattended
+        self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
         self._parts: dict[str, str] = {}
         self._planning: Planning | None = None
         self._then: ProgramOrder | None = None
@@ -97,10 +86,12 @@ class ProgramRunner(Runner):
         match request:
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(window, text, more=more, speed=speed)
-            case requests.Steer(order=order):
-                if ticket := self.steer(window, order):
+            case requests.Steer(order=order, unattended=unattended):
+                if ticket := self.steer(window, order, unattended=unattended):
                     return answers.Done(ticket=ticket)
                 return answers.Done(outcome=Verdict.ACCEPTED.value)
+            case requests.AllowUnattended(allowed=allowed):
+                self._owner.allow_unattended(window.person, allowed=allowed)
         return answers.Done()
 
     def then(self, order: ProgramOrder | None) -> None:
@@ -121,11 +112,13 @@ class ProgramRunner(Runner):
         if more:
             self._parts[key] = text
             return
-        self._check_free()
+        if self.running:
+            raise LeaseError("A program is running. End it first.")
         arm = self.hub.present()
         if arm.state.moving:
             raise LeaseError("The arm is moving. Plan the program when it is at rest.")
         self._check_may_drive(window.person)
+        self._supersede(window)
         before = self._planning
         if before is not None and before.fits(text, speed, arm.state):
             before.refused, before.note = None, ""
@@ -148,7 +141,7 @@ class ProgramRunner(Runner):
         self._run = self._then = None
         self._owner.change_to(window, self.hub.clock())
 
-    def steer(self, window: Window, order: ProgramOrder) -> int | None:
+    def steer(self, window: Window, order: ProgramOrder, *, unattended: bool = False) -> int | None:
         """Run, step, pause, resume or end the program. Raises LeaseError if it is refused.
 
         During planning, RUN and STEP take effect at its end, PAUSE and RESUME decide whether the
@@ -157,12 +150,18 @@ class ProgramRunner(Runner):
         Returns the ticket of the command that the arm was given now; None for none.
         """
         self._check_may_drive(window.person)
+        begins = order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running
+        if unattended and not begins:
+            raise LeaseError("Only `run` and `step` begin an unattended program.")
+        self._owner.check_unattended(unattended=unattended)
         planning = self._planning
         if planning is not None and planning.busy:
             self._owner.check_may_steer(window.person)
-            return self._steer_planning(planning, window, order)
-        if order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running:
-            return self._begin(window, order)
+            ticket = self._steer_planning(planning, window, order)
+            self._owner.unattended = self._owner.unattended or unattended
+            return ticket
+        if begins:
+            return self._begin(window, order, unattended=unattended)
         if not self.running or self._run is None:
             raise LeaseError("No program is running.")
         self._owner.check_may_steer(window.person)
@@ -212,7 +211,7 @@ class ProgramRunner(Runner):
         if not self.owns(window):
             return
         self._forget_run(f"{window.person.name} left")
-        if self.running:
+        if self.running and not self._owner.unattended:
             self._end(f"{window.person.name} left.")
 
     def tick(self) -> None:
@@ -233,7 +232,7 @@ class ProgramRunner(Runner):
         if hub.stopped is not None:
             self._leave_with(Phase.STOPPED, hub.stopped.why)
             return
-        if owner is not None and self._owner.is_silent(t):
+        if owner is not None and self._owner.is_missing(t):
             why = "sends no heartbeats" if self._owner.is_here else "left"
             self._end(f"{owner.person.name} {why}. A program ends without its owner.")
             return
@@ -259,7 +258,7 @@ class ProgramRunner(Runner):
         program, run, arm = planning.program, self._run, self.hub.arm
         if program is None or run is None or arm is None or planning.refused is not None:
             return planning.progress(owner.person.name)
-        now = runner.progress(program, run, arm.state)
+        now, began = runner.progress(program, run, arm.state), self._owner.began
         return answers.Progress(
             name=program.name,
             by=owner.person.name,
@@ -271,6 +270,8 @@ class ProgramRunner(Runner):
             fraction=now.fraction,
             seconds=program.duration,
             why=now.why,
+            unattended=self._owner.unattended and self.running,
+            began=None if began is None else began.isoformat(timespec="seconds"),
         )
 
     def status_line(self, state: State, line: StatusLine) -> StatusLine:
@@ -294,12 +295,12 @@ class ProgramRunner(Runner):
             # The order was cancelled meanwhile.
             return
         try:
-            self.steer(owner, then)
+            self.steer(owner, then, unattended=self._owner.unattended)
         except LeaseError as error:
             assert self._planning is not None
             self._planning.refused = str(error)
 
-    def _begin(self, window: Window, order: ProgramOrder) -> int | None:
+    def _begin(self, window: Window, order: ProgramOrder, *, unattended: bool) -> int | None:
         """Run the planned program. If the situation has changed, plan it again first."""
         planning, hub = self._planning, self.hub
         if planning is None or planning.program is None:
@@ -314,12 +315,12 @@ class ProgramRunner(Runner):
                 # Otherwise a refusal would come only at the end of the planning, which takes long.
                 hub.lease.acquire(window.person, hub.clock())
             self._plan(window, planning.text, planning.speed, changed)
-            self._then = order
+            self._then, self._owner.unattended = order, unattended
             return None
         planning.refused, planning.note = None, ""
         program = planning.program
         identity = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
-        alive = _AlwaysAlive(hub.clock)
+        alive = AlwaysAlive(hub.clock)
         joined = hub.join(identity, "program", lambda _notice: None, alive, CommandChannel.PROGRAM)
         try:
             if hub.lease.holder == window.person:
@@ -335,12 +336,13 @@ class ProgramRunner(Runner):
             raise
         began = hub.clock()
         self._participant = joined
-        self._owner.change_to(window, began)
+        self._owner.begin(window, began, unattended=unattended)
         hub.gate.program = RunningProgram(joined.person, window.person.key)
         self._speed = self._commanded = arm.state.speed
         self._allowed = 1.0
         self._run = Run(began, single=order is ProgramOrder.STEP)
-        log.info("%s runs the program %s.", window.person.name, program.name)
+        how = "runs unattended" if unattended else "runs"
+        log.info("%s %s the program %s.", window.person.name, how, program.name)
         return ticket
 
     def _send(self, *commands: cmd.Command) -> int | None:
@@ -383,15 +385,11 @@ class ProgramRunner(Runner):
         self.hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
 
-    def _check_free(self) -> None:
-        if self.running:
-            raise LeaseError("A program is running. End it first.")
+    def _supersede(self, window: Window) -> None:
+        """Cancel the planning of another program. Raises LeaseError if ``window`` may not."""
         planning = self._planning
-        if planning is None or not planning.busy:
-            return
-        if not self._owner.is_silent(self.hub.clock()):
-            raise LeaseError("Another program is being planned. Cancel it, or wait for it.")
-        planning.cancel("Its owner sends no heartbeats.")
+        if planning is not None and planning.busy:
+            planning.cancel(self._owner.superseded_by(window))
 
     def _check_may_drive(self, person: Person) -> None:
         if not person.role.may_drive:

@@ -26,6 +26,8 @@ def status_line(
         return line
     step = f"Step {program.step} of {program.steps}"
     if program.status in RUNS:
+        if program.unattended:
+            line = line._replace(why=f"{_unattended(program)} {line.why}".rstrip())
         if state.paused:
             return line._replace(headline=f"{program.name}, paused", why=f"{step}. {line.why}")
         return line._replace(mood="moving", headline=f"{program.name}, {step.lower()}")
@@ -43,6 +45,12 @@ def status_line(
     else:
         about.append("It does not start by itself.")
     return StatusLine(PLANNING, headline, " ".join(about))
+
+
+def _unattended(program: Progress) -> str:
+    """Return a sentence on who started an unattended program, and when."""
+    at = "" if program.began is None else f" at {program.began[11:16]} UTC"
+    return f"Unattended: started by {program.by}{at}."
 
 
 def orders(

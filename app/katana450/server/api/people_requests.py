@@ -1,0 +1,66 @@
+"""Requests of admins about everybody who is connected."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from katana450.server.api.fields import ADMIN, Request, RequestTraits
+
+MAX_TIME_OUT = 86_400.0
+"""Maximum time [s] for which an admin keeps somebody out without revoking the link."""
+
+
+class ListPeople(Request, frozen=True):
+    """List everybody who is connected, muted or kept out. For admins only."""
+
+    traits: ClassVar[RequestTraits] = RequestTraits(admin=True, answered=True)
+
+
+class Kick(Request, frozen=True, kw_only=True):
+    """Close all connections of a person, and keep the person out for a while. For admins only.
+
+    The person can still stop the arm over HTTP, once per 10 s. A running program of the person ends
+    as if its owner left.
+
+    Attributes:
+        person: Number of the person in ``people``.
+        seconds: Time [s] after which the person may come back; 0 lets the person in at once.
+        revoke: Whether to revoke the access link for good. An admin's link is revoked by
+            ``katana450 access revoke`` alone.
+    """
+
+    traits: ClassVar[RequestTraits] = ADMIN
+
+    person: int
+    seconds: Annotated[float, Meta(ge=0.0, le=MAX_TIME_OUT)] = 60.0
+    revoke: bool = False
+
+
+class Mute(Request, frozen=True, kw_only=True):
+    """Let only one STOP and one request of a person count per interval. For admins only.
+
+    An admin cannot be muted, and the mute of the driver waits until somebody else drives.
+
+    Attributes:
+        person: Number of the person in ``people``.
+        seconds: Interval [s].
+    """
+
+    traits: ClassVar[RequestTraits] = ADMIN
+
+    person: int
+    seconds: Annotated[float, Meta(ge=1.0, le=60.0)] = 10.0
+
+
+class Unmute(Request, frozen=True, kw_only=True):
+    """End the mute of a person. For admins only.
+
+    Attributes:
+        person: Number of the person in ``people``.
+    """
+
+    traits: ClassVar[RequestTraits] = ADMIN
+
+    person: int

@@ -1,0 +1,221 @@
+"""Everybody who is connected, by identity, for the list of the admins and what they do with it.
+
+An identity is an access link; without links it is the cookie of a browser, or one program. Its key
+(the *session*) can be secret, so admins name an identity by a number.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+from katana450.errors import KatanaError
+from katana450.server.service.identity import Identity
+from katana450.server.service.mutes import Mutes
+
+log = logging.getLogger(__name__)
+
+MAX_REMEMBERED = 1024
+"""Maximum number of identities whose numbers and refusals are remembered."""
+
+
+class ConnectionKind(Enum):
+    """Kind of a connection."""
+
+    PAGE = "page"
+    """The control socket of a page."""
+    SCENE = "scene"
+    """The 3D scene of a page."""
+    PROGRAM = "program"
+    """A program on a websocket."""
+    LINES = "lines"
+    """A program on the TCP port."""
+    POSTS = "posts"
+    """A program that sends single requests over HTTP."""
+
+
+class LinkStore(Protocol):
+    """Interface of the access links, which ``AccessFile`` implements. Its methods may block."""
+
+    def revoke(self, number: str) -> object:
+        """Delete the link of ``number``. Raises KatanaError or OSError."""
+
+    def mute(self, number: str, interval: float | None) -> None:
+        """Store the interval of a mute [s], or its end. Raises KatanaError or OSError."""
+
+
+@dataclass(eq=False)
+class Connection:
+    """An open connection of an identity.
+
+    Attributes:
+        identity: Identity of the client.
+        kind: Kind of the connection.
+        address: Host address of the client, as the server sees it.
+        key: Key of its window; empty without one.
+        since: Time at which it was opened [s since the epoch].
+        kicked: Set when an admin ends the connection.
+    """
+
+    identity: Identity
+    kind: ConnectionKind
+    address: str
+    key: str = ""
+    since: float = field(default_factory=time.time)
+    kicked: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+class People:
+    """The connections of all identities, their refused requests, and who is kept out.
+
+    Used in the server's thread alone.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self.mutes = Mutes(clock)
+        self.links: LinkStore | None = None
+        """The access links; None on a server without them."""
+        self._connections: dict[Connection, None] = {}
+        self._known: dict[str, tuple[int, Identity]] = {}
+        self._counted = 0
+        self._refusals: Counter[str] = Counter()
+        self._kept_out: dict[str, float] = {}
+        self._away = Mutes(clock)
+        self._writing = asyncio.Lock()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    # Connections
+
+    @contextmanager
+    def connected(self, connection: Connection) -> Iterator[None]:
+        """List ``connection`` inside the ``with`` block."""
+        self.add(connection)
+        try:
+            yield
+        finally:
+            self.remove(connection)
+
+    def add(self, connection: Connection) -> None:
+        """List ``connection``."""
+        self._connections[connection] = None
+        self._remember(connection.identity)
+
+    def remove(self, connection: Connection) -> None:
+        """Remove ``connection`` from the list."""
+        self._connections.pop(connection, None)
+
+    @property
+    def connections(self) -> dict[str, list[Connection]]:
+        """The open connections by session, the oldest first."""
+        found: dict[str, list[Connection]] = {}
+        for each in self._connections:
+            found.setdefault(each.identity.session, []).append(each)
+        return found
+
+    def _remember(self, identity: Identity) -> None:
+        number, _ = self._known.pop(identity.session, (0, identity))
+        if not number:
+            self._counted += 1
+            number = self._counted
+        self._known[identity.session] = number, identity
+        while len(self._known) > MAX_REMEMBERED:
+            del self._known[next(iter(self._known))]
+
+    def identity(self, number: int) -> Identity | None:
+        """Return the identity with ``number``; None if it is not remembered."""
+        return next((found for known, found in self._known.values() if known == number), None)
+
+    @property
+    def shown(self) -> dict[int, Identity]:
+        """The identities that are connected, muted or kept out, by their numbers."""
+        present = {each.identity.session for each in self._connections}
+        sessions = present | set(self.mutes.sessions) | set(self._kept_out)
+        return {
+            number: identity
+            for session, (number, identity) in self._known.items()
+            if session in sessions and (session in present or self.kept_out(session) < math.inf)
+        }
+
+    # Refusals
+
+    def refused(self, session: str) -> None:
+        """Count a refused request of ``session``."""
+        if session in self._refusals or len(self._refusals) < MAX_REMEMBERED:
+            self._refusals[session] += 1
+
+    def refusals(self, session: str) -> int:
+        """Return the number of refused requests of ``session``."""
+        return self._refusals[session]
+
+    # Kick
+
+    def kick(self, identity: Identity, seconds: float) -> int:
+        """Close all connections of ``identity`` and keep it out for ``seconds``.
+
+        Infinite ``seconds`` stand for a revoked link. Returns the number of connections. Their
+        tasks close them in the next turns of the event loop.
+        """
+        session = identity.session
+        if seconds > 0.0:
+            self._kept_out[session] = self._clock() + seconds
+        closed = self.connections.get(session, [])
+        for each in closed:
+            each.kicked.set()
+        return len(closed)
+
+    def let_in(self, session: str) -> None:
+        """Let the identity of ``session`` in again before its time."""
+        self._kept_out.pop(session, None)
+
+    def kept_out(self, session: str) -> float:
+        """Return for how long the identity is kept out [s]; 0 if it is not."""
+        if session not in self._kept_out:
+            return 0.0
+        left = self._kept_out[session] - self._clock()
+        if left <= 0.0:
+            del self._kept_out[session]
+        return max(left, 0.0)
+
+    # Links
+
+    def write(self, change: Callable[[], object], failed: Callable[[str], None]) -> None:
+        """Call ``change`` of the links in a thread, because a disk can be slow.
+
+        ``failed`` is called with the reason if it fails.
+        """
+        task = asyncio.ensure_future(self._write(change, failed))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _write(self, change: Callable[[], object], failed: Callable[[str], None]) -> None:
+        async with self._writing:
+            try:
+                await asyncio.to_thread(change)
+            except (KatanaError, OSError) as error:
+                log.error("The access file cannot be changed: %s", error)
+                failed(str(error))
+
+    # STOP
+
+    def is_muted(self, session: str) -> bool:
+        """Return whether ``session`` is muted or kept out, so that not every STOP counts."""
+        return self.mutes.interval(session) is not None or self.kept_out(session) > 0.0
+
+    def count_stop(self, session: str) -> None:
+        """Count a STOP of ``session``. Raises MutedError if it is muted and does not count.
+
+        An identity that is kept out counts as muted. It can still stop the arm over HTTP.
+        """
+        if self.kept_out(session):
+            self._away.add(session)
+            self._away.count_stop(session)
+        self.mutes.count_stop(session)

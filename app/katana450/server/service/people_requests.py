@@ -1,0 +1,152 @@
+"""Requests of admins about everybody who is connected."""
+
+from __future__ import annotations
+
+import logging
+import math
+from datetime import UTC, datetime
+
+from katana450.arm.control.lease import Role
+from katana450.errors import InputError, LeaseError
+from katana450.server.api import answers, requests
+from katana450.server.service.hub import Hub, Window, session_of
+from katana450.server.service.identity import Identity
+from katana450.server.service.people import Connection, ConnectionKind
+
+log = logging.getLogger(__name__)
+
+
+class PeopleRequests:
+    """Executes the requests of admins about people.
+
+    The dispatcher has checked that the sender is one. Raises LeaseError for what even an admin may
+    not do, and InputError for an unknown person.
+    """
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._people = hub.people
+
+    def answer(self, window: Window, request: requests.Request) -> answers.Answer | None:
+        """Execute ``request`` and return its answer; None for a request about something else."""
+        match request:
+            case requests.ListPeople():
+                return answers.People(people=self._list(session_of(window.person.key)))
+            case requests.Kick(person=number):
+                self._kick(window, self._person(number), request)
+            case requests.Mute(person=number, seconds=seconds):
+                self._mute(window, self._person(number), seconds)
+            case requests.Unmute(person=number):
+                found = self._person(number)
+                self._people.mutes.remove(found.session)
+                self._store_mute(window, found, None)
+                log.warning("%s ended the mute of %s.", window.person.name, self._name(found))
+            case _:
+                return None
+        return answers.Done()
+
+    def _kick(self, window: Window, person: Identity, request: requests.Kick) -> None:
+        by, name, people = window.person.name, self._name(person), self._people
+        if person.session == session_of(window.person.key):
+            raise InputError("You cannot disconnect yourself. Close your windows instead.")
+        if not request.revoke:
+            if request.seconds:
+                log.warning("%s disconnected %s for %g s.", by, name, request.seconds)
+                people.kick(person, request.seconds)
+            else:
+                log.warning("%s let %s in again.", by, name)
+                people.let_in(person.session)
+            return
+        links = people.links
+        if links is None:
+            raise InputError("This server has no links that could be revoked.")
+        if person.role is Role.ADMIN:
+            raise LeaseError("Revoke the link of an admin with `katana450 access revoke`.")
+        people.kick(person, math.inf)
+        log.warning("%s revoked the link of %s.", by, name)
+        people.write(
+            lambda: links.revoke(person.session),
+            lambda why: _report(window, f"The link of {name} works again after a restart. {why}"),
+        )
+
+    def _mute(self, window: Window, person: Identity, seconds: float) -> None:
+        if person.role is Role.ADMIN:
+            raise LeaseError("An admin cannot be muted.")
+        self._people.mutes.add(person.session, seconds)
+        name = self._name(person)
+        log.warning("%s muted %s: one STOP per %g s.", window.person.name, name, seconds)
+        self._store_mute(window, person, seconds)
+
+    def _store_mute(self, window: Window, person: Identity, interval: float | None) -> None:
+        links = self._people.links
+        if links is not None:
+            self._people.write(
+                lambda: links.mute(person.session, interval),
+                lambda why: _report(window, f"The server forgets this when it restarts. {why}"),
+            )
+
+    def _person(self, number: int) -> Identity:
+        found = self._people.identity(number)
+        if found is None:
+            raise InputError(f"No person has the number {number} now. List the people again.")
+        return found
+
+    def _list(self, asker: str) -> tuple[answers.ConnectedPerson, ...]:
+        connections, shown = self._people.connections, self._people.shown
+        return tuple(
+            self._described(number, shown[number], connections, you=shown[number].session == asker)
+            for number in sorted(shown)
+        )
+
+    def _described(
+        self,
+        number: int,
+        identity: Identity,
+        connections: dict[str, list[Connection]],
+        *,
+        you: bool,
+    ) -> answers.ConnectedPerson:
+        hub, people, session = self._hub, self._people, identity.session
+        program = hub.gate.program
+        owns = program is not None and session_of(program.owner) == session
+        kept_out = people.kept_out(session)
+        return answers.ConnectedPerson(
+            person=number,
+            name=self._name(identity),
+            role=identity.role.value,
+            link=None if people.links is None else session,
+            you=you,
+            drives=hub.drives(session),
+            asks=any(session_of(each.key) == session for each in hub.lease.waiting),
+            program=program.person.name if program is not None and owns else None,
+            refused=people.refusals(session),
+            muted=people.mutes.interval(session),
+            kept_out=round(kept_out, 1) if kept_out else None,
+            connections=tuple(self._connection(each) for each in connections.get(session, ())),
+        )
+
+    def _name(self, identity: Identity) -> str:
+        """Return the name of the link; without links, of the first window."""
+        if identity.link:
+            return identity.link
+        for each in self._people.connections.get(identity.session, ()):
+            window = self._hub.window(each.key)
+            if window is not None:
+                return window.person.name
+        return identity.name or "Somebody"
+
+    def _connection(self, connection: Connection) -> answers.PersonConnection:
+        window = self._hub.window(connection.key)
+        scene = connection.kind is ConnectionKind.SCENE
+        return answers.PersonConnection(
+            kind=connection.kind.value,
+            name=(connection.identity.name or "") if window is None else window.person.name,
+            number=None if window is None or scene else window.number,
+            address=connection.address,
+            since=datetime.fromtimestamp(connection.since, UTC).isoformat(timespec="seconds"),
+        )
+
+
+def _report(window: Window, why: str) -> None:
+    """Show ``why`` in ``window`` as the reason of a refusal."""
+    window.notify({"is": "refused", "why": why})

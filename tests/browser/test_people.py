@@ -1,0 +1,170 @@
+"""The list of those who are connected, in the page of an admin."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from katana450.arm.control.lease import Role
+from katana450.client import Client, connect
+from katana450.client.files import LostError
+from katana450.server.api import answers, requests
+from katana450.server.web.access_links import AccessFile
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import HOUR
+
+
+class Site(NamedTuple):
+    """A server that requires links, and its access file."""
+
+    server: AppServer
+    file: AccessFile
+
+    def link(self, name: str, role: Role) -> str:
+        return self.file.give(name, role, time.time() + HOUR)
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[Site]:
+    file = AccessFile.create(tmp_path / "access.json")
+    with AppServer((*APP, "--access", str(file.path))) as server:
+        yield Site(server, file)
+
+
+@contextmanager
+def visiting(browser: Browser, url: str, *, scene: bool = False) -> Iterator[Page]:
+    """Open ``url`` in a browser of its own, by default without the scene, which takes long."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    try:
+        page = context.new_page()
+        if not scene:
+            page.route("**/viser/*", lambda route: route.abort())
+        page.goto(url)
+        page.locator("#name", has_text=re.compile(".")).wait_for()
+        yield page
+    finally:
+        context.close()
+
+
+def waits(page: Page, name: str, words: str) -> None:
+    page.locator("#people-list li", has_text=name).get_by_text(words).wait_for(timeout=10_000)
+
+
+def test_admin_lists_mutes_and_disconnects(site: Site, browser: Browser, artefacts: Path) -> None:
+    url, token = site.server.url, site.link("Vera", Role.VIEWER)
+    boss = site.link("Ada", Role.ADMIN)
+    with (
+        visiting(browser, f"{url}/#{boss}", scene=True) as page,
+        connect(url, "Watch", token) as watch,
+        connect(url, "Sorter of parts", site.link("Oda", Role.OPERATOR)) as sorter,
+    ):
+        sorter.ask(requests.Acquire())
+        opener = page.locator("#people-button")
+        page.locator("#people-button", has_text="3 connected").wait_for()
+        # With the keyboard alone.
+        opener.focus()
+        page.keyboard.press("Enter")
+        waits(page, "Vera", "viewer · program from 127.0.0.1")
+        assert opener.get_attribute("aria-expanded") == "true"
+        waits(page, "Oda", "operator · drives · program")
+        assert page.locator("#people-list li b").all_inner_texts() == ["Ada (you)", "Vera", "Oda"]
+        for size in ((1280, 800), (390, 844), (844, 390)):
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+            for scheme in ("light", "dark"):
+                page.emulate_media(color_scheme=scheme)
+                page.wait_for_timeout(300)
+                page.screenshot(path=artefacts / f"people-{size[0]}-{scheme}.png")
+            assert page.locator("#people-button").is_visible() == (min(size) > 560)
+            stop = page.locator("#stop").bounding_box()
+            box = page.locator("#people").bounding_box()
+            assert stop is not None
+            assert box is not None
+            assert box["y"] >= stop["y"] + stop["height"]
+            assert box["x"] >= 0.0
+            assert box["x"] + box["width"] <= size[0]
+        # On a phone the help has the button that opens the list.
+        page.get_by_role("button", name="Close").last.click()
+        page.click("#help-button")
+        page.click("#people-help-button")
+        assert not page.locator("#help").is_visible()
+        waits(page, "Vera", "viewer")
+        page.set_viewport_size({"width": 1280, "height": 800})
+        mute = page.get_by_role("button", name="Mute Vera", exact=True)
+        mute.focus()
+        page.keyboard.press("Enter")
+        waits(page, "Vera", "muted, one STOP in 10 s")
+        # The focus is still on the button of the same person.
+        assert page.evaluate("document.activeElement.ariaLabel") == "Unmute Vera"
+        page.keyboard.press("Enter")
+        page.get_by_role("button", name="Mute Vera", exact=True).wait_for()
+        # Nobody mutes or disconnects an admin by mistake.
+        assert page.locator("#people-list li", has_text="Ada").locator("button").count() == 0
+        page.select_option("#kick-for", "600")
+        page.get_by_role("button", name="Disconnect Vera").click()
+        waits(page, "Vera", "disconnected for 10 min")
+        with pytest.raises(LostError):
+            poll(watch)
+        page.get_by_role("button", name="Let in Vera").click()
+        page.locator("#people-list li", has_text="Vera").wait_for(state="detached")
+        page.keyboard.press("Escape")
+        assert not page.locator("#people").is_visible()
+    with connect(url, "Watch", token) as watch:
+        assert watch.query(answers.State).stopped == "Ada pressed STOP."
+
+
+def poll(program: Client) -> None:
+    """Query the state for ten seconds."""
+    for _ in range(100):
+        program.query(answers.State)
+        time.sleep(0.1)
+
+
+def test_disconnected_page_says_why_and_comes_back(site: Site, browser: Browser) -> None:
+    url = site.server.url
+    boss, token = site.link("Ada", Role.ADMIN), site.link("Kai", Role.OPERATOR)
+    with (
+        visiting(browser, f"{url}/#{boss}") as page,
+        visiting(browser, f"{url}/#{token}") as other,
+    ):
+        page.locator("#people-button", has_text="2 connected").wait_for()
+        # Only admins have the button.
+        assert not other.locator("#people-button").is_visible()
+        page.click("#people-button")
+        page.get_by_role("button", name="Disconnect Kai").click()
+        gate = other.locator("#gate")
+        gate.wait_for(state="visible", timeout=10_000)
+        other.get_by_text("An admin has disconnected you. Come back in").wait_for()
+        page.get_by_role("button", name="Let in Kai").click()
+        gate.wait_for(state="hidden", timeout=10_000)
+        waits(page, "Kai", "page")
+
+
+def test_page_of_a_muted_viewer_shows_that_a_stop_did_not_count(
+    site: Site, browser: Browser
+) -> None:
+    url = site.server.url
+    boss, token = site.link("Ada", Role.ADMIN), site.link("Vera", Role.VIEWER)
+    with (
+        visiting(browser, f"{url}/#{boss}") as page,
+        visiting(browser, f"{url}/#{token}") as other,
+        connect(url, "Guard", boss) as guard,
+    ):
+        (vera,) = (each for each in guard.people() if each.name == "Vera")
+        guard.mute(vera.person, 60.0)
+        other.keyboard.press("Space")
+        page.locator("body[data-mood=stopped]").wait_for()
+        page.locator("#clear-stop").click(timeout=10_000)
+        for each in (page, other):
+            each.locator("body:not([data-mood=stopped])").wait_for()
+        other.keyboard.press("Space")
+        other.locator("#toast", has_text="this STOP does not count").wait_for(timeout=10_000)
+        # The button shows no stop that is still being sent.
+        other.locator("#stop:not(.asked)").wait_for()
+        assert other.get_attribute("body", "data-mood") != "stopped"

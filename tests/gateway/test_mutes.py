@@ -1,0 +1,132 @@
+"""Test which STOPs and requests of muted and absent people count, with a simulated clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import Role
+from katana450.arm.control.session import Session
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.server.service.hub import Hub, Window, actor_of
+from katana450.server.service.identity import Identity
+from katana450.server.service.mutes import STOP_INTERVAL, MutedError
+from tests.gateway.test_hub import FakeArm
+
+VERA = Identity("vera", "Vera", Role.VIEWER, "Vera")
+ODA = Identity("oda", "Oda", Role.OPERATOR, "Oda")
+JOG = cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE)
+
+
+class Room:
+    """A hub with a viewer, an operator, an arm and a clock that tests set."""
+
+    def __init__(self, session: Session) -> None:
+        self.t = 100.0
+        self.hub = Hub(lambda: self.t)
+        self.arm = self.hub.gate.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
+        self.vera, self.oda = (self.join(each) for each in (VERA, ODA))
+
+    def join(self, identity: Identity) -> Window:
+        return self.hub.join(identity, "a-page-of-this-person", lambda _: None)
+
+    def clear(self) -> None:
+        self.hub.move(self.oda, cmd.ClearStop())
+
+    def stops(self, window: Window, press: str | None = None) -> bool:
+        """Press STOP in ``window``; return whether the arm is stopped."""
+        try:
+            self.hub.stop(window.actor, press)
+        except MutedError:
+            assert self.hub.stopped is None
+            return False
+        return self.hub.stopped is not None
+
+
+@pytest.fixture
+def room(session: Session) -> Room:
+    return Room(session)
+
+
+def test_muted_viewer_stops_once_per_interval(room: Room) -> None:
+    room.hub.people.mutes.add("vera", 10.0)
+    assert room.stops(room.vera)
+    room.clear()
+    room.t += 3.0
+    with pytest.raises(MutedError, match=r"counts in 7\.0 s"):
+        room.hub.stop(room.vera.actor)
+    assert not room.stops(room.vera)
+    room.t += 7.0
+    assert room.stops(room.vera)
+    room.hub.people.mutes.remove("vera")
+    for _ in range(3):
+        room.clear()
+        assert room.stops(room.vera)
+
+
+def test_press_while_the_arm_is_stopped_uses_up_nothing(room: Room) -> None:
+    room.hub.people.mutes.add("vera", 10.0)
+    room.hub.stop(room.oda.actor)
+    sent = room.arm.stops
+    for _ in range(20):
+        assert room.stops(room.vera)
+    assert room.arm.stops == sent
+    room.clear()
+    assert room.stops(room.vera)
+
+
+def test_mute_concerns_no_other_identity(room: Room) -> None:
+    room.hub.people.mutes.add("vera", 10.0)
+    assert room.stops(room.vera)
+    room.clear()
+    assert not room.stops(room.vera)
+    other = room.join(Identity("willi", "Willi", Role.VIEWER, "Willi"))
+    assert room.stops(other)
+    room.clear()
+    assert room.stops(room.oda)
+
+
+def test_driver_is_never_muted(room: Room) -> None:
+    room.hub.people.mutes.add("oda", 10.0)
+    room.hub.move(room.oda, JOG)
+    for _ in range(3):
+        assert room.stops(room.oda)
+        room.clear()
+    # In another window of the driver too, and over HTTP.
+    room.hub.stop(actor_of(ODA, CommandChannel.API))
+    assert room.hub.stopped is not None
+    room.clear()
+    room.hub.release_lease(room.oda)
+    assert room.stops(room.oda)
+    room.clear()
+    room.hub.release_lease(room.oda)
+    assert not room.stops(room.oda)
+
+
+def test_repeated_press_of_a_muted_viewer_counts_once(room: Room) -> None:
+    room.hub.people.mutes.add("vera", 10.0)
+    assert room.stops(room.vera, "one press")
+    room.clear()
+    assert room.hub.stop(room.vera.actor, "one press") == 0
+    assert room.hub.stopped is None
+
+
+def test_absent_person_stops_once_per_interval(room: Room) -> None:
+    people = room.hub.people
+    people.kick(VERA, 60.0)
+    absent = actor_of(VERA, CommandChannel.PAGE)
+    room.hub.stop(absent)
+    room.clear()
+    with pytest.raises(MutedError):
+        room.hub.stop(absent)
+    room.t += STOP_INTERVAL
+    room.hub.stop(absent)
+    assert room.hub.stopped is not None
+    room.t += 60.0
+    room.clear()
+    # Back again, and not muted.
+    for _ in range(3):
+        assert room.stops(room.vera)
+        room.clear()

@@ -1,0 +1,166 @@
+"""Test the places of the driver and the admins, while viewers take all others."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Iterator
+from contextlib import AsyncExitStack, ExitStack, suppress
+from typing import NamedTuple
+
+import pytest
+from websockets.exceptions import InvalidStatus
+
+from katana450.arm.control.lease import Role
+from katana450.server.viser_bridge.proxy import MAX_BROWSERS, MAX_BROWSERS_EACH
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.admission import LIMIT_CLOSE_CODE, SOCKETS, SOCKETS_EACH
+from katana450.server.web.connection_limit import ConnectionLimit
+from katana450.server.web.program_socket import LINES, LINES_EACH
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import (
+    HOUR,
+    SUBPROTOCOL,
+    Peer,
+    controlling,
+    enter,
+    page_name,
+    websocket,
+)
+from tests.gateway.lines import Lines
+
+
+class Site(NamedTuple):
+    """A server that requires links, and its access file."""
+
+    server: AppServer
+    file: AccessFile
+
+    def link(self, role: Role) -> str:
+        return self.file.give(role.value.title(), role, time.time() + HOUR)
+
+    def cookie(self, role: Role) -> str:
+        return enter(self.server.url, self.link(role))
+
+
+@pytest.fixture
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    path = tmp_path_factory.mktemp("places") / "access.json"
+    file = AccessFile.create(path)
+    with AppServer((*APP, "--access", str(path), "--lines", "0")) as server:
+        yield Site(server, file)
+
+
+def test_reserved_places_are_free_when_all_others_are_taken() -> None:
+    limit = ConnectionLimit(maximum=4, each=3)
+    with ExitStack() as stack:
+
+        def takes(identity: str, reserved: int = 0) -> bool:
+            return stack.enter_context(limit.taken(identity, reserved))
+
+        assert [takes("a") for _ in range(4)] == [True, True, True, False]
+        assert [takes("b") for _ in range(2)] == [True, False]
+        assert [takes("admin", 2) for _ in range(3)] == [True, True, False]
+        # Who already has as many places has no more.
+        assert not takes("a", 2)
+    with limit.taken("b") as free:
+        assert free
+
+
+async def crowd_in(site: Site, stack: AsyncExitStack, path: str, links: int, each: int) -> int:
+    """Open ``each`` websockets with each of ``links`` viewers; return how many were accepted."""
+    opened = 0
+    for _ in range(links):
+        cookie = site.cookie(Role.VIEWER)
+        for _ in range(each):
+            options = {"subprotocols": [SUBPROTOCOL]} if path == "/viser" else {}
+            line = websocket(site.server.url, f"{path}?page={page_name()}", cookie, **options)
+            with suppress(InvalidStatus):
+                socket = await stack.enter_async_context(line)
+                if path == "/viser":
+                    # Otherwise the frames of the scene fill the memory of the test.
+                    socket.transport.pause_reading()
+                opened += 1
+    return opened
+
+
+async def whole_page(site: Site, cookie: str) -> None:
+    """Open a page with its scene, and a program; both are served."""
+    url, page = site.server.url, page_name()
+    async with (
+        controlling(url, cookie, page) as control,
+        websocket(url, f"/viser?page={page}", cookie, subprotocols=[SUBPROTOCOL]) as scene,
+        websocket(url, "/api/v1/socket?name=Mine", cookie) as program,
+    ):
+        await control.wait(10.0)
+        assert json.loads(await program.recv())["is"] == "welcome"
+        await Peer(scene).learn()
+
+
+async def is_refused(site: Site, cookie: str) -> bool:
+    async with websocket(site.server.url, f"/control?page={page_name()}", cookie) as socket:
+        async with asyncio.timeout(5.0):
+            await socket.wait_closed()
+        return socket.close_code == LIMIT_CLOSE_CODE
+
+
+def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(site: Site) -> None:
+    async def act() -> None:
+        driver, admin = site.cookie(Role.OPERATOR), site.cookie(Role.ADMIN)
+        async with (
+            controlling(site.server.url, driver) as driving,
+            AsyncExitStack() as stack,
+        ):
+            await driving.wait(mood="ok", seconds=10.0)
+            await driving.say("acquire")
+            await driving.wait(mine=True)
+            links = SOCKETS // SOCKETS_EACH
+            await crowd_in(site, stack, "/control", links, SOCKETS_EACH)
+            assert await is_refused(site, site.cookie(Role.VIEWER))
+            # An operator who does not drive has no place reserved.
+            assert await is_refused(site, site.cookie(Role.OPERATOR))
+            await whole_page(site, admin)
+            await whole_page(site, driver)
+            await driving.say("stop")
+            await driving.wait(stop="confirmed")
+
+    asyncio.run(act())
+
+
+def test_admin_gets_in_while_viewers_hold_the_tcp_port(site: Site) -> None:
+    def welcomed(stack: ExitStack, token: str) -> bool:
+        lines = Lines(site.server)
+        stack.enter_context(lines.socket)
+        stack.enter_context(lines.reader)
+        lines.say(do="hello", name="Crowd", token=token)
+        return bool(lines.hear()["is"] == "welcome")
+
+    with ExitStack() as stack:
+        for _ in range(LINES // LINES_EACH):
+            token = site.link(Role.VIEWER)
+            assert all(welcomed(stack, token) for _ in range(LINES_EACH))
+            assert not welcomed(stack, token)
+        assert not welcomed(stack, site.link(Role.OPERATOR))
+        admin = site.link(Role.ADMIN)
+        assert [welcomed(stack, admin) for _ in range(3)] == [True, True, False]
+
+
+@pytest.mark.long
+def test_admin_and_driver_get_the_scene_while_viewers_watch_everywhere(site: Site) -> None:
+    async def act() -> None:
+        driver, admin = site.cookie(Role.OPERATOR), site.cookie(Role.ADMIN)
+        async with (
+            controlling(site.server.url, driver) as driving,
+            AsyncExitStack() as stack,
+        ):
+            await driving.wait(mood="ok", seconds=10.0)
+            await driving.say("acquire")
+            await driving.wait(mine=True)
+            links = MAX_BROWSERS // MAX_BROWSERS_EACH
+            count = await crowd_in(site, stack, "/viser", links + 1, MAX_BROWSERS_EACH)
+            assert count == MAX_BROWSERS
+            await whole_page(site, admin)
+            await whole_page(site, driver)
+
+    asyncio.run(act())
