@@ -57,7 +57,7 @@ def test_log_names_the_person_who_stopped_the_arm() -> None:
     with AppServer() as server, connect(server.url, "Anna") as arm:
         arm.ask(requests.Stop())
         end = time.monotonic() + 10.0
-        while " INFO Anna (api, anybody may stop the arm), Stop: " not in server.output:
+        while " INFO Anna (websocket, anybody may stop the arm), Stop: " not in server.output:
             assert time.monotonic() < end, server.output
             time.sleep(0.02)
 

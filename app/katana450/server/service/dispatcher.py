@@ -10,12 +10,13 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import Verdict
+from katana450.errors import KatanaError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
-from katana450.server.service.budget import Budget
+from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub, Window
 from katana450.server.service.interfaces import ArmInterface
@@ -66,8 +67,13 @@ class Dispatcher:
         """
         question, driver = request.traits.question, driver_key(self._hub, window)
         free = request.traits.free or (driver and not question)
-        with nullcontext() if free else budget.charged(driver, question=question):
-            return msgspec.structs.replace(self._execute(window, request), id=request.id)
+        try:
+            with nullcontext() if free else budget.charged(driver, question=question):
+                return msgspec.structs.replace(self._execute(window, request), id=request.id)
+        except KatanaError as error:
+            if not question or isinstance(error, BusyError):
+                self._hub.recorder.refuse(request, window.actor, error)
+            raise
 
     def _execute(self, window: Window, request: requests.Request) -> answers.Answer:
         hub = self._hub

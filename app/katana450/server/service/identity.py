@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from katana450.arm.control.lease import Role
+from katana450.arm.control.lease import Person, Role
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,16 @@ class Identity:
         session: Text that identifies the browser, the program or the access link.
         name: Name of the access link; None without one.
         role: Role of the client.
+        link: Number of the access link; empty without one.
+        address: Network address of the client; empty if it is unknown.
     """
 
     session: str
     name: str | None
     role: Role
+    link: str = ""
+    address: str = ""
+
+    def person(self, key: str, name: str) -> Person:
+        """Return the client as the participant of ``key`` that is shown as ``name``."""
+        return Person(key, name, self.role, self.link, self.address)

@@ -17,7 +17,7 @@ from starlette.responses import Response
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
-from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile
+from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile, Grant
 
 SESSION_SIZE = 22
 """Length of a session's name in characters: 16 random bytes."""
@@ -106,8 +106,7 @@ class Authenticator:
         """Return the identity of the sender of ``cookies``; None if it is not authorised."""
         value = cookies.get(self._cookie, "")
         if self._access is not None:
-            known = self._access.check(value, time.time())
-            return None if known is None else Identity(known[0], known[1].name, known[1].role)
+            return _of_link(self._access.check(value, time.time()))
         if len(value) != SESSION_SIZE:
             return None
         return Identity(value, None, Role.ADMIN)
@@ -125,8 +124,7 @@ class Authenticator:
             return Identity(secrets.token_urlsafe(16), name, Role.ADMIN)
         scheme, _, token = authorization.partition(" ")
         if scheme.lower() == "bearer":
-            known = self._access.check(token.strip(), time.time())
-            found = None if known is None else Identity(known[0], known[1].name, known[1].role)
+            found = _of_link(self._access.check(token.strip(), time.time()))
         else:
             found = self.identity(cookies or {})
         return None if found is None else replace(found, name=f"{found.name}, {name}")
@@ -149,17 +147,27 @@ class Authenticator:
             with suppress(asyncio.CancelledError):
                 await task
 
-    def sign_in(self, token: str, response: Response) -> bool:
-        """Set the cookie of the bearer of ``token``; return whether the token is accepted."""
+    def sign_in(self, token: str, response: Response) -> Identity | None:
+        """Set the cookie of the bearer of ``token``; return None if the token is not accepted."""
         max_age = None
         if self._access is None:
             token = secrets.token_urlsafe(16)
+            found: Identity | None = Identity(token, None, Role.ADMIN)
         else:
             known = self._access.check(token, time.time())
+            found = _of_link(known)
             if known is None:
-                return False
+                return None
             max_age = int(known[1].expires - time.time())
         response.set_cookie(
             self._cookie, token, max_age, secure=self._secure, httponly=True, samesite="strict"
         )
-        return True
+        return found
+
+
+def _of_link(known: tuple[str, Grant] | None) -> Identity | None:
+    """Return the identity of a link, given by its number and grant; None without one."""
+    if known is None:
+        return None
+    number, grant = known
+    return Identity(number, grant.name, grant.role, link=number)

@@ -6,6 +6,7 @@ States are sent only on request, a few at a time, so a slow connection has no ba
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 from starlette.websockets import WebSocket
@@ -14,6 +15,7 @@ from katana450.server.api import requests
 from katana450.server.service import status
 from katana450.server.service.budget import Budget, Budgets
 from katana450.server.service.hub import Hub, Window
+from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
 from katana450.server.web.token_bucket import TokenBucket
@@ -82,11 +84,13 @@ async def serve(
         return
     line = WebSocketJsonChannel(socket)
     control = ControlSocket(hub, line, budgets.of(identity.session))
+    identity = replace(identity, address=address_of(socket))
     control.window = window = hub.join(identity, page, control.notify, line.arrival)
     try:
         if not await authenticator.run_while_authorised(
             lambda: authenticator.identity(socket.cookies), control.run(window)
         ):
+            hub.recorder.note("revocation", window.actor, always=True)
             await line.close(SIGN_IN_CLOSE_CODE, "Your link has expired or was revoked.")
     finally:
         hub.leave(window)

@@ -7,6 +7,7 @@ import logging
 import math
 import re
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from starlette.exceptions import HTTPException
@@ -24,6 +25,7 @@ from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, 
 from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub, Window, actor_of
 from katana450.server.service.identity import Identity
+from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
 from katana450.server.web.authenticator import Authenticator
@@ -124,7 +126,7 @@ class Api:
         return read
 
     async def _stop(self, request: Request) -> Response:
-        self._hub.stop(actor_of(self._identity(request), CommandChannel.API))
+        self._hub.stop(actor_of(self._identity(request), CommandChannel.HTTP))
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:
@@ -148,6 +150,8 @@ class Api:
         except BusyError as error:
             return await _too_much(error, requests.id_of(body))
         except InputError as error:
+            actor = actor_of(identity, CommandChannel.HTTP)
+            self._hub.recorder.refuse("invalid", actor, error)
             refused = answers.Refused(why=str(error), id=requests.id_of(body))
             return as_json(refused, NOT_UNDERSTOOD)
         except LeaseError as error:
@@ -162,8 +166,10 @@ class Api:
             headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
         )
         if identity is None:
+            refused = stranger(address_of(request))
+            self._hub.recorder.note("sign-in", refused, outcome=REFUSED, why="No valid token.")
             raise HTTPException(401, "A token is required. `katana450 access give` makes one.")
-        return identity
+        return replace(identity, address=address_of(request))
 
     def _window(self, request: Request, identity: Identity) -> Window:
         """Return the window of the program; it closes after ``LEASE_TIMEOUT`` without a request."""
@@ -171,9 +177,9 @@ class Api:
         known = self._posting.pop(key, None)
         if known is None:
             session, _, page = key.partition("/")
-            identity = Identity(session, identity.name, identity.role)
+            identity = replace(identity, session=session)
             window = self._hub.join(
-                identity, page, lambda _notice: None, channel=CommandChannel.API
+                identity, page, lambda _notice: None, channel=CommandChannel.HTTP
             )
             assert window.person.key == key
         else:

@@ -9,7 +9,8 @@ import secrets
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, nullcontext, suppress
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import msgspec
 from starlette.websockets import WebSocket
@@ -25,6 +26,7 @@ from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub, Window
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import address_of, identity, refuse
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
@@ -59,6 +61,13 @@ LINES, LINES_EACH = 16, 8
 """Maximum of TCP connections, of all together and of one identity."""
 
 BUDGET_EXHAUSTED = "Your programs together send too many requests. Wait, and send fewer requests."
+
+
+class ProgramClient(NamedTuple):
+    """Channel of a program, and its network address."""
+
+    channel: CommandChannel
+    address: str
 
 
 class ProgramChannel(Channel):
@@ -145,7 +154,8 @@ async def serve_socket(
         await refuse(socket, BUDGET_EXHAUSTED)
         return
     await socket.accept()
-    await _serve(hub, authenticator, budget, WebSocketJsonChannel(socket), current_identity)
+    client = ProgramClient(CommandChannel.WEBSOCKET, address_of(socket))
+    await _serve(hub, authenticator, budget, WebSocketJsonChannel(socket), current_identity, client)
 
 
 class LineServer:
@@ -214,7 +224,14 @@ class LineServer:
         kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
         with self._places.taken(session) as free, kept:
             if free:
-                await _serve(self._hub, self._authenticator, budget, line, current_identity)
+                await _serve(
+                    self._hub,
+                    self._authenticator,
+                    budget,
+                    line,
+                    current_identity,
+                    ProgramClient(CommandChannel.TCP, client[0]),
+                )
             else:
                 why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
                 await line.close(0, why)
@@ -240,19 +257,24 @@ async def _serve(
     budget: Budget,
     line: JsonChannel,
     current_identity: Callable[[], Identity | None],
+    client: ProgramClient,
 ) -> None:
     found = current_identity()
     if found is None:
+        refused = replace(stranger(client.address), channel=client.channel)
+        hub.recorder.note("sign-in", refused, outcome=REFUSED, why="The token is invalid.")
         await line.close(
             SIGN_IN_CLOSE_CODE, "A token is required. `katana450 access give` makes one."
         )
         return
     program = ProgramChannel(hub, line, budget)
     page = secrets.token_hex(16)
-    window = hub.join(found, page, program.notify, line.arrival, CommandChannel.API)
+    found = replace(found, address=client.address)
+    window = hub.join(found, page, program.notify, line.arrival, client.channel)
     program.greet(window)
     try:
         if not await authenticator.run_while_authorised(current_identity, program.run(window)):
+            hub.recorder.note("revocation", window.actor, always=True)
             await line.close(SIGN_IN_CLOSE_CODE, "The token has expired or was revoked.")
     finally:
         hub.leave(window, for_good=True)

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from katana450.arm.control.lease import Person
+from katana450.arm.control.lease import Person, Role
 from katana450.errors import LeaseError
 from katana450.server.service.hub import Hub, Window
+from katana450.server.service.identity import Identity
+
+
+def program_identity(name: str, owner: Person) -> Identity:
+    """Return the identity as which the program ``name`` of ``owner`` joins the hub."""
+    return Identity(f"program of {owner.key}", name, Role.OPERATOR, owner.link, owner.address)
 
 
 class ProgramOwner:
