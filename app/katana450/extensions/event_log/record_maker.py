@@ -235,7 +235,7 @@ class RecordMaker:
             grounds = note.actor.grounds.value
         more = {"what": what, "grounds": grounds, "outcome": note.outcome, "why": text(note.why)}
         record |= {name: value for name, value in more.items() if value}
-        if self._limits.admits(_source(note.actor), record, note.t) or note.always:
+        if note.always or self._limits.admits(_source(note.actor), record, note.t):
             self._made.append(record)
 
 
