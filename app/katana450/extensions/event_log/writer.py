@@ -184,8 +184,9 @@ class LogWriter:
             why = error.strerror or str(error)
             if isinstance(error, BlockingIOError):
                 why = "another server writes there"
-            self._failing = f"The event log in {self.folder} cannot be written: {why}."
-            log.error("%s It is tried again; later records are counted.", self._failing)
+            # Everybody sees this text, so it does not name the folder.
+            self._failing = f"The event log cannot be written: {why}."
+            log.error("%s Folder: %s. Later records are counted.", self._failing, self.folder)
             self._tell_all(self._failing)
 
     def _note_success(self, now: float) -> None:
