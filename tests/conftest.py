@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import signal
+import tempfile
 
 import numpy as np
 import pytest
@@ -21,6 +24,10 @@ LONG = "KATANA450_LONG" in os.environ
 def pytest_configure() -> None:
     """A shell has what it runs in the background ignore Ctrl-C, and so would all it starts."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    # Servers that the tests start keep their event logs out of the user's folders.
+    state = tempfile.mkdtemp(prefix="katana450-")
+    os.environ["XDG_STATE_HOME"] = state
+    atexit.register(shutil.rmtree, state, ignore_errors=True)
 
 
 def pytest_report_header() -> str:

@@ -6,6 +6,9 @@ from __future__ import annotations
 class KatanaError(Exception):
     """Base class of all errors of this project; the text can be shown to a person unchanged."""
 
+    noted = False
+    """Whether the event log has a record of this error."""
+
 
 class InputError(KatanaError, ValueError):
     """A value from outside is unusable: not finite, of the wrong shape, not a rotation, ..."""

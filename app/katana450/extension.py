@@ -23,6 +23,8 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
     from starlette.routing import BaseRoute
 
     from katana450.arm.control.scene_objects import Environment
@@ -30,7 +32,9 @@ if TYPE_CHECKING:
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
     from katana450.server.service.nodes import Nodes
+    from katana450.server.service.recorder import Recorder
     from katana450.server.service.runner import Runner
+    from katana450.server.service.server_log import ServerLog
     from katana450.server.view.layer import ViewLayer
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
@@ -38,7 +42,7 @@ if TYPE_CHECKING:
 PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
 
-BUILT_IN = ("programs", "importers", "reachability", "export", "experiments", "media")
+BUILT_IN = ("event_log", "programs", "importers", "reachability", "export", "experiments", "media")
 """Built-in extensions, in the order of their commands in the help text."""
 
 log = logging.getLogger(__name__)
@@ -80,6 +84,10 @@ class ServeExtension:
             process of the view, of the first extension that has it.
         folder: Returns a folder of the panel of an arm, or None. Called in the process of the view.
             Raises KatanaError.
+        server_log: Returns the event log of the server on a port, or None. Called in the process
+            that starts the others, of the first extension that has it.
+        send_records: Sends records of the notes of a recorder by a pipe to that event log, and
+            returns the function that ends this. Called in the process of the view.
         needs: Built-in extensions that must be installed; without them this part is left out.
     """
 
@@ -90,6 +98,10 @@ class ServeExtension:
     nodes: Callable[[Robot, Environment], Nodes] | None = None
     runner: Callable[[], type[Runner]] | None = None
     folder: Callable[[FolderContext], PanelFolder | None] | None = None
+    server_log: Callable[[Namespace, int], ServerLog | None] | None = None
+    send_records: Callable[[Namespace, Recorder, Connection], Callable[[], None] | None] | None = (
+        None
+    )
     needs: tuple[str, ...] = ()
 
 

@@ -17,9 +17,11 @@ from pathlib import Path
 from typing import Any
 
 if sys.platform != "win32":
+    import fcntl
     import resource
 else:
     import ctypes
+    import msvcrt
 
 PROMPT = -10
 """Niceness of a time-critical process, where the system allows it."""
@@ -138,9 +140,41 @@ def create_file(path: Path, mode: int) -> int:
     Raises:
         OSError: the file exists already or cannot be created.
     """
+    return open_bytes(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+
+
+def open_bytes(path: Path, flags: int, mode: int) -> int:
+    """Open ``path`` as ``os.open`` does, for bytes. Raises OSError."""
     # Windows replaces line ends in a descriptor that is not binary.
     binary: int = getattr(os, "O_BINARY", 0)
-    return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | binary, mode)
+    return os.open(path, flags | binary, mode)
+
+
+def claim_file(descriptor: int) -> None:
+    """Claim an open file for this process until it closes it or ends.
+
+    Raises OSError if another process has claimed it.
+    """
+    if sys.platform == "win32":
+        # The lock covers a byte far beyond the content, which others may read.
+        position = os.lseek(descriptor, 0, os.SEEK_CUR)
+        os.lseek(descriptor, 1 << 30, os.SEEK_SET)
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        os.lseek(descriptor, position, os.SEEK_SET)
+    else:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def state_folder() -> Path:
+    """Return the folder in which programs of this user keep their logs; it need not exist."""
+    if sys.platform == "win32":
+        default = Path.home() / "AppData" / "Local"
+        return Path(os.environ.get("LOCALAPPDATA") or default)
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support"
+    named = os.environ.get("XDG_STATE_HOME", "")
+    # The standard of these folders demands that a relative path is ignored.
+    return Path(named) if Path(named).is_absolute() else Path.home() / ".local" / "state"
 
 
 def _set_priority_class(priority: int) -> None:

@@ -90,6 +90,7 @@ def test_every_built_in_extension_is_found() -> None:
 @pytest.mark.parametrize(
     ("name", "commands"),
     [
+        ("event_log", ["log"]),
         ("reachability", ["workspace"]),
         ("export", ["export", "render"]),
         ("experiments", ["run", "demo"]),
@@ -103,7 +104,18 @@ def test_commands_of_a_missing_extension_are_not_listed(
     blocked = f"katana450.extensions.{name}"
     output = katana450("--help", folder=blocking, blocked=blocked)
     listed = [line.split()[0] for line in output.splitlines() if line.startswith("    ")]
-    everything = ["serve", "fk", "ik", "access", "workspace", "export", "run", "demo", "render"]
+    everything = [
+        "serve",
+        "fk",
+        "ik",
+        "access",
+        "log",
+        "workspace",
+        "export",
+        "run",
+        "demo",
+        "render",
+    ]
     assert [each for each in everything if each not in listed] == commands
     refused = katana450(commands[0], folder=blocking, blocked=blocked)
     assert refused.startswith("2 ")

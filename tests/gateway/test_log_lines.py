@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from katana450.assembly.log_lines import LineFormatter, printable
+from katana450.assembly.log_lines import LineFormatter, RepetitionFilter, printable
 from katana450.client import connect
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
@@ -48,6 +48,26 @@ def test_traceback_follows_on_marked_lines() -> None:
     assert all(line.startswith("    | ") for line in rest)
 
 
+def test_flood_makes_few_lines_and_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    repetitions, formatter = RepetitionFilter(), LineFormatter()
+
+    def printed(text: str, value: object) -> str | None:
+        record = logging.LogRecord("katana450", logging.WARNING, "", 0, text, (value,), None)
+        return formatter.format(record) if repetitions.filter(record) else None
+
+    flood = [printed("Invalid request from %s.", n) for n in range(1000)]
+    assert sum(line is not None for line in flood) == 20
+    # Other entries are printed meanwhile.
+    assert printed("Stopped: %s.", "Anna")
+    clock[0] += 10.0
+    line = printed("Invalid request from %s.", "Eve")
+    assert line is not None
+    assert line.endswith("Invalid request from Eve. (and 980 more such lines before)")
+    assert "before" not in str(printed("Invalid request from %s.", "Eve"))
+
+
 def test_printable_text_is_left_as_it_is() -> None:
     for text in ("", "Anna's arm: 5° ✓", "Ænna\u00a0".strip()):
         assert printable(text) == text
@@ -57,7 +77,7 @@ def test_log_names_the_person_who_stopped_the_arm() -> None:
     with AppServer() as server, connect(server.url, "Anna") as arm:
         arm.ask(requests.Stop())
         end = time.monotonic() + 10.0
-        while " INFO Anna (api, anybody may stop the arm), Stop: " not in server.output:
+        while " INFO Anna (websocket, anybody may stop the arm), Stop: " not in server.output:
             assert time.monotonic() < end, server.output
             time.sleep(0.02)
 

@@ -95,7 +95,7 @@ def test_driver_is_never_muted(room: Room) -> None:
         assert room.stops(room.oda)
         room.clear()
     # In another window of the driver too, and over HTTP.
-    room.hub.stop(actor_of(ODA, CommandChannel.API))
+    room.hub.stop(actor_of(ODA, CommandChannel.HTTP))
     assert room.hub.stopped is not None
     room.clear()
     room.hub.release_lease(room.oda)

@@ -173,7 +173,9 @@ def test_loop_timing_is_reported_periodically(ends: Ends) -> None:
 
 
 def test_actor_crosses_the_pipe_into_the_event_log(ends: Ends) -> None:
-    actor = Actor(Person("a key", "Anna", Role.OPERATOR), CommandChannel.API, None, Grounds.LEASE)
+    actor = Actor(
+        Person("a key", "Anna", Role.OPERATOR), CommandChannel.WEBSOCKET, None, Grounds.LEASE
+    )
     ends.front.deliver(cmd.SetJoint(0, 99.0), actor)
     until(lambda: bool(ends.front.state_publisher.event_log))
     (entry,) = ends.front.state_publisher.event_log

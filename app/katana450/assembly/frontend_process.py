@@ -21,6 +21,7 @@ from katana450.assembly.log_lines import start_log
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.extension import serve_extensions
 from katana450.platform_support import reset_priority
+from katana450.server.service.server_log import ServerLog
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
@@ -61,17 +62,19 @@ class FrontendConfig:
 class FrontendProcess:
     """One front end process, as its parent process sees it."""
 
-    def __init__(self, config: FrontendConfig) -> None:
-        """Start the process."""
+    def __init__(self, config: FrontendConfig, event_log: ServerLog) -> None:
+        """Start the process, whose records go to ``event_log``."""
         spawn = multiprocessing.get_context("spawn")
         self._status_receiver, status_sender = spawn.Pipe(duplex=False)
         # The ends are of another class on Windows, with the same methods.
         ends: Any = spawn.Pipe()
         self.pipe: Connection
         self.pipe, child_end = ends
+        records: Any
+        records, record_sender = spawn.Pipe()
         self._process = spawn.Process(
             target=_run,
-            args=(config, child_end, status_sender),
+            args=(config, child_end, status_sender, record_sender),
             name="katana450 front",
             daemon=True,
         )
@@ -79,6 +82,8 @@ class FrontendProcess:
         self._statuses: set[str] = set()
         # Closed here, so that each side notices when the other is gone.
         child_end.close()
+        record_sender.close()
+        event_log.attach(records)
         status_sender.close()
 
     @property
@@ -131,14 +136,16 @@ class FrontendProcess:
             self._process.join()
 
 
-def _run(config: FrontendConfig, pipe: Connection, status_sender: Connection) -> None:
+def _run(
+    config: FrontendConfig, pipe: Connection, status_sender: Connection, records: Connection
+) -> None:
     """Run the front end in this process, from start to end."""
     # Ctrl-C reaches all processes of a terminal; the arm's process ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     reset_priority()
     start_log()
     try:
-        _serve(config, pipe, status_sender)
+        _serve(config, pipe, status_sender, records)
     except KatanaError as error:
         status_sender.send(error)
     except (EOFError, BrokenPipeError):
@@ -146,7 +153,9 @@ def _run(config: FrontendConfig, pipe: Connection, status_sender: Connection) ->
         return
 
 
-def _serve(config: FrontendConfig, pipe: Connection, status_sender: Connection) -> None:
+def _serve(
+    config: FrontendConfig, pipe: Connection, status_sender: Connection, records: Connection
+) -> None:
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.gateway import Gateway
     from katana450.server.viser_bridge.viser_server import close_server
@@ -165,6 +174,11 @@ def _serve(config: FrontendConfig, pipe: Connection, status_sender: Connection) 
         routes,
         partial(runners[0], options=options) if runners and options is not None else None,
     )
+    senders = [
+        part.send_records(options, gateway.hub.recorder, records)
+        for part in parts
+        if part.send_records is not None and options is not None
+    ]
     gateway.start()
     status_sender.send(OPEN)
     try:
@@ -185,6 +199,9 @@ def _serve(config: FrontendConfig, pipe: Connection, status_sender: Connection) 
         view.stop()
     finally:
         gateway.stop()
+        for close in senders:
+            if close is not None:
+                close()
         close_server(gateway.viser)
         # Let Python collect reference cycles when it ends.
         gc.unfreeze()

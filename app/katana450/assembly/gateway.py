@@ -149,6 +149,7 @@ class Gateway:
 
     def attach(self, arm: ArmHandle) -> None:
         """Let clients drive ``arm`` from now on."""
+        arm.listen(self.hub.recorder.outcomes)
         self.hub.gate.arm = arm
 
     def announce(self, why: str) -> None:

@@ -1,14 +1,45 @@
-"""Log lines that clients cannot forge: their texts can neither begin a line nor colour one."""
+"""Log lines that clients can neither forge nor multiply.
+
+Their texts can neither begin a line nor colour one, and a flood of events makes few lines.
+"""
 
 from __future__ import annotations
 
 import logging
 import sys
+import time
 
 FORMAT = "%(asctime)s %(levelname)s %(message)s"
 
 CONTINUED = "    | "
 """Begins each further line of an entry, as in a traceback."""
+
+BURST, RATE = 20.0, 0.5
+"""Entries with the same text, apart from its values, in a burst and per second afterwards."""
+
+MAX_TEXTS = 512
+"""Maximum number of texts whose entries are counted."""
+
+
+class RepetitionFilter(logging.Filter):
+    """Drops entries of a flood. The next entry of that text states how many were dropped."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._left: dict[tuple[str, str], tuple[float, float, int]] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether ``record`` is printed, and set its ``dropped`` entries before it."""
+        key = (record.name, str(record.msg))
+        t = time.monotonic()
+        left, before, dropped = self._left.pop(key, (BURST, t, 0))
+        left = min(BURST, left + RATE * (t - before))
+        printed = left >= 1.0
+        record.dropped = dropped if printed else 0
+        self._left[key] = (left - 1.0, t, 0) if printed else (left, t, dropped + 1)
+        while len(self._left) > MAX_TEXTS:
+            self._left.pop(next(iter(self._left)))
+        return printed
 
 
 def printable(text: str) -> str:
@@ -29,7 +60,9 @@ class LineFormatter(logging.Formatter):
 
     def formatMessage(self, record: logging.LogRecord) -> str:
         """Return the message as one line."""
-        record.message = printable(record.message)
+        dropped = getattr(record, "dropped", 0)
+        more = f" (and {dropped} more such lines before)" if dropped else ""
+        record.message = printable(record.message) + more
         return super().formatMessage(record)
 
     def format(self, record: logging.LogRecord) -> str:
@@ -42,5 +75,6 @@ def start_log() -> None:
     """Log errors, warnings and changes of the driver to standard error."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(LineFormatter())
+    handler.addFilter(RepetitionFilter())
     logging.basicConfig(handlers=[handler])
     logging.getLogger("katana450").setLevel(logging.INFO)

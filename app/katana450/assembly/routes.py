@@ -23,11 +23,12 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub, actor_of
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import MutedError
+from katana450.server.service.recorder import ACCEPTED, REFUSED, stranger
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web import control_socket, security, static_files
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.admission import Admission
+from katana450.server.web.admission import Admission, address_of
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.bodies import TOO_MANY, body_of
 from katana450.server.web.control_socket import PAGE
@@ -93,7 +94,9 @@ def application(
             return Response(status_code=204)
         _check_admitted(authenticator, request, entry.token)
         response = Response(status_code=204)
-        if not authenticator.sign_in(entry.token, response):
+        found = authenticator.sign_in(entry.token, response)
+        _note_sign_in(hub, request, found)
+        if found is None:
             # A valid link is accepted even while others guess.
             if entry.token and not bad_links.take(hub.clock()):
                 raise HTTPException(429, "Too many attempts. Wait a moment.")
@@ -150,10 +153,20 @@ def _check_admitted(authenticator: Authenticator, request: Request, token: str) 
         raise HTTPException(403, why)
 
 
+def _note_sign_in(hub: Hub, request: Request, found: Identity | None) -> None:
+    address = address_of(request)
+    if found is None:
+        why = "The link is invalid or has expired."
+        hub.recorder.note("sign-in", stranger(address), outcome=REFUSED, why=why)
+    else:
+        actor = actor_of(replace(found, address=address), CommandChannel.PAGE)
+        hub.recorder.note("sign-in", actor, outcome=ACCEPTED)
+
+
 def _signed_in(
     authenticator: Authenticator, request: Request, *, stopping: bool = False
 ) -> Identity:
     identity = authenticator.identity(request.cookies, stopping=stopping)
     if identity is None:
         raise HTTPException(401, "Sign in at the start page first.")
-    return identity
+    return replace(identity, address=address_of(request))

@@ -18,6 +18,7 @@ from katana450.cli.output import say
 from katana450.extension import serve_extensions
 from katana450.platform_support import stop_signals
 from katana450.resources import URDF_PATH
+from katana450.server.service.server_log import ServerLog
 from katana450.server.web.listen import LOOPBACK, listen
 from katana450.settings import Settings
 
@@ -79,20 +80,16 @@ def serve(
     # Read first: the front end gets this scene each time it is started.
     robot, scene = _with_scene(settings, urdf, tool, options)
     stopping = threading.Event()
-
-    def stop(_signal: int, _frame: FrameType | None) -> None:
-        stopping.set()
-
-    for number in stop_signals():
-        signal.signal(number, stop)
+    _set_on_signals(stopping)
     # Held by this process, so that the port stays taken while the front end is started again.
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
 
+    event_log = _server_log(options, listening.getsockname()[1])
     meshes = () if scene is None else scene.meshes
     config = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
-    front, arm = FrontendProcess(config), None
+    front, arm = FrontendProcess(config, event_log), None
     try:
         # Importing the libraries that read the robot takes most of a second. The front end starts
         # meanwhile.
@@ -109,6 +106,8 @@ def serve(
         front.wait_for(READY)
         if lines is not None:
             say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
+        for line in event_log.description:
+            say(line)
         say(f"katana450 is ready: {url} (Ctrl-C stops)")
         early_ends, started = 0, time.monotonic()
         # A signal that another thread receives does not wake this one from its wait.
@@ -122,10 +121,11 @@ def serve(
                 "The page's server ended with status %s and is started again; the arm holds.",
                 front.exit_code,
             )
+            event_log.restart("front end", front.exit_code)
             early_ends = 0 if time.monotonic() - started > STABLE_SECONDS else early_ends + 1
             stopping.wait(RESTART_DELAYS[min(early_ends, len(RESTART_DELAYS) - 1)])
             front.stop()
-            front, started = FrontendProcess(config), time.monotonic()
+            front, started = FrontendProcess(config, event_log), time.monotonic()
             arm.attach(front.pipe)
         if not stopping.is_set():
             log.critical("The control loop has ended, so the server ends too. Start it again.")
@@ -137,6 +137,7 @@ def serve(
         if arm is not None:
             arm.join()
         listening.close()
+        event_log.close(requested=stopping.is_set())
     return 0 if stopping.is_set() else 1
 
 
@@ -162,6 +163,26 @@ def _with_scene(
     for note in () if scene is None else scene.notes:
         say(f"katana450: {note}")
     return (found_robots[0] if found_robots else None), scene
+
+
+def _set_on_signals(stopping: threading.Event) -> None:
+    """Set ``stopping`` when a signal asks this process to end."""
+
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        stopping.set()
+
+    for number in stop_signals():
+        signal.signal(number, stop)
+
+
+def _server_log(options: Namespace | None, port: int) -> ServerLog:
+    """Return the event log that an extension provides, or none."""
+    if options is not None:
+        for part in serve_extensions():
+            found = None if part.server_log is None else part.server_log(options, port)
+            if found is not None:
+                return found
+    return ServerLog()
 
 
 def _address(settings: Settings, port: int) -> str:

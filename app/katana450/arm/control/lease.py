@@ -7,7 +7,7 @@ and changes nothing. Time is an argument, in seconds on any monotonic clock.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Self
 
@@ -50,11 +50,15 @@ class Person:
         key: identity, unique for each page; not shown to people.
         name: display name.
         role: the rights.
+        link: number of the access link, for the event log; empty without one.
+        address: network address, for the event log; empty if it is unknown.
     """
 
     key: str
     name: str
     role: Role
+    link: str = field(default="", compare=False)
+    address: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

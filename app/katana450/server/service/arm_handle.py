@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
 from katana450.arm.control import commands as cmd
@@ -19,6 +20,7 @@ from katana450.arm.robot.weight import loads_of
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import CommandSink
+from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import InputError
@@ -127,6 +129,10 @@ class ArmHandle:
     def outcome(self, ticket: int) -> Future[Outcome]:
         """Return the outcome of the command of ``ticket``, once the arm's process reports it."""
         return self._state_publisher.outcomes.of(ticket)
+
+    def listen(self, listener: Callable[[Sequence[TicketOutcome]], None]) -> None:
+        """Call ``listener`` with all outcomes from now on, in the thread of the link."""
+        self._state_publisher.outcomes.listener = listener
 
     @property
     def state(self) -> State:

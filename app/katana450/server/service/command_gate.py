@@ -12,8 +12,9 @@ from typing import NamedTuple
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Lease, Person
-from katana450.errors import InputError, LeaseError
+from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import StopRecord
 
 log = logging.getLogger(__name__)
@@ -49,6 +50,8 @@ class CommandGate:
         """Number of stops and of losses of the lease."""
         self.on_stop: Callable[[], None] = lambda: None
         """Callback at each stop, before the arm gets it."""
+        self.recorder = Recorder()
+        """Notes commands, stops and changes of the lease for the event log."""
         self._jogged = -cmd.JOG_TIME
 
     def submit(self, command: cmd.Command, actor: Actor) -> int:
@@ -61,21 +64,30 @@ class CommandGate:
         with self._lock:
             if isinstance(command, cmd.Stop):
                 return self._stop(StopRecord(actor.name, f"{actor.name} pressed STOP."), actor)
-            if not all(each.traits.while_stopped for each in command.parts):
-                self.check_runs()
-            if actor.channel is CommandChannel.SERVER and not command.traits.protective:
-                raise LeaseError("The server itself may not move the arm.")
-            granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
-            clears = isinstance(command, cmd.ClearStop)
-            if not clears:
-                # Without an arm only a stop can be cleared.
-                self.present()
-            ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
-            if clears:
+            try:
+                granted = self._checked(command, actor)
+                ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
+            except KatanaError as error:
+                self.recorder.refuse(command, actor, error)
+                raise
+            if isinstance(command, cmd.ClearStop):
                 self.stopped = None
             elif isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
+            self.recorder.command(command, granted, ticket)
             return ticket
+
+    def _checked(self, command: cmd.Command, actor: Actor) -> Actor:
+        """Return ``actor`` with the grounds for ``command``. Raises LeaseError without any."""
+        if not all(each.traits.while_stopped for each in command.parts):
+            self.check_runs()
+        if actor.channel is CommandChannel.SERVER and not command.traits.protective:
+            raise LeaseError("The server itself may not move the arm.")
+        granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
+        if not isinstance(command, cmd.ClearStop):
+            # Without an arm only a stop can be cleared.
+            self.present()
+        return granted
 
     def claim(self, actor: Actor, *, pacing: bool = False) -> Actor:
         """Return ``actor`` with the grounds on which it may command now; send no command.
@@ -84,8 +96,12 @@ class CommandGate:
         pauses, resumes or slows down. Raises, and acquires a free lease, as ``submit`` does.
         """
         with self._lock:
-            self.check_runs()
-            return self._granted(actor, pacing=pacing)
+            try:
+                self.check_runs()
+                return self._granted(actor, pacing=pacing)
+            except LeaseError as error:
+                self.recorder.refuse("gesture", actor, error)
+                raise
 
     def check_runs(self) -> ArmInterface:
         """Return the arm. Raises LeaseError while it is missing or stopped."""
@@ -117,10 +133,12 @@ class CommandGate:
 
     # Lease
 
-    def acquire(self, person: Person) -> None:
-        """Acquire the free lease for ``person``. Raises LeaseError if another person holds it."""
+    def acquire(self, actor: Actor) -> None:
+        """Acquire the free lease for ``actor``. Raises LeaseError if another person holds it."""
         with self._lock:
-            self.lease = self.lease.acquire(person, self._clock())
+            before = self.lease
+            self.lease = before.acquire(actor.person, self._clock())
+            self.recorder.lease(before, self.lease, actor)
 
     def change(self, event: Callable[[Lease, float], Lease], by: Actor = SERVER) -> None:
         """Apply ``event`` to the lease at the present time. A change of holder holds the arm.
@@ -136,6 +154,7 @@ class CommandGate:
                     with suppress(InputError):
                         grounds = Grounds.SERVER if by is SERVER else Grounds.LEASE
                         self.arm.deliver(cmd.Hold(), replace(by, grounds=grounds))
+            self.recorder.lease(self.lease, lease, by)
             self.lease = lease
 
     # Stop
@@ -158,7 +177,9 @@ class CommandGate:
                 sent = self.stopped.ticket
                 if not stopped and (sent is None or snapshot.ticket >= sent):
                     # The arm started after the stop, or an error undid the stop.
-                    self.stopped = self._requested(self.stopped, arm, SERVER)
+                    self.stopped = self._requested(
+                        self.stopped, arm, replace(SERVER, grounds=Grounds.SERVER)
+                    )
             elif stopped and arm.caught_up:
                 self.protect("The arm lost the connection to the server and stopped.")
 
@@ -171,6 +192,8 @@ class CommandGate:
     def _stop(self, stopped: StopRecord, actor: Actor) -> int:
         self._revoke()
         self.on_stop()
+        actor = replace(actor, grounds=Grounds.SERVER if actor is SERVER else Grounds.SAFETY)
+        self.recorder.stop(stopped.why, actor, first=self.stopped is None)
         if self.stopped is None:
             self.stopped = stopped
             log.warning("Stopped: %s", stopped.why)
@@ -181,8 +204,7 @@ class CommandGate:
 
     @staticmethod
     def _requested(stopped: StopRecord, arm: ArmInterface, actor: Actor) -> StopRecord:
-        grounds = Grounds.SERVER if actor is SERVER else Grounds.SAFETY
-        return stopped.requested(arm.deliver(cmd.Stop(), replace(actor, grounds=grounds)))
+        return stopped.requested(arm.deliver(cmd.Stop(), actor))
 
     def _revoke(self) -> None:
         """Void every gesture received so far."""
@@ -199,6 +221,6 @@ class CommandGate:
             return actor if first else replace(actor, grounds=Grounds.LEASE)
         if pacing and self.program == (holder, actor.key):
             return replace(actor, grounds=Grounds.PROGRAM_OWNER)
-        self.acquire(actor.person)
+        self.acquire(actor)
         log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
         return replace(actor, grounds=Grounds.FREE_LEASE)

@@ -11,13 +11,13 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.lease import Role
 from katana450.arm.control.state import Verdict
-from katana450.errors import LeaseError
+from katana450.errors import KatanaError, LeaseError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
-from katana450.server.service.budget import Budget
+from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub, Window, session_of
 from katana450.server.service.interfaces import ArmInterface
@@ -73,8 +73,13 @@ class Dispatcher:
         self._check_muted(window, request)
         admin = request.traits.admin and window.person.role is Role.ADMIN
         free = request.traits.free or admin or (driver and not question)
-        with nullcontext() if free else budget.charged(driver, question=question):
-            return msgspec.structs.replace(self._execute(window, request), id=request.id)
+        try:
+            with nullcontext() if free else budget.charged(driver, question=question):
+                return msgspec.structs.replace(self._execute(window, request), id=request.id)
+        except KatanaError as error:
+            if not question or isinstance(error, BusyError):
+                self._hub.recorder.refuse(request, window.actor, error)
+            raise
 
     def _check_muted(self, window: Window, request: requests.Request) -> None:
         """Raise MutedError if ``request`` does not count. ``Hub.stop`` counts the STOPs."""

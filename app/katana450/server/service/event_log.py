@@ -59,15 +59,17 @@ class EventLog:
         # Entries have times of the loop's monotonic clock.
         self._epoch = time.time() - time.perf_counter()
 
-    def follow(self, event_log: Sequence[LogEntry]) -> None:
-        """Add the new entries of ``event_log``."""
-        for entry in _newer(event_log, self._seen):
+    def follow(self, event_log: Sequence[LogEntry]) -> list[LogEntry]:
+        """Add the new entries of ``event_log``, and return them."""
+        newer = _newer(event_log, self._seen)
+        for entry in newer:
             when = datetime.fromtimestamp(self._epoch + entry.t, UTC)
             self._lines.append(LogLine(entry, when))
             if entry.began:
                 log.info("%s%s", _credit(entry), finding_text(entry.finding))
         if event_log:
             self._seen = event_log[-1]
+        return newer
 
     @property
     def lines(self) -> tuple[LogLine, ...]:

@@ -22,6 +22,7 @@ from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
 from katana450.server.service.people import People
+from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_state import Presses, StopRecord
@@ -104,6 +105,11 @@ class Hub:
         return self.gate.arm
 
     @property
+    def recorder(self) -> Recorder:
+        """Notes events for the event log."""
+        return self.gate.recorder
+
+    @property
     def lease(self) -> Lease:
         """The lease, which names the driver."""
         return self.gate.lease
@@ -132,6 +138,7 @@ class Hub:
         person, number = self._known(key, identity)
         window = Window(person, number, notify, heartbeat or LastHeartbeat(self.clock), channel)
         self._windows[key] = window
+        self._note_presence("join", window)
         self.heartbeat(window)
         return window
 
@@ -144,6 +151,7 @@ class Hub:
         if self._windows.get(person.key) is not window:
             return
         del self._windows[person.key]
+        self._note_presence("leave", window)
         self.gate.change(lambda lease, _: lease.leave(person))
         if not for_good:
             return
@@ -153,6 +161,11 @@ class Hub:
             if self.stopped is None and self.gate.moves():
                 self.gate.protect(f"{person.name} left while the arm moved.")
             self.release_lease(window)
+
+    def _note_presence(self, kind: str, window: Window) -> None:
+        # A program on the server is noted where it begins and ends.
+        if window.channel is not CommandChannel.PROGRAM:
+            self.recorder.note(kind, window.actor, {"number": window.number})
 
     def present(self) -> ArmInterface:
         """Return the arm. Raises LeaseError until it is ready."""
@@ -235,7 +248,7 @@ class Hub:
 
     def acquire(self, window: Window) -> None:
         """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
-        self.gate.acquire(window.person)
+        self.gate.acquire(window.actor)
 
     def take(self, window: Window) -> None:
         """Take the lease from its holder for ``window``. Raises LeaseError if not allowed."""
@@ -247,11 +260,11 @@ class Hub:
 
     def request(self, window: Window) -> None:
         """Request the lease from its holder for ``window``. Raises LeaseError."""
-        self.gate.change(lambda lease, _: lease.request(window.person))
+        self.gate.change(lambda lease, _: lease.request(window.person), window.actor)
 
     def withdraw(self, window: Window) -> None:
         """Withdraw the request of ``window`` for the lease."""
-        self.gate.change(lambda lease, _: lease.withdraw(window.person))
+        self.gate.change(lambda lease, _: lease.withdraw(window.person), window.actor)
 
     def taken_by(self, window: Window) -> str | None:
         """Return the name of the person who took the lease from ``window`` and still holds it."""
@@ -275,7 +288,9 @@ class Hub:
     def decline(self, window: Window, number: int) -> None:
         """Decline the request of the window of ``number`` for the lease, and notify it."""
         requester = self._numbered(number)
-        self.gate.change(lambda lease, _: lease.decline(self.giver(window), requester.person))
+        self.gate.change(
+            lambda lease, _: lease.decline(self.giver(window), requester.person), window.actor
+        )
         requester.notify({"is": "refused", "why": f"{window.person.name} declined your request."})
 
     def giver(self, window: Window) -> Person:
@@ -311,7 +326,8 @@ class Hub:
             if not silent:
                 arm.heartbeat()
             self._watch(arm)
-            self.event_log.follow(arm.event_log)
+            for entry in self.event_log.follow(arm.event_log):
+                self.recorder.finding(entry)
             self.gate.reconcile()
             self.runner.tick()
 
@@ -349,6 +365,8 @@ class Hub:
     def _known(self, key: str, identity: Identity) -> tuple[Person, int]:
         """Return person and number of the page of ``key``; a new page gets new ones."""
         known = self._remembered.pop(key, None) or self._new_person(key, identity)
+        # A page that returns may have another address.
+        known = replace(known[0], link=identity.link, address=identity.address), known[1]
         self._remembered[key] = known
         while len(self._remembered) > REMEMBERED:
             self._remembered.pop(next(iter(self._remembered)))
@@ -361,13 +379,12 @@ class Hub:
         known = [person for person, _ in self._remembered.values()]
         if any(person.name == name for person in known):
             name = f"{name} ({number})"
-        return Person(key, name, identity.role), number
+        return identity.person(key, name), number
 
 
 def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
     """Return ``identity`` as the actor of a command, without a window."""
-    person = Person(identity.session, identity.name or "Somebody", identity.role)
-    return Actor(person, channel)
+    return Actor(identity.person(identity.session, identity.name or "Somebody"), channel)
 
 
 def key_of(identity: Identity, page: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from katana450.arm.control.lease import Role
+from katana450.arm.control.lease import Person, Role
 
 
 @dataclass(frozen=True)
@@ -15,12 +15,20 @@ class Identity:
         session: Text that identifies the browser, the program or the access link.
         name: Name of the access link or of a program; None for a browser without a link.
         role: Role of the client.
-        link: Name of the access link, also of a program with a name of its own; empty without one.
+        link: Number of the access link; empty without one.
+        link_name: Name of the link, also of a program with a name of its own; empty without one.
         muted: Interval [s] in which one STOP counts; None unless the access file has a mute.
+        address: Network address of the client; empty if it is unknown.
     """
 
     session: str
     name: str | None
     role: Role
     link: str = ""
+    link_name: str = ""
     muted: float | None = None
+    address: str = ""
+
+    def person(self, key: str, name: str) -> Person:
+        """Return the client as the participant of ``key`` that is shown as ``name``."""
+        return Person(key, name, self.role, self.link, self.address)

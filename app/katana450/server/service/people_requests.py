@@ -127,8 +127,8 @@ class PeopleRequests:
 
     def _name(self, identity: Identity) -> str:
         """Return the name of the link; without links, of the first window."""
-        if identity.link:
-            return identity.link
+        if identity.link_name:
+            return identity.link_name
         for each in self._people.connections.get(identity.session, ()):
             window = self._hub.window(each.key)
             if window is not None:

@@ -55,6 +55,11 @@ class GestureGate(Protocol):
         """Submit ``command`` and return its ticket. Raises LeaseError and InputError."""
         ...
 
+    @property
+    def log_problem(self) -> str:
+        """Why events are not recorded, as a sentence; empty while they are."""
+        ...
+
     def is_current(self, actor: Actor, /) -> bool:
         """Return False if a stop or a loss of the lease has happened since ``actor`` began."""
         ...

@@ -62,7 +62,7 @@ class MachinePanel:
         with gui.add_folder("Show", expand_by_default=False):
             add_themes(gui)
         with gui.add_folder("Why", expand_by_default=False):
-            self._why = EventList(gui)
+            self._why = EventList(gui, gestures)
 
     def follow(
         self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool

@@ -98,7 +98,7 @@ class Panel:
         with self._gui.add_folder("Show", expand_by_default=False):
             add_shows(self._gui, shows)
         with self._gui.add_folder("Why", expand_by_default=False):
-            self._why = EventList(self._gui)
+            self._why = EventList(self._gui, gestures)
         # At the end of the panel, because the element takes an empty line.
         self._gui.add_html(readout.style())
 

@@ -207,22 +207,24 @@ class Authenticator:
             with suppress(asyncio.CancelledError):
                 await task
 
-    def sign_in(self, token: str, response: Response) -> bool:
-        """Set the cookie of the bearer of ``token``; return whether the token is accepted."""
+    def sign_in(self, token: str, response: Response) -> Identity | None:
+        """Set the cookie of the bearer of ``token``; return None if the token is not accepted."""
         max_age = None
         if self._access is None:
             value = secrets.token_urlsafe(16)
+            found: Identity | None = Identity(value, None, Role.ADMIN)
         else:
             known = self._access.check(token, time.time())
             if known is None:
-                return False
+                return None
+            found = _of_link(*known)
             max_age = int(known[1].expires - time.time())
             value = self._access.session(known[0])
         response.set_cookie(
             self._cookie, value, max_age, secure=self._secure, httponly=True, samesite="strict"
         )
-        return True
+        return found
 
 
 def _of_link(number: str, grant: Grant) -> Identity:
-    return Identity(number, grant.name, grant.role, grant.name, grant.muted)
+    return Identity(number, grant.name, grant.role, number, grant.name, grant.muted)

@@ -160,6 +160,7 @@ class Channel(ABC):
                 request = self.hub.requests.decoded(text)
             except InputError as error:
                 log.warning("Invalid request from %s: %s", window.person.name, error)
+                self.hub.recorder.refuse("invalid", window.actor, error)
                 if not self._bad.take(self.hub.clock()):
                     await self._disconnect(BAD_REQUEST_CLOSE_CODE, "Too many invalid requests.")
                     return
@@ -168,6 +169,7 @@ class Channel(ABC):
             # STOP is exempt from the rate limit.
             if not self._often.take(self.hub.clock()) and not request.traits.safety:
                 log.warning("%s sends too many requests: disconnected.", window.person.name)
+                self.hub.recorder.refuse("any", window.actor, InputError("Too many requests."))
                 await self._disconnect(LIMIT_CLOSE_CODE, "Too many requests.")
                 return
             try:

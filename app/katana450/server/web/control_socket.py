@@ -6,6 +6,7 @@ States are sent only on request, a few at a time, so a slow connection has no ba
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 from starlette.websockets import WebSocket
@@ -83,6 +84,7 @@ async def serve(
         return
     line = WebSocketJsonChannel(socket)
     control = ControlSocket(hub, line, budgets.of(identity.session))
+    identity = replace(identity, address=address_of(socket))
     control.window = window = hub.join(identity, page, control.notify, line.arrival)
     connection = Connection(
         identity, ConnectionKind.PAGE, address_of(socket), key=window.person.key
@@ -92,6 +94,7 @@ async def serve(
             lambda: authenticator.identity(socket.cookies), control.run(window), connection
         )
         if why is not None:
+            hub.recorder.note("revocation", window.actor, always=True, why=why)
             await line.close(SIGN_IN_CLOSE_CODE, why)
     finally:
         hub.leave(window)

@@ -7,6 +7,7 @@ import logging
 import math
 import re
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from starlette.exceptions import HTTPException
@@ -26,6 +27,7 @@ from katana450.server.service.hub import Hub, Window, actor_of
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import MutedError
 from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
 from katana450.server.web.authenticator import TOKEN_REQUIRED, Authenticator
@@ -138,7 +140,7 @@ class Api:
 
     async def _stop(self, request: Request) -> Response:
         found = self._identity(request, stopping=True)
-        self._hub.stop(actor_of(found, CommandChannel.API))
+        self._hub.stop(actor_of(found, CommandChannel.HTTP))
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:
@@ -164,6 +166,8 @@ class Api:
             return await _too_much(error, requests.id_of(body))
         except InputError as error:
             self._refused(request)
+            actor = actor_of(identity, CommandChannel.HTTP)
+            self._hub.recorder.refuse("invalid", actor, error)
             refused = answers.Refused(why=str(error), id=requests.id_of(body))
             return as_json(refused, NOT_UNDERSTOOD)
         except LeaseError as error:
@@ -187,8 +191,14 @@ class Api:
         )
         if found is None:
             why = self._authenticator.refusal(request.cookies, headers.get("authorization", ""))
+            self._hub.recorder.note(
+                "sign-in",
+                stranger(address_of(request)),
+                outcome=REFUSED,
+                why=why or "No valid token.",
+            )
             raise HTTPException(401, TOKEN_REQUIRED) if why is None else HTTPException(403, why)
-        return found
+        return replace(found, address=address_of(request))
 
     def _window(self, request: Request, identity: Identity) -> Window:
         """Return the window of the program; it closes after ``LEASE_TIMEOUT`` without a request."""
@@ -196,9 +206,9 @@ class Api:
         known = self._posting.pop(key, None)
         if known is None:
             session, _, page = key.partition("/")
-            identity = Identity(session, identity.name, identity.role)
+            identity = replace(identity, session=session)
             window = self._hub.join(
-                identity, page, lambda _notice: None, channel=CommandChannel.API
+                identity, page, lambda _notice: None, channel=CommandChannel.HTTP
             )
             assert window.person.key == key
             kind, address = ConnectionKind.POSTS, address_of(request)

@@ -9,6 +9,7 @@ import secrets
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, nullcontext, suppress
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import msgspec
@@ -26,6 +27,7 @@ from katana450.server.service.hub import Hub, Window
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import address_of, identity, refuse, reserved
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED, Authenticator
@@ -61,6 +63,21 @@ LINES, LINES_EACH, RESERVED_LINES = 16, 8, 2
 driver and for each admin."""
 
 BUDGET_EXHAUSTED = "Your programs together send too many requests. Wait, and send fewer requests."
+
+
+class ProgramClient(NamedTuple):
+    """The other side of a connection. ``why``: why it is refused unless authorised."""
+
+    identity: Callable[[], Identity | None]
+    channel: CommandChannel
+    address: str
+    why: str
+
+    @property
+    def kind(self) -> ConnectionKind:
+        """Kind of the connection in the list of people."""
+        tcp = self.channel is CommandChannel.TCP
+        return ConnectionKind.LINES if tcp else ConnectionKind.PROGRAM
 
 
 class ProgramChannel(Channel):
@@ -146,11 +163,11 @@ async def serve_socket(
         await refuse(socket, BUDGET_EXHAUSTED)
         return
     await socket.accept()
-    line, kind = WebSocketJsonChannel(socket), ConnectionKind.PROGRAM
+    channel = WebSocketJsonChannel(socket)
     token = socket.headers.get("authorization", "")
     why = authenticator.refusal(socket.cookies, token) or TOKEN_REQUIRED
-    client = _Client(current_identity, kind, address_of(socket), why)
-    await _serve(hub, authenticator, budget, line, client)
+    client = ProgramClient(current_identity, CommandChannel.WEBSOCKET, address_of(socket), why)
+    await _serve(hub, authenticator, budget, channel, client)
 
 
 class LineServer:
@@ -223,7 +240,7 @@ class LineServer:
         with self._places.taken(session, places) as free, kept:
             if free:
                 why = self._authenticator.refusal({}, f"Bearer {hello.token}") or TOKEN_REQUIRED
-                program = _Client(current_identity, ConnectionKind.LINES, client[0], why)
+                program = ProgramClient(current_identity, CommandChannel.TCP, client[0], why)
                 await _serve(self._hub, self._authenticator, budget, line, program)
             else:
                 why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
@@ -244,25 +261,19 @@ class LineServer:
         return None
 
 
-class _Client(NamedTuple):
-    """The other side of a connection. ``why``: why it is refused unless authorised."""
-
-    identity: Callable[[], Identity | None]
-    kind: ConnectionKind
-    address: str
-    why: str
-
-
 async def _serve(
-    hub: Hub, authenticator: Authenticator, budget: Budget, line: JsonChannel, client: _Client
+    hub: Hub, authenticator: Authenticator, budget: Budget, line: JsonChannel, client: ProgramClient
 ) -> None:
     found = client.identity()
     if found is None:
+        refused = replace(stranger(client.address), channel=client.channel)
+        hub.recorder.note("sign-in", refused, outcome=REFUSED, why=client.why)
         await line.close(SIGN_IN_CLOSE_CODE, client.why)
         return
     program = ProgramChannel(hub, line, budget)
     page = secrets.token_hex(16)
-    window = hub.join(found, page, program.notify, line.arrival, CommandChannel.API)
+    found = replace(found, address=client.address)
+    window = hub.join(found, page, program.notify, line.arrival, client.channel)
     program.greet(window)
     connection = Connection(found, client.kind, client.address, key=window.person.key)
     try:
@@ -270,6 +281,7 @@ async def _serve(
             client.identity, program.run(window), connection
         )
         if why is not None:
+            hub.recorder.note("revocation", window.actor, always=True, why=why)
             await line.close(SIGN_IN_CLOSE_CODE, why)
     finally:
         hub.leave(window, for_good=True)

@@ -5,12 +5,20 @@ from __future__ import annotations
 import logging
 from datetime import UTC, datetime
 
-from katana450.arm.control.lease import Person
+from katana450.arm.control.lease import Person, Role
 from katana450.errors import LeaseError
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub, Window, session_of
+from katana450.server.service.identity import Identity
 
 log = logging.getLogger(__name__)
+
+
+def program_identity(name: str, owner: Person) -> Identity:
+    """Return the identity as which the program ``name`` of ``owner`` joins the hub."""
+    return Identity(
+        f"program of {owner.key}", name, Role.OPERATOR, link=owner.link, address=owner.address
+    )
 
 
 class AlwaysAlive(LastHeartbeat):

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State, Verdict
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import requests, runner
@@ -20,14 +20,17 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
-from katana450.extensions.programs.server.program_owner import AlwaysAlive, ProgramOwner
+from katana450.extensions.programs.server.program_owner import (
+    AlwaysAlive,
+    ProgramOwner,
+    program_identity,
+)
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.hub import Hub, Window
-from katana450.server.service.identity import Identity
 from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
@@ -165,6 +168,7 @@ class ProgramRunner(Runner):
         if not self.running or self._run is None:
             raise LeaseError("No program is running.")
         self._owner.check_may_steer(window.person)
+        self.hub.recorder.note("program", window.actor, {"order": order.value})
         match order:
             case ProgramOrder.RUN | ProgramOrder.RESUME:
                 return self._send(cmd.Resume())
@@ -319,7 +323,7 @@ class ProgramRunner(Runner):
             return None
         planning.refused, planning.note = None, ""
         program = planning.program
-        identity = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
+        identity = program_identity(program.name, window.person)
         alive = AlwaysAlive(hub.clock)
         joined = hub.join(identity, "program", lambda _notice: None, alive, CommandChannel.PROGRAM)
         try:
@@ -343,6 +347,8 @@ class ProgramRunner(Runner):
         self._run = Run(began, single=order is ProgramOrder.STEP)
         how = "runs unattended" if unattended else "runs"
         log.info("%s %s the program %s.", window.person.name, how, program.name)
+        what = {"program": program.name, "order": order.value, "unattended": unattended}
+        hub.recorder.note("program", window.actor, what)
         return ticket
 
     def _send(self, *commands: cmd.Command) -> int | None:
@@ -384,6 +390,7 @@ class ProgramRunner(Runner):
             self.hub.release_lease(joined)
         self.hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
+        self.hub.recorder.note("program", joined.actor, {"ended": phase.value}, why=why)
 
     def _supersede(self, window: Window) -> None:
         """Cancel the planning of another program. Raises LeaseError if ``window`` may not."""

@@ -1,0 +1,54 @@
+"""The event log of one server, written by the process that starts the others and outlives them."""
+
+from __future__ import annotations
+
+import os
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from katana450.extensions.event_log.records import Record, record
+from katana450.extensions.event_log.writer import LogWriter
+from katana450.platform_support import state_folder
+from katana450.server.service.server_log import ServerLog
+
+CLOSE_TIMEOUT = 2.0
+"""[s] Time in which a slow disk may take the last records."""
+
+
+def default_folder(port: int) -> Path:
+    """Return the folder of the event log of the server on ``port``."""
+    return state_folder() / "katana450" / "events" / f"port-{port}"
+
+
+class DiskLog(ServerLog):
+    """The event log of this server in a folder."""
+
+    def __init__(self, folder: Path, port: int) -> None:
+        """Write to ``folder``, first the start of the server on ``port``."""
+        self._writer = LogWriter(folder)
+        self._writer.put(_by_server("start", {"port": port, "pid": os.getpid()}))
+
+    @property
+    def description(self) -> tuple[str, ...]:
+        """Folder and last record, as a line for the terminal."""
+        head = self._writer.head
+        last = f" (record {head.seq}, sha256 {head.hash})" if head.seq else ""
+        return (f"Event log: {self._writer.folder}{last}",)
+
+    def attach(self, pipe: Connection) -> None:
+        """Write the records that another process sends by ``pipe``."""
+        self._writer.attach(pipe)
+
+    def restart(self, process: str, status: int | None) -> None:
+        """Record that ``process`` ended with ``status``, and is started again."""
+        self._writer.put(_by_server("restart", {"process": process, "status": status}))
+
+    def close(self, *, requested: bool) -> None:
+        """Record the end of the server, and write what waits. ``requested``: by a signal."""
+        what = {"cause": "requested" if requested else "the control loop ended"}
+        self._writer.close(_by_server("end", what), CLOSE_TIMEOUT)
+
+
+def _by_server(kind: str, what: dict[str, Any]) -> Record:
+    return record(kind, what, who={"name": "the server", "channel": "server"})

@@ -1,0 +1,102 @@
+"""``katana450 log``: verify and show the event log of a server."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from katana450.assembly.log_lines import printable
+from katana450.errors import InputError
+from katana450.extensions.event_log.disk_log import default_folder
+from katana450.extensions.event_log.records import Record
+from katana450.extensions.event_log.verification import lines_of, verified
+
+MAX_SHOWN_FAULTS = 100
+"""Maximum number of faults that are printed one by one."""
+
+
+def log(options: Namespace) -> int:
+    """Run ``katana450 log`` and return the exit status: 1 for a log that was changed or cut."""
+    folder = options.folder or default_folder(options.port)
+    if options.folder is None and not folder.is_dir() and folder.parent.is_dir():
+        found = ", ".join(str(each) for each in sorted(folder.parent.iterdir()))
+        raise InputError(f"There is no event log in {folder}. Name one of: {found or 'none'}.")
+    return _verify(folder) if options.act == "verify" else _show(folder, options)
+
+
+def _verify(folder: Path) -> int:
+    report = verified(folder)
+    for text in (*report.notes, *report.faults[:MAX_SHOWN_FAULTS]):
+        print(printable(text))
+    if len(report.faults) > MAX_SHOWN_FAULTS:
+        print(f"... and {len(report.faults) - MAX_SHOWN_FAULTS} more.")
+    if report.first is not None and report.last is not None:
+        print(
+            f"{report.records} records in {report.files} files, numbers {report.first['seq']} to "
+            f"{report.head.seq}, {_text(report.first, 'time')} to {_text(report.last, 'time')}."
+        )
+        print(f"Last record: {report.head.seq}, sha256 {report.head.hash}")
+    if report.faults:
+        print(f"The log was changed or cut: {len(report.faults)} faults.")
+        return 1
+    print("The chain is intact.")
+    return 0
+
+
+def _show(folder: Path, options: Namespace) -> int:
+    status = 0
+    for line in lines_of(folder):
+        if line.record is None:
+            print(f"{line.place}: this is not a record.", file=sys.stderr)
+            status = 1
+        elif _matches(line.record, options):
+            print(_shown(line.record))
+    return status
+
+
+def _matches(record: Record, options: Namespace) -> bool:
+    if _text(record, "time") < options.since:
+        return False
+    if options.kind and record.get("kind") not in options.kind:
+        return False
+    if options.who is None:
+        return True
+    who = record.get("who")
+    values = who.values() if isinstance(who, dict) else ()
+    return any(options.who.casefold() in str(value).casefold() for value in values)
+
+
+def _shown(record: Record) -> str:
+    """Return ``record`` as one line without control characters."""
+    who, what = record.get("who"), record.get("what")
+    name, about = "", ""
+    if isinstance(who, dict):
+        name = str(who.get("name", ""))
+        rest = [str(value) for key, value in who.items() if key != "name"]
+        about = f" ({', '.join(rest)})" if rest else ""
+    content = _values(what) if isinstance(what, dict) else json.dumps(what) if what else ""
+    grounds = f"[{record['grounds']}]" if "grounds" in record else ""
+    outcome = ": ".join(str(record[key]) for key in ("outcome", "why") if key in record)
+    parts = (
+        str(record["seq"]).rjust(6),
+        _text(record, "time"),
+        f"{name}{about}",
+        _text(record, "kind"),
+        content,
+        grounds,
+        outcome,
+    )
+    return printable("  ".join(part for part in parts if part))
+
+
+def _values(what: Record) -> str:
+    return " ".join(
+        f"{key}={value if isinstance(value, str) else json.dumps(value)}"
+        for key, value in what.items()
+    )
+
+
+def _text(record: Record, key: str) -> str:
+    return str(record.get(key, ""))

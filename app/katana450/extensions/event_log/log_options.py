@@ -1,0 +1,62 @@
+"""Options of ``katana450 log``, separate from its work: reading them must load nothing heavy."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from datetime import datetime
+from pathlib import Path
+
+from katana450.settings import Settings
+
+AGO = re.compile(r"(\d+)\s*([smhd])")
+SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400}
+
+
+def add_log_options(parser: argparse.ArgumentParser) -> None:
+    """Add the subcommands verify and show to ``parser``."""
+    acts = parser.add_subparsers(dest="act", required=True, metavar="verify | show")
+    verify = acts.add_parser("verify", help="check that no record was changed or cut")
+    show = acts.add_parser("show", help="print records, the oldest first")
+    for each in (verify, show):
+        each.add_argument(
+            "folder",
+            type=Path,
+            nargs="?",
+            metavar="FOLDER",
+            help="folder of the log (default: that of the server on --port)",
+        )
+        each.add_argument("--port", type=int, default=Settings.port, help=argparse.SUPPRESS)
+    show.add_argument(
+        "--since",
+        type=_since,
+        default="",
+        metavar="TIME",
+        help="only records since then: 30m, 12h, 7d, or 2026-01-31T12:00 (UTC)",
+    )
+    show.add_argument(
+        "--who", metavar="TEXT", help="only records with this text in name, role, link or address"
+    )
+    show.add_argument(
+        "--kind",
+        action="append",
+        metavar="KIND",
+        help="only records of this kind, such as stop or lease; can be repeated",
+    )
+
+
+def _since(text: str) -> str:
+    """Return the time in ``text`` as records state it, in UTC."""
+    if not text:
+        return ""
+    if found := AGO.fullmatch(text.strip()):
+        ago = int(found[1]) * SECONDS[found[2]]
+        return time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(max(time.time() - ago, 0)))
+    try:
+        datetime.fromisoformat(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"a time such as 30m, 12h, 7d or 2026-01-31T12:00, not {text!r}"
+        ) from None
+    return text.replace(" ", "T")

@@ -1,0 +1,125 @@
+"""Notes of events for an event log: who did what, as the thread in which it happens notes it.
+
+Taking a note costs about a microsecond and never waits. The extension ``event_log`` makes records
+of the notes, in a thread of its own, and writes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from queue import SimpleQueue
+from typing import Any, NamedTuple
+
+from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.event_log import LogEntry
+from katana450.arm.control.lease import Lease, Person, Role
+from katana450.arm.control.state import Verdict
+from katana450.arm.control.traits import BaseCommand
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.outcomes import TicketOutcome
+from katana450.errors import KatanaError
+
+MAX_WAITING = 4096
+"""Maximum number of notes that wait for their reader; more are counted and dropped."""
+
+REFUSED, ACCEPTED = Verdict.REFUSED.value, Verdict.ACCEPTED.value
+
+
+class Note(NamedTuple):
+    """An event.
+
+    Attributes:
+        t: time [s] on the clock of the states.
+        kind: kind of the record.
+        actor: the participant; None for the arm's own process.
+        what: a command, request, lease change, outcome or log entry, or a JSON value.
+        outcome: ``accepted`` or ``refused``, if known.
+        why: reason in words.
+        ticket: ticket of a command; 0 without one.
+        always: whether the record is written whatever the limits.
+    """
+
+    t: float
+    kind: str
+    actor: Actor | None = None
+    what: Any = None
+    outcome: str = ""
+    why: str = ""
+    ticket: int = 0
+    always: bool = False
+
+
+class LeaseChange(NamedTuple):
+    """The lease before and after an event."""
+
+    before: Lease
+    after: Lease
+
+
+class Recorder:
+    """Takes notes once it is ``enabled``. Every method may be called in any thread.
+
+    Attributes:
+        enabled: whether somebody reads the notes.
+        notes: the notes; None asks their reader to end.
+        lost: number of notes that were dropped, because too many waited.
+        problem: why records are not written, as a sentence; empty while they are.
+    """
+
+    def __init__(self) -> None:
+        self.enabled = False
+        self.notes: SimpleQueue[Note | None] = SimpleQueue()
+        self.lost = 0
+        self.problem = ""
+        self._now = MonotonicClock().now
+
+    def note(self, kind: str, actor: Actor | None, what: Any = None, **more: Any) -> None:
+        """Note an event of ``kind``. ``more``: further fields of ``Note``."""
+        if not self.enabled:
+            return
+        if self.notes.qsize() < MAX_WAITING:
+            self.notes.put(Note(self._now(), kind, actor, what, **more))
+        else:
+            self.lost += 1
+
+    def command(self, command: BaseCommand, actor: Actor, ticket: int) -> None:
+        """Note an accepted command."""
+        self.note("command", actor, command, outcome=ACCEPTED, ticket=ticket)
+
+    def refuse(self, what: Any, actor: Actor, error: KatanaError) -> None:
+        """Note that ``what``, a command or request or its name, was refused with ``error``.
+
+        An error that passes several callers is noted once.
+        """
+        if not error.noted:
+            error.noted = True
+            named = {"request": what} if isinstance(what, str) else what
+            self.note("refusal", actor, named, outcome=REFUSED, why=str(error))
+
+    def stop(self, why: str, actor: Actor, *, first: bool) -> None:
+        """Note a stop. ``first``: the arm was not stopped before."""
+        cause = "protection" if actor.channel is CommandChannel.SERVER else "pressed"
+        what = {"stop": cause} if first else {"stop": cause, "repeated": True}
+        self.note("stop", actor, what, why=why, outcome=ACCEPTED, always=first)
+
+    def lease(self, before: Lease, after: Lease, by: Actor) -> None:
+        """Note a change of the lease, if it is one of its holder or of the requests for it."""
+        if before.holder != after.holder or (
+            before.waiting is not after.waiting and before.waiting != after.waiting
+        ):
+            self.note("lease", by, LeaseChange(before, after))
+
+    def outcomes(self, outcomes: Iterable[TicketOutcome]) -> None:
+        """Note the outcomes of commands that were limited or refused."""
+        for ticket, outcome in outcomes:
+            if outcome.verdict is not Verdict.ACCEPTED:
+                self.note("outcome", None, outcome, ticket=ticket)
+
+    def finding(self, entry: LogEntry) -> None:
+        """Note that a finding of the arm began or ended."""
+        self.note("finding", entry.actor, entry)
+
+
+def stranger(address: str) -> Actor:
+    """Return an unknown client at ``address`` as the actor of a note."""
+    return Actor(Person("", "Somebody", Role.VIEWER, address=address), CommandChannel.HTTP)

@@ -1,0 +1,43 @@
+"""Event logs for the tests: written by the real writer, read as records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from katana450.extensions.event_log.folder import MAX_FILE_BYTES, MAX_FILES, log_files
+from katana450.extensions.event_log.records import Record, record
+from katana450.extensions.event_log.verification import lines_of
+from katana450.extensions.event_log.writer import LogWriter
+
+CLOSING = 20.0
+"""[s] Timeout of the writer's end."""
+
+
+def write(
+    folder: Path,
+    contents: list[Record],
+    max_file_bytes: int = MAX_FILE_BYTES,
+    max_files: int = MAX_FILES,
+) -> None:
+    """Write ``contents`` between a start and an end."""
+    writer = LogWriter(folder, max_file_bytes, max_files)
+    writer.put(record("start"))
+    for content in contents:
+        writer.put(content)
+    writer.close(record("end"), CLOSING)
+
+
+def numbered(count: int) -> list[Record]:
+    """Return ``count`` different records."""
+    return [record("command", {"command": "SetJoint", "value": n}) for n in range(count)]
+
+
+def records(folder: Path) -> list[Record]:
+    """Return all records of the log."""
+    found = [line.record for line in lines_of(folder)]
+    return [each for each in found if each is not None]
+
+
+def newest(folder: Path) -> Path:
+    """Return the newest file of the log."""
+    return log_files(folder)[-1]

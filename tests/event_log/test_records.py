@@ -1,0 +1,223 @@
+"""Test how notes become records: streams, outcomes, secrets, and floods."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor, CommandChannel, Grounds
+from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.outcome import refused
+from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
+from katana450.arm.control.traits import BaseCommand
+from katana450.client import connect
+from katana450.extensions.event_log.compact import MAX_TEXT, compact_command, compact_request
+from katana450.extensions.event_log.record_limits import LIMITS
+from katana450.extensions.event_log.record_maker import STREAM_GAP, RecordMaker
+from katana450.extensions.event_log.records import MAX_LINE_BYTES, Record, encoded
+from katana450.server.api import requests
+from katana450.server.service.recorder import MAX_WAITING, Note, Recorder
+from tests.browser.server import APP, AppServer
+from tests.event_log.logs import records
+
+ANNA = Actor(
+    Person("secret/page", "Anna", Role.OPERATOR, address="10.0.0.7"),
+    CommandChannel.PAGE,
+    grounds=Grounds.LEASE,
+)
+BERT = replace(ANNA, person=Person("other/page", "Bert", Role.VIEWER, address="10.0.0.8"))
+
+LIMITED = Outcome(Verdict.LIMITED, (Finding(Reason.AXIS_LIMIT, 1.0, 0),))
+
+
+def command(t: float, value: BaseCommand, ticket: int = 0, actor: Actor = ANNA) -> Note:
+    return Note(t, "command", actor, value, "accepted", ticket=ticket)
+
+
+def made(*notes: Note, end: float = 1000.0) -> list[Record]:
+    return RecordMaker().made(list(notes), end, closing=True)
+
+
+def what(found: list[Record]) -> list[tuple[str, str, object]]:
+    return [(each["kind"], each["what"]["command"], each["what"].get("count")) for each in found]
+
+
+def test_stream_makes_a_record_at_its_start_and_at_its_end() -> None:
+    notes = [command(n / 50, cmd.Servo(np.full(5, n / 10)), n + 1) for n in range(100)]
+    first, end = made(*notes)
+    assert first["what"]["q"] == [0.0] * 5
+    assert (end["kind"], end["what"]["count"]) == ("stream", 100)
+    assert end["what"]["seconds"] == pytest.approx(1.98)
+    assert end["what"]["first"]["q"] == [0.0] * 5
+    assert end["what"]["last"]["q"] == [9.9] * 5
+    assert (end["t"], end["grounds"]) == (1.98, "holds the lease")
+
+
+def test_single_command_of_a_stream_makes_one_record() -> None:
+    assert what(made(command(1.0, cmd.SetJoint(0, 0.5)))) == [("command", "SetJoint", None)]
+
+
+def test_pause_another_joint_and_another_participant_begin_new_streams() -> None:
+    later = 0.1 + STREAM_GAP * 1.01
+    found = made(
+        command(0.0, cmd.SetJoint(0, 0.1)),
+        command(0.1, cmd.SetJoint(0, 0.2)),
+        command(0.1, cmd.SetJoint(1, 0.2)),
+        command(later, cmd.SetJoint(0, 0.3)),
+        command(later, cmd.SetJoint(0, 0.4), actor=BERT),
+    )
+    assert what(found) == [
+        ("command", "SetJoint", None),
+        ("command", "SetJoint", None),
+        ("stream", "SetJoint", 2),
+        ("command", "SetJoint", None),
+        ("command", "SetJoint", None),
+    ]
+    assert [each["what"].get("axis") for each in found] == [1, 2, None, 1, 1]
+
+
+def test_streams_end_before_the_stop_that_ends_them() -> None:
+    jogs = [command(n / 10, cmd.Jog(np.array([0.1, 0, 0, 0, 0]))) for n in range(5)]
+    stop = Note(0.5, "stop", BERT, {"stop": "pressed"}, always=True)
+    found = made(*jogs, stop)
+    assert [each["kind"] for each in found] == ["command", "stream", "stop"]
+
+
+def test_released_key_ends_the_stream_of_jogs() -> None:
+    maker = RecordMaker()
+    jogs = [cmd.Jog(np.array([0.1, 0, 0, 0, 0])), cmd.Jog(np.zeros(5))]
+    found = maker.made([command(n / 10, each) for n, each in enumerate(jogs)], 0.1)
+    assert what(found) == [("command", "Jog", None), ("stream", "Jog", 2)]
+    assert maker.is_idle
+
+
+def test_long_stream_makes_records_on_the_way() -> None:
+    notes = [command(n / 2, cmd.Servo(np.zeros(5))) for n in range(300)]
+    ends = [each for each in made(*notes) if each["kind"] == "stream"]
+    assert [each["what"]["count"] for each in ends] == [121, 121, 58]
+
+
+def test_nudges_are_recorded_one_by_one() -> None:
+    found = made(*(command(n / 50, cmd.Nudge(2, 0.1 * n)) for n in range(5)))
+    assert [(each["what"]["axis"], each["what"]["by"]) for each in found] == [
+        (3, pytest.approx(0.1 * n)) for n in range(5)
+    ]
+
+
+@pytest.mark.parametrize("early", [False, True])
+def test_outcome_that_is_not_accepted_is_recorded(early: bool) -> None:
+    """The thread of the link may be quicker than the one that gave the command."""
+    notes = [
+        command(1.0, cmd.Nudge(0, 9.0), 7),
+        Note(1.01, "outcome", None, LIMITED, ticket=7),
+    ]
+    given, outcome = made(*(notes[::-1] if early else notes))
+    assert given["what"]["ticket"] == outcome["what"]["ticket"] == 7
+    assert (outcome["who"]["name"], outcome["outcome"]) == ("Anna", "limited")
+    assert "Axis 1" in outcome["why"]
+
+
+def test_outcomes_of_a_stream_are_counted() -> None:
+    notes: list[Note] = []
+    for n in range(10):
+        notes.append(command(n / 50, cmd.SetJoint(0, 9.0), n + 1))
+        notes.append(
+            Note(n / 50, "outcome", None, refused("No.") if n % 2 else LIMITED, ticket=n + 1)
+        )
+    first, outcome, end = made(*notes)
+    assert (first["kind"], outcome["kind"]) == ("command", "outcome")
+    assert (end["what"]["limited"], end["what"]["refused"], end["why"]) == (5, 5, "No.")
+
+
+def test_participant_is_described_without_its_key() -> None:
+    (found,) = made(command(1.0, cmd.Home()))
+    assert found["who"] == {
+        "name": "Anna",
+        "role": "operator",
+        "channel": "page",
+        "address": "10.0.0.7",
+    }
+    assert "secret" not in str(found)
+
+
+def test_values_are_bounded_and_without_secrets() -> None:
+    hello = compact_request(requests.Hello(name="x" * 40, token="secret"))
+    assert "secret" not in str(hello)
+    assert compact_command(cmd.SetTool("x\n" * 500_000))["name"].startswith("x\n" * (MAX_TEXT // 2))
+    batch = cmd.Batch(tuple(cmd.SetTool("x" * 1000) for _ in range(1000)))
+    person = replace(ANNA.person, name="A\n\u2028\x1b[31m\ud800" * 200_000)
+    (found,) = made(Note(1.0, "refusal", replace(ANNA, person=person), batch, why="y" * 1_000_000))
+    assert found["what"]["count"] == 1000
+    assert len(encoded(1, found, "0" * 64)) <= MAX_LINE_BYTES
+    assert compact_command(cmd.SetPose(np.eye(4)))["T"] == np.eye(4).ravel().tolist()
+
+
+def test_flood_of_one_participant_is_counted_and_leaves_room_for_others() -> None:
+    flood = [Note(n / 1000, "refusal", BERT, {"request": "Home"}) for n in range(20_000)]
+    drive = [command(n / 2, cmd.Nudge(0, 0.1)) for n in range(40)]
+    maker = RecordMaker()
+    found: list[Record] = []
+    for note in sorted((*flood, *drive), key=lambda note: note.t):
+        found += maker.made([note], note.t)
+    found += maker.made([], 1000.0, closing=True)
+    kinds = [each["kind"] for each in found]
+    assert kinds.count("command") == 40
+    assert kinds.count("refusal") <= LIMITS["refusal"].burst + 20.0 * LIMITS["refusal"].rate + 1
+    more = [each for each in found if each["kind"] == "more"]
+    assert len(more) <= 3
+    assert sum(each["what"]["count"] for each in more) + kinds.count("refusal") == 20_000
+    assert {each["who"]["name"] for each in more} == {"Bert"}
+    assert list(more[0]["what"]["of"]) == ["refusal Home"]
+
+
+def test_flood_of_many_strangers_is_counted() -> None:
+    people = [
+        replace(BERT, person=Person("", "Somebody", Role.VIEWER, address=f"10.0.{n % 250}.{n}"))
+        for n in range(5000)
+    ]
+    found = made(*(Note(1.0, "sign-in", each, outcome="refused") for each in people))
+    written = sum(each["kind"] == "sign-in" for each in found)
+    counted = sum(each["what"]["count"] for each in found if each["kind"] == "more")
+    assert written <= 4 * LIMITS["session"].burst
+    assert written + counted == 5000
+    assert len(found) < 1000
+
+
+def test_first_stop_is_recorded_whatever_came_before() -> None:
+    flood = [Note(1.0, "stop", BERT, {"stop": "pressed", "repeated": True}) for _ in range(1000)]
+    found = made(*flood, Note(1.0, "stop", BERT, {"stop": "pressed"}, always=True))
+    assert found[-2]["what"] == {"stop": "pressed"}
+    assert found[-1]["kind"] == "more"
+
+
+def test_notes_that_nobody_reads_do_not_pile_up() -> None:
+    recorder = Recorder()
+    recorder.command(cmd.Home(), ANNA, 1)
+    assert recorder.notes.empty()
+    recorder.enabled = True
+    for _ in range(MAX_WAITING + 10):
+        recorder.command(cmd.Home(), ANNA, 1)
+    assert (recorder.notes.qsize(), recorder.lost) == (MAX_WAITING, 10)
+
+
+def test_flood_of_stops_on_a_server_is_counted(tmp_path: Path) -> None:
+    with AppServer((*APP, "--log", str(tmp_path))) as server:
+        with connect(server.url, "Flood") as flood, connect(server.url, "Anna") as arm:
+            arm.ask(requests.Speed(value=0.5))
+            for _ in range(400):
+                flood.ask(requests.Stop())
+            arm.ask(requests.ClearStop())
+            arm.ask(requests.Nudge(axis=1, by=0.1))
+        server.stop()
+    found = records(tmp_path)
+    stops = [each for each in found if each["kind"] == "stop" and each["who"]["name"] == "Flood"]
+    more = [each for each in found if each["kind"] == "more"]
+    assert len(stops) < 100
+    assert len(stops) + sum(each["what"]["of"]["stop"] for each in more) == 400
+    assert "repeated" not in stops[0]["what"]
+    commands = [each["what"]["command"] for each in found if each["kind"] in ("command", "clear")]
+    assert commands == ["SpeedScale", "ClearStop", "Nudge"]
