@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.service.hub import Hub, Window, actor_of
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import STOP_INTERVAL, MutedError
+from katana450.server.service.people import Connection, ConnectionKind
 from tests.gateway.test_hub import FakeArm
 
 VERA = Identity("vera", "Vera", Role.VIEWER, "Vera")
@@ -130,3 +133,30 @@ def test_absent_person_stops_once_per_interval(room: Room) -> None:
     for _ in range(3):
         assert room.stops(room.vera)
         room.clear()
+
+
+def test_people_are_shown_while_they_are_connected_muted_or_kept_out(room: Room) -> None:
+    people = room.hub.people
+    connection = Connection(VERA, ConnectionKind.PAGE, "127.0.0.1")
+
+    def shown() -> list[Identity]:
+        return list(people.shown.values())
+
+    with people.connected(connection):
+        assert shown() == [VERA]
+        assert people.kick(VERA, 60.0) == 1
+        assert connection.kicked.is_set()
+    assert shown() == [VERA]
+    room.t += 59.0
+    assert (people.kept_out("vera"), shown()) == (1.0, [VERA])
+    room.t += 1.0
+    assert (people.kept_out("vera"), shown()) == (0.0, [])
+    people.mutes.add("vera")
+    assert shown() == [VERA]
+    people.mutes.remove("vera")
+    people.kick(VERA, math.inf)
+    assert shown() == []
+    # The number stays the same, and is never given again.
+    (number,) = (number for number in range(10) if people.identity(number) == VERA)
+    with people.connected(Connection(ODA, ConnectionKind.PAGE, "127.0.0.1")):
+        assert list(people.shown) == [number + 1]

@@ -10,6 +10,7 @@ import msgspec
 from katana450.server.api.fields import VERSION, Answer, Numbers
 from katana450.server.api.outcome_answers import Done, Finding, PartRefusal, Refused
 from katana450.server.api.people_answers import ConnectedPerson, People, PersonConnection
+from katana450.server.api.program_answers import Progress
 from katana450.server.api.scene_answers import (
     Field,
     Link,
@@ -127,39 +128,6 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
     air_ml: float
     spilled_ml: float
     margin_to_rim: float
-
-
-class Progress(msgspec.Struct, frozen=True, kw_only=True):
-    """The program that is being planned, is running, or ran last.
-
-    Attributes:
-        name: Name of the program.
-        by: Name of its owner.
-        status: planning, cancelled, refused, ready, running, paused, blocked, done, stopped or
-            failed.
-        step: Number of the present step.
-        steps: Number of steps.
-        line: Line of the present step in the script.
-        task: Present task in words.
-        fraction: Fraction of the task that is done, or of all planning.
-        seconds: Duration of all motions at full speed [s].
-        why: What is wrong with the program, or why it was planned again or not run.
-        unattended: Whether it runs without heartbeats of its owner.
-        began: Time at which the run began, in UTC, in ISO 8601; null before that.
-    """
-
-    name: str
-    by: str
-    status: str
-    step: int = 0
-    steps: int = 0
-    line: int = 0
-    task: str = ""
-    fraction: float = 0.0
-    seconds: float = 0.0
-    why: str = ""
-    unattended: bool = False
-    began: str | None = None
 
 
 class State(Answer, frozen=True, kw_only=True):

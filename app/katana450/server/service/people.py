@@ -138,11 +138,12 @@ class People:
     def shown(self) -> dict[int, Identity]:
         """The identities that are connected, muted or kept out, by their numbers."""
         present = {each.identity.session for each in self._connections}
-        sessions = present | set(self.mutes.sessions) | set(self._kept_out)
+        absent = {each for each in tuple(self._kept_out) if 0.0 < self.kept_out(each) < math.inf}
+        sessions = present | absent | set(self.mutes.sessions)
         return {
             number: identity
             for session, (number, identity) in self._known.items()
-            if session in sessions and (session in present or self.kept_out(session) < math.inf)
+            if session in sessions
         }
 
     # Refusals
