@@ -11,6 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import MAX_ZIP_BYTES, read_scene_zip
@@ -18,7 +19,7 @@ from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene,
 from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
-from katana450.server.service.hub import Hub
+from katana450.server.service.hub import Hub, actor_of
 from katana450.server.service.identity import Identity
 from katana450.server.web.admission import identity
 from katana450.server.web.authenticator import Authenticator
@@ -113,8 +114,11 @@ class Uploads:
         self, request: Request, keep: Callable[[], Awaitable[answers.Answer]]
     ) -> Response:
         """Return the answer of ``keep`` as a response, if role and limits allow the upload."""
-        if not self._identity(request).role.may_drive:
+        sender = self._identity(request)
+        if not sender.role.may_drive:
             raise HTTPException(NOT_ALLOWED, "Your role may watch, but not upload files.")
+        what = {"path": request.url.path, "name": request.query_params.get("name")}
+        self._hub.recorder.note("upload", actor_of(sender, CommandChannel.HTTP), what)
         with self._places.taken(identity(self._authenticator, request) or "") as free:
             if not free or not self._often.take(self._hub.clock()):
                 why = "Too many files at once. Wait a moment."
