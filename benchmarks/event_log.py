@@ -98,7 +98,7 @@ def answer_times(folder: Path) -> list[list[float]]:
         clients: Sequence[Client] = (first, second)
         for n in range(ASKED):
             for logged, client in enumerate(clients):
-                request = requests.Servo(q=tuple(client_posture(n)))
+                request = requests.Servo(q=client_posture(n))
                 began = time.perf_counter()
                 client.ask(request)
                 times[logged].append(time.perf_counter() - began)

@@ -46,6 +46,7 @@ GROUPS = {
     "join": "session",
     "leave": "session",
     "sign-in": "session",
+    "upload": "session",
     "refusal": "refusal",
 }
 """Groups of the kinds of records; all others are in ``command``."""

@@ -12,6 +12,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.errors import CancelledError, InputError, LeaseError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import MAX_ZIP_BYTES, read_scene_zip
@@ -20,7 +21,7 @@ from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYT
 from katana450.maths.planning.checkpoint import checked_by
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
-from katana450.server.service.hub import Hub
+from katana450.server.service.hub import Hub, actor_of
 from katana450.server.service.identity import Identity
 from katana450.server.web.admission import client_of, reserved
 from katana450.server.web.authenticator import Authenticator
@@ -122,8 +123,11 @@ class Uploads:
         self, request: Request, keep: Callable[[], Awaitable[answers.Answer]]
     ) -> Response:
         """Return the answer of ``keep`` as a response, if role and limits allow the upload."""
-        if not self._identity(request).role.may_drive:
+        sender = self._identity(request)
+        if not sender.role.may_drive:
             raise HTTPException(NOT_ALLOWED, "Your role may watch, but not upload files.")
+        what = {"path": request.url.path, "name": request.query_params.get("name")}
+        self._hub.recorder.note("upload", actor_of(sender, CommandChannel.HTTP), what)
         client = client_of(self._authenticator, request)
         assert client is not None
         places = reserved(self._hub, self._authenticator, client, RESERVED)

@@ -68,6 +68,9 @@ class GestureGate(Protocol):
 class NoGestures:
     """A `GestureGate` that refuses everything, for a scene that only shows an arm."""
 
+    log_problem = ""
+    """Nothing is recorded, so there is no problem."""
+
     def actor(self, _client_id: int | None) -> Actor:
         """Raise LeaseError."""
         raise LeaseError(SHOW_ONLY)
