@@ -108,14 +108,25 @@ class AppServer:
 
     @property
     def front(self) -> int:
-        """Id of the front end, a child process, as Linux lists it."""
-        (front,) = (
+        """Id of the front-end process, as Linux lists it."""
+        return self.child("katana450 front")
+
+    @property
+    def arm(self) -> int:
+        """Id of the arm's process, as Linux lists it."""
+        return self.child("katana450 arm")
+
+    def child(self, name: str) -> int:
+        """Return the id of the child process ``name``. Raises ServerError if there is none."""
+        found = [
             int(child)
             for children in Path(f"/proc/{self.pid}/task").glob("*/children")
             for child in children.read_text().split()
-            if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
-        )
-        return front
+            if Path(f"/proc/{child}/comm").read_text().strip() == name
+        ]
+        if len(found) != 1:
+            raise ServerError(f"{self._name} has {len(found)} processes {name!r}")
+        return found[0]
 
     def start(self) -> None:
         """Start the process and return when it is ready.

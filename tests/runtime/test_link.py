@@ -7,6 +7,7 @@ import os
 import socket
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 
 import numpy as np
 import pytest
@@ -19,7 +20,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, Verdict
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.link import ArmEnd, FrontEnd
+from katana450.arm.runtime.front_end import FrontEnd
+from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES
@@ -239,3 +241,48 @@ def test_command_for_a_full_mailbox_is_refused(ends: Ends) -> None:
     outcome = ends.front.state_publisher.outcomes.of(ticket).result(5.0)
     assert outcome.verdict is Verdict.REFUSED
     assert "slower" in outcome.why
+
+
+def test_front_end_connects_to_a_new_process_of_the_arm(arm: ArmModel, session: Session) -> None:
+    old, new = Ends(arm, session), Ends(arm, session)
+    pipes: list[Connection] = []
+    numbers: list[int] = []
+
+    def reconnect(number: int) -> Connection:
+        numbers.append(number)
+        if not pipes:
+            raise ConnectionRefusedError
+        return pipes.pop()
+
+    ours, theirs = multiprocessing.Pipe()
+    arm_end = ArmEnd(ours, old.loop, old.mailbox, SILENCE)
+    arm_end.start()
+    front = FrontEnd(theirs, session.check, reconnect)
+    front.start()
+    front.deliver(cmd.SetJoint(0, 2.0))
+    until(lambda: front.state_publisher.snapshot.ticket == 1)
+    # The end of the process closes its end of the pipe.
+    with socket.socket(fileno=os.dup(ours.fileno())) as line:
+        line.shutdown(socket.SHUT_RDWR)
+    until(lambda: bool(numbers))
+    assert front.age > 0.0
+    with pytest.raises(InputError, match="only STOP"):
+        front.deliver(cmd.SetJoint(0, 1.0))
+    stop = front.deliver(cmd.Stop())
+    until(lambda: numbers[-1] == stop)
+    ours, theirs = multiprocessing.Pipe()
+    later = ArmEnd(ours, new.loop, new.mailbox, SILENCE, numbers[-1])
+    later.start()
+    pipes.append(theirs)
+    until(lambda: front.state_publisher.snapshot.ticket == stop)
+    # No command to the process that ended has reached the new one.
+    assert new.mailbox.last_ticket == 0
+    assert front.last_ticket == stop
+    ticket = front.deliver(cmd.SetJoint(0, 0.1))
+    until(lambda: front.state_publisher.snapshot.ticket == ticket)
+    # Another front end replaces this one.
+    later.close()
+    assert front.cut.wait(2.0)
+    for each in (old, new):
+        each.arm_end.close()
+        each.loop.stop()

@@ -104,6 +104,7 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"{_short(math.degrees(f.amount))}° off, or the arm still moves; go to its start first"
     ),
     Reason.INTERNAL: lambda _: "internal error: the arm holds; see the server's log",
+    Reason.RESTARTED: lambda _: "the arm's process was started again; see the server's log",
 }
 
 STATUS: dict[Status, str] = {

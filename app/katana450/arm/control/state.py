@@ -82,7 +82,11 @@ class Reason(Enum):
     NOT_AT_START = "not at the start"
     LOPSIDED = "one finger only"
     INTERNAL = "internal error"
+    RESTARTED = "restarted"
 
+
+STOP_CAUSES = (Reason.RESTARTED,)
+"""The reasons for which the process of the arm stops it by itself."""
 
 GRIPPER_LIMITS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT)
 """The reasons that concern only the fingers."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Protocol
 
@@ -55,6 +55,7 @@ class ControlLoop:
         clock: Clock,
         rate: float,
         held_up: float = math.inf,
+        first: Callable[[State], State] | None = None,
     ) -> None:
         """Create the loop, and start the driver.
 
@@ -66,6 +67,7 @@ class ControlLoop:
             rate: ticks per second [Hz].
             held_up: lateness of a tick [s] that stops a moving arm, because the loop did not
                 supervise it meanwhile.
+            first: makes the first state from that with which the session begins; None keeps it.
         """
         self._session = session
         self._driver = driver
@@ -75,13 +77,17 @@ class ControlLoop:
         self._held_up = held_up
         t = clock.now()
         sent = driver.start(t)
-        self._state = session.begin(sent.q, sent.gripper, t)
+        begun = session.begin(sent.q, sent.gripper, t)
+        self._state = begun if first is None else first(begun)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
         self._newest: Submission | None = None
         self.state_publisher = StatePublisher(Snapshot(self._state, 0), self.loop_timing)
         """Publisher of the states of the loop."""
+        self.state_publisher.publish(
+            self.state_publisher.snapshot, entries_between(begun, self._state)
+        )
         self.ticks = 0
         """Number of completed ticks."""
 

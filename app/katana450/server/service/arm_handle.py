@@ -16,7 +16,7 @@ from katana450.arm.control.state import Outcome, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
-from katana450.arm.runtime.link import FrontEnd
+from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.planning_worker import PlanningWorker

@@ -12,6 +12,8 @@ from typing import NamedTuple
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.messages import finding_text
+from katana450.arm.control.state import STOP_CAUSES, State
 from katana450.errors import InputError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.stop_state import StopRecord
@@ -163,7 +165,7 @@ class CommandGate:
                     # The arm started after the stop, or an error undid the stop.
                     self.stopped = self._requested(self.stopped, arm, SERVER)
             elif stopped and arm.caught_up:
-                self.protect("The arm lost the connection to the server and stopped.")
+                self.protect(_why_stopped(snapshot.state))
 
     def moves(self) -> bool:
         """Return whether the arm moves or is about to move."""
@@ -205,3 +207,11 @@ class CommandGate:
         self.acquire(actor.person)
         log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
         return replace(actor, grounds=Grounds.FREE_LEASE)
+
+
+def _why_stopped(state: State) -> str:
+    """Return why the process of the arm itself has stopped the arm."""
+    causes = [each for each in state.findings if each.reason in STOP_CAUSES]
+    if not causes:
+        return "The arm lost the connection to the server and stopped."
+    return f"{finding_text(causes[0])}."

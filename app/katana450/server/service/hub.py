@@ -95,6 +95,14 @@ class Hub:
         self._numbers = 0
         self._presses = Presses()
         self._takeover: Takeover | None = None
+        self._ticked = clock()
+        self.supervisor_problem: Callable[[], str | None] = lambda: None
+        """Returns what is wrong with the supervisor of this process, in words."""
+
+    @property
+    def held_up(self) -> float:
+        """Time since the last tick [s], which is longer than ``TICK`` if the thread hangs."""
+        return self.clock() - self._ticked
 
     @property
     def arm(self) -> ArmInterface | None:
@@ -284,6 +292,7 @@ class Hub:
     def tick(self) -> None:
         """Check that the driver and the arm are alive. Call this every ``TICK``."""
         arm = self.arm
+        self._ticked = self.clock()
         self._update_lease()
         silent = self._check_driver(self.clock())
         if arm is not None:

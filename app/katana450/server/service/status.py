@@ -30,7 +30,9 @@ def health(hub: Hub) -> str | None:
     if hub.arm is None:
         return "The arm is not ready yet."
     age = silence(hub)
-    return None if age is None else f"No answer from the arm's process for {age:.1f} s."
+    if age is not None:
+        return f"No answer from the arm's process for {age:.1f} s."
+    return hub.supervisor_problem()
 
 
 def common(hub: Hub) -> dict[str, Any]:
