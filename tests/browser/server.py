@@ -22,7 +22,9 @@ from katana450.platform_support import without_interrupts
 ROOT = Path(__file__).resolve().parents[2]
 # A machine that draws without a graphics card delays its browsers, and their heartbeats come late.
 # APP therefore has longer timeouts than ATTENTIVE_APP, which has the default ones.
-ATTENTIVE_APP = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
+# SIMULATION_APP pauses after silence; the others stop, as with a real arm.
+SIMULATION_APP = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
+ATTENTIVE_APP = (*SIMULATION_APP, "--strict-silence")
 APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.restart import restarted
+from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import State
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.initial_scene import InitialScene
@@ -55,17 +56,20 @@ class RunningArm:
             q, gripper = kept.q, kept.gripper
         elif scene is not None and scene.joints is not None:
             q = scene.joints
+        driver = SimulatedDriver(arm, q, gripper)
+        strict = settings.strict_silence
         self._mailbox = Mailbox(session.check)
         if scene is not None:
             self._mailbox.put(scene.command)
         self._loop = ControlLoop(
             session,
-            SimulatedDriver(arm, q, gripper),
+            driver,
             self._mailbox,
             MonotonicClock(),
             settings.rate,
             settings.silence,
             partial(restarted, kept=kept) if again else None,
+            SilenceProfile.REAL_ARM if strict else driver.silence_profile,
         )
         self._silence_timeout = settings.silence
         self._link: ArmEnd | None = None

@@ -39,6 +39,7 @@ def serve_with(options: Namespace) -> int:
         host=options.host,
         port=options.port,
         silence=options.silence,
+        strict_silence=options.strict_silence,
         access=options.access,
         insecure=options.insecure,
         tls_cert=options.tls_cert,

@@ -67,6 +67,8 @@ class FrontEnd:
         if first is None:
             raise EOFError
         self._heard = time.monotonic()
+        self.profile = first.profile
+        """Reaction of the moving arm to silence."""
         self.state_publisher = StatePublisher(first.snapshot, first.loop_timing)
         self.state_publisher.publish(first.snapshot, first.event_log)
         self.cut = threading.Event()
@@ -114,7 +116,8 @@ class FrontEnd:
             self._number += 1
             if isinstance(command, cmd.Follow):
                 self._plans.note(self._number, command.plan)
-            self._unsent.append(CommandMessage(self._number, command, actor))
+            seen = self.state_publisher.snapshot.state.t
+            self._unsent.append(CommandMessage(self._number, command, actor, seen))
             self._flush()
             return self._number
 

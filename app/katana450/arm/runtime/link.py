@@ -20,6 +20,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.outcome import refused
+from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.state import Finding, Reason
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import Mailbox
@@ -43,17 +45,28 @@ PULSE = b"."
 REPORT_INTERVAL = 1.0
 """[s] Time between two reports of the timing of the control loop."""
 
+OLDER_THAN_PAUSE = "The arm has just paused. Give the command again."
+"""Reason for the refusal of a command that is older than the pause."""
+
 JOIN_TIMEOUT = 2.0
 """[s] Timeout for the end of a thread; a thread that waits to report wakes sooner."""
 
 
 @dataclass(frozen=True)
 class CommandMessage:
-    """A command with its giver, and the number that the front end has given it."""
+    """A command as the front end sends it.
+
+    Attributes:
+        number: its number, given by the front end.
+        command: the command.
+        actor: its giver.
+        seen: time of the newest state [s] that the front end knew.
+    """
 
     number: int
     command: cmd.Command
     actor: Actor | None
+    seen: float
 
 
 @dataclass(frozen=True)
@@ -70,12 +83,14 @@ class StateMessage:
         event_log: entries since the last message.
         loop_timing: timing of the control loop.
         outcomes: outcomes of commands since the last message, by the numbers of the front end.
+        profile: reaction of the moving arm to silence.
     """
 
     snapshot: Snapshot
     event_log: tuple[LogEntry, ...]
     loop_timing: LoopTiming
     outcomes: tuple[TicketOutcome, ...] = ()
+    profile: SilenceProfile = SilenceProfile.REAL_ARM
 
 
 class ArmEnd:
@@ -99,7 +114,7 @@ class ArmEnd:
             pipe: the pipe to the front end.
             loop: the control loop.
             mailbox: the mailbox of that loop.
-            silence_timeout: time without a message [s] after which a moving arm is stopped.
+            silence_timeout: time without a message [s] after which a moving arm brakes.
             number: the number that the front end gave its newest command before it connected.
         """
         self._pipe = pipe
@@ -158,9 +173,12 @@ class ArmEnd:
             self._names.note(message.number, message.command.plan)
         with self._numbering:
             try:
+                moves = not all(each.traits.while_stopped for each in message.command.parts)
+                if moves and message.seen < self._loop.paused_at:
+                    raise InputError(OLDER_THAN_PAUSE)
                 ticket = self._mailbox.put(message.command, message.actor)
             except InputError as error:
-                # The front end has checked the command, so only the mailbox can be full.
+                # The front end has checked the command: it came too late, or the mailbox is full.
                 log.warning("A command was dropped: %s", error)
                 ticket = self._mailbox.last_ticket
                 self._refused.append((message.number, refused(str(error))))
@@ -173,7 +191,8 @@ class ArmEnd:
         seen, reported, ticks = state_publisher.snapshot, time.monotonic(), self._loop.ticks
         try:
             event_log = state_publisher.event_log
-            self._send(StateMessage(self._named(seen), event_log, state_publisher.loop_timing))
+            timing, profile = state_publisher.loop_timing, self._loop.profile
+            self._send(StateMessage(self._named(seen), event_log, timing, profile=profile))
             last = event_log[-1] if event_log else None
             while not self.cut.is_set():
                 snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
@@ -195,6 +214,7 @@ class ArmEnd:
                         fresh,
                         state_publisher.loop_timing,
                         self._outcomes(snapshot.ticket),
+                        profile,
                     )
                 )
                 seen = snapshot
@@ -231,10 +251,8 @@ class ArmEnd:
     def _watch(self) -> None:
         while not self.cut.wait(self._silence_timeout / 4):
             silent = time.monotonic() - self._heard
-            state = self._loop.state_publisher.snapshot.state
-            if silent > self._silence_timeout and state.moving and state.stopped is None:
-                log.error("The front end was silent for %.2f s: STOP.", silent)
-                self._mailbox.put(cmd.Stop())
+            if silent > self._silence_timeout:
+                self._loop.brake(Finding(Reason.SERVER_SILENT, silent), silent)
 
 
 def _newer(event_log: tuple[LogEntry, ...], last: LogEntry | None) -> tuple[LogEntry, ...]:

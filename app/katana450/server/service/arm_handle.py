@@ -12,6 +12,7 @@ from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
+from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Outcome, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -66,6 +67,11 @@ class ArmHandle:
     def ready(self) -> FloatArray:
         """(n,) Posture to which Home moves [rad]."""
         return self.session.ready
+
+    @property
+    def profile(self) -> SilenceProfile:
+        """The reaction of the moving arm to silence."""
+        return self._link.profile
 
     @property
     def environment(self) -> Environment:

@@ -13,12 +13,16 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Lease, Person
 from katana450.arm.control.messages import finding_text
-from katana450.arm.control.state import STOP_CAUSES, State
+from katana450.arm.control.state import CAUSES, Finding, State
 from katana450.errors import InputError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.stop_state import StopRecord
 
 log = logging.getLogger(__name__)
+
+SETTLE_TIME = 0.3
+"""[s] Time after a pause in which commands are refused: three intervals of the heartbeats, so that
+messages which waited meanwhile have arrived."""
 
 PROTECTIVE = (cmd.Stop, cmd.Hold, cmd.SpeedScale)
 """Commands that the server itself may give."""
@@ -55,6 +59,8 @@ class CommandGate:
         self.on_stop: Callable[[], None] = lambda: None
         """Callback at each stop, before the arm gets it."""
         self._jogged = -cmd.JOG_TIME
+        self._waits = False
+        self._settled = -SETTLE_TIME
 
     def submit(self, command: cmd.Command, actor: Actor) -> int:
         """Send ``command`` of ``actor`` to the arm; return its ticket.
@@ -68,6 +74,7 @@ class CommandGate:
                 return self._stop(StopRecord(actor.name, f"{actor.name} pressed STOP."), actor)
             if not all(each.traits.while_stopped for each in command.parts):
                 self.check_runs()
+                self._check_settled(actor)
             if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
                 raise LeaseError("The server itself may not move the arm.")
             granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
@@ -90,6 +97,7 @@ class CommandGate:
         """
         with self._lock:
             self.check_runs()
+            self._check_settled(actor)
             return self._granted(actor, pacing=pacing)
 
     def check_runs(self) -> ArmInterface:
@@ -150,12 +158,50 @@ class CommandGate:
         with self._lock:
             self._stop(StopRecord(None, why), SERVER)
 
+    def pause(self, cause: Finding) -> None:
+        """Pause the arm in the name of the server: the next command moves it."""
+        with self._lock:
+            arm = self.present()
+            log.warning("Paused: %s.", finding_text(cause))
+            self._waits = True
+            self.settle()
+            with suppress(InputError):
+                arm.deliver(cmd.Hold(cause), replace(SERVER, grounds=Grounds.SERVER))
+
+    def settle(self) -> None:
+        """Void every gesture, and refuse motion for SETTLE_TIME.
+
+        Messages that waited while a connection or a process hung are not new commands.
+        """
+        with self._lock:
+            self._revoke()
+            self._settled = self._clock() + SETTLE_TIME
+
+    def _note_pause(self) -> None:
+        """Take note of a pause by the process of the arm, which is newer than all gestures."""
+        arm = self.arm
+        if arm is None:
+            return
+        if not arm.state.waits:
+            self._waits = self._waits and not arm.caught_up
+        elif not self._waits:
+            causes = [each for each in arm.state.findings if each.reason in CAUSES]
+            # Also ends what is being planned for this arm.
+            self.pause(causes[0])
+
+    def _check_settled(self, actor: Actor) -> None:
+        """Raise LeaseError for a motion just after a pause."""
+        self._note_pause()
+        if actor.channel is not CommandChannel.SERVER and self._clock() < self._settled:
+            raise LeaseError("The arm has just paused. Give the command again.")
+
     def reconcile(self) -> None:
-        """Make gate and arm agree on whether the arm is stopped. Call this often."""
+        """Make gate and arm agree on whether the arm is stopped or paused. Call this often."""
         with self._lock:
             arm = self.arm
             if arm is None:
                 return
+            self._note_pause()
             snapshot = arm.snapshot
             stopped = snapshot.state.stopped is not None
             if self.stopped is not None:
@@ -211,7 +257,7 @@ class CommandGate:
 
 def _why_stopped(state: State) -> str:
     """Return why the process of the arm itself has stopped the arm."""
-    causes = [each for each in state.findings if each.reason in STOP_CAUSES]
+    causes = [each for each in state.findings if each.reason in CAUSES]
     if not causes:
         return "The arm lost the connection to the server and stopped."
     return f"{finding_text(causes[0])}."

@@ -5,6 +5,7 @@ Runs in the gateway's one thread; ``CommandGate`` decides which commands reach t
 
 from __future__ import annotations
 
+import math
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,10 +14,13 @@ from typing import Any, NamedTuple
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.messages import sentence
+from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.command_gate import CommandGate
+from katana450.server.service.driver_watch import DriverWatch
 from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
@@ -96,6 +100,7 @@ class Hub:
         self._presses = Presses()
         self._takeover: Takeover | None = None
         self._ticked = clock()
+        self._driver_watch = DriverWatch(self.gate, self._ticked)
         self.supervisor_problem: Callable[[], str | None] = lambda: None
         """Returns what is wrong with the supervisor of this process, in words."""
 
@@ -118,6 +123,14 @@ class Hub:
     def stopped(self) -> StopRecord | None:
         """The present stop; None while the arm is not stopped."""
         return self.gate.stopped
+
+    @property
+    def halted(self) -> str | None:
+        """Reason of the present stop or pause by the server; None without one."""
+        arm = self.arm
+        if self.stopped is None and arm is not None and arm.caught_up and arm.state.waits:
+            return sentence(arm.state)
+        return None if self.stopped is None else self.stopped.why
 
     # Participants
 
@@ -292,7 +305,8 @@ class Hub:
     def tick(self) -> None:
         """Check that the driver and the arm are alive. Call this every ``TICK``."""
         arm = self.arm
-        self._ticked = self.clock()
+        before, self._ticked = self._ticked, self.clock()
+        self._driver_watch.note_lateness(self._ticked - before - TICK, self._ticked)
         self._update_lease()
         silent = self._check_driver(self.clock())
         if arm is not None:
@@ -315,21 +329,32 @@ class Hub:
     def _watch(self, arm: ArmInterface) -> None:
         """Stop an arm whose process does not answer; it stops once the process answers again."""
         age, due = arm.age, self.gate.moves() or not arm.caught_up
-        if self.stopped is None and due and age > 2 * self._hold_after:
+        # A simulated arm that answers late pauses by itself.
+        strict = arm.profile is SilenceProfile.REAL_ARM
+        limit = 2 * self._hold_after if strict else PAUSE_TIMEOUT
+        if self.stopped is None and due and age > limit:
             self.gate.protect(f"The arm's process did not answer for {age:.1f} s.")
 
     def _check_driver(self, t: float) -> bool:
-        """Stop a moving arm if the driver is silent; return whether the driver is silent."""
+        """Brake a moving arm if the driver is silent; return whether the driver is silent."""
+        self._follow_pause(t)
         holder = self.lease.holder
         if holder is None or self.arm is None:
             return False
-        silent = self.lease.silence(t) >= self._hold_after
+        silence = self.lease.silence(t)
+        silent = silence >= self._hold_after
         if silent and self.stopped is None and self.gate.moves():
             connected = holder.key in self._windows
-            why = "fell silent" if connected else "lost the connection"
-            self.gate.protect(f"{holder.name} {why} while the arm moved.")
+            self._driver_watch.brake(holder, silence, t, connected=connected)
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
+
+    def _follow_pause(self, t: float) -> None:
+        paused = self._driver_watch.paused
+        if paused is not None:
+            window = self._windows.get(paused.key)
+            heard = -math.inf if window is None else window.heartbeat.newest
+            self._driver_watch.follow(self.lease.holder, heard, t)
 
     def person_of(self, identity: Identity, page: str) -> Person:
         """Return the person at ``page``, whether or not its control socket is open now."""

@@ -113,6 +113,7 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         stopped=None,
         stop=None,
         revocations=0,
+        silence_profile=arm.profile.value,
         age=0.0,
         windows=0,
         water=water(arm.pouring, now),

@@ -56,6 +56,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "stop": None if stopped is None else stopped.stage,
         "stopped": None if stopped is None else stopped.why,
         "holder": None if holder is None else holder.name,
+        "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
         "speed": 1.0 if state is None else state.speed,
         "windows": len(hub.windows),
     }
