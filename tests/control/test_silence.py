@@ -18,16 +18,16 @@ LATE = Finding(Reason.LOOP_LATE, 0.3)
 
 
 def test_profile_chooses_between_stop_and_pause() -> None:
-    assert SilenceProfile.REAL_ARM.braking(LATE, 0.3) == cmd.Stop(LATE)
-    assert SilenceProfile.SIMULATION.braking(LATE, 0.3) == cmd.Hold(LATE)
-    assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT) == cmd.Stop(LATE)
+    assert SilenceProfile.REAL_ARM.braking(LATE, 0.3) == cmd.Stop(finding=LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, 0.3) == cmd.Hold(finding=LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT) == cmd.Stop(finding=LATE)
 
 
 @pytest.fixture
 def paused(session: Session, state: State) -> State:
     """Return a state after a pause in a motion."""
     moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
-    return run(session, moving, [cmd.Hold(LATE)], ticks=100)
+    return run(session, moving, [cmd.Hold(finding=LATE)], ticks=100)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_settings_keep_a_pause(session: Session, paused: State, command: cmd.Com
 
 def test_stop_keeps_its_cause_until_it_is_cleared(session: Session, state: State) -> None:
     moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
-    stopped = run(session, moving, [cmd.Stop(LATE)], ticks=100)
+    stopped = run(session, moving, [cmd.Stop(finding=LATE)], ticks=100)
     assert reasons(stopped) == {Reason.STOPPED, Reason.LOOP_LATE}
     again = run(session, stopped, [cmd.Stop()])
     assert reasons(again) == {Reason.STOPPED, Reason.LOOP_LATE}

@@ -107,7 +107,7 @@ class FakeArm:
                 return self.stops
             case cmd.ClearStop():
                 self.stopped = False
-            case cmd.Hold(cause=cause):
+            case cmd.Hold(finding=cause):
                 self.holds += 1
                 self.moves = False
                 self.cause = cause

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state import Finding, Reason
@@ -19,6 +20,7 @@ from katana450.errors import LeaseError
 from katana450.server.api import answers
 from katana450.server.service.command_gate import SETTLE_TIME
 from katana450.server.service.hub import TICK, Window
+from katana450.server.service.identity import Identity
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, SIMULATION_APP, AppServer
 from tests.gateway.test_hub import PAGES, Table, moves
@@ -112,6 +114,46 @@ def test_pause_by_the_arm_voids_older_gestures(table: Table, driver: Window) -> 
     table.arm.cause = None
     table.hub.move(driver, JOG)
     table.wait(1.0, driver)
+    assert table.hub.stopped is None
+
+
+@pytest.mark.parametrize("profile", SilenceProfile)
+def test_closed_window_brakes_and_frees_the_arm(
+    table: Table, driver: Window, profile: SilenceProfile
+) -> None:
+    table.arm.profile = profile
+    table.hub.close(Identity("session", None, Role.ADMIN), PAGES[0])
+    assert not moves(table)
+    if profile is SilenceProfile.REAL_ARM:
+        assert table.hub.stopped is not None
+        assert table.hub.stopped.why == "Window 1 closed the window while the arm moved."
+        return
+    assert table.arm.cause == Finding(Reason.DRIVER_LEFT)
+    revocations = table.hub.gate.revocations
+    other = table.join(PAGES[1], Role.OPERATOR)
+    table.wait(SETTLE_TIME + TICK)
+    table.hub.acquire(other)
+    assert table.hub.lease.driver == other.person
+    # What the page before had begun is void.
+    assert table.hub.gate.revocations > revocations
+    # Its page has lost the arm when it returns.
+    with pytest.raises(LeaseError, match="Window 2 holds the arm"):
+        table.touch(table.join(PAGES[0]).person.key)
+    assert driver.person != other.person
+
+
+def test_reloaded_page_keeps_the_arm_that_nobody_took(table: Table, driver: Window) -> None:
+    table.arm.moves = False
+    table.hub.close(Identity("session", None, Role.ADMIN), PAGES[0])
+    table.hub.leave(driver)
+    assert table.hub.lease.driver is None
+    table.wait(1.0)
+    again = table.join(PAGES[0])
+    table.wait(TICK, again)
+    assert table.hub.lease.driver == driver.person
+    # A window that is unknown or does not drive changes nothing.
+    table.hub.close(Identity("session", None, Role.ADMIN), PAGES[1])
+    assert table.hub.lease.driver == driver.person
     assert table.hub.stopped is None
 
 

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.client import connect
+from katana450.client import Client, connect
+from katana450.client.files import RefusedError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Shape
@@ -65,6 +66,18 @@ def healthy(server: AppServer) -> bool:
     return False
 
 
+def clear_stop(arm: Client) -> None:
+    """Clear the stop as soon as the server allows it."""
+
+    def cleared() -> bool:
+        with suppress(RefusedError):
+            arm.ask(requests.ClearStop())
+            return True
+        return False
+
+    until(cleared, 5.0)
+
+
 def strike(server: AppServer, process: str, number: signal.Signals, delay: float) -> float:
     """Send ``number`` to ``process`` ``delay`` [s] into a motion; check the restart.
 
@@ -72,7 +85,7 @@ def strike(server: AppServer, process: str, number: signal.Signals, delay: float
     """
     victim = server.child(f"katana450 {process}")
     with suppress(KatanaError, OSError), connect(server.url, "Driver") as arm:
-        arm.ask(requests.ClearStop())
+        clear_stop(arm)
         start = arm.query(answers.State).q[0]
         goal = NEAR if start > 0.0 else FAR
         arm.ask(requests.Joints(q=goal.tolist()))
@@ -100,7 +113,7 @@ def strike(server: AppServer, process: str, number: signal.Signals, delay: float
     with connect(server.url, "Driver") as arm:
         with suppress(KatanaError):
             assert isinstance(arm.ask(requests.Joints(q=goal.tolist())), answers.Refused)
-        arm.ask(requests.ClearStop())
+        clear_stop(arm)
         time.sleep(0.3)
         assert arm.query(answers.State).q == q
         there = q[0] + (0.1 if q[0] < 0.0 else -0.1)
@@ -134,7 +147,7 @@ def test_lost_processes_at_random_moments_of_a_motion(process: str, number: sign
 def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServer) -> None:
     front, killed = server.front, server.arm
     with connect(server.url, "Driver") as arm:
-        arm.ask(requests.ClearStop())
+        clear_stop(arm)
         arm.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.05, 0.05, 0.05]))
         arm.joints(np.deg2rad((30.0, -68.0, 85.0, 8.0, 0.0)))
         before = arm.query(answers.State)
@@ -150,7 +163,7 @@ def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServe
         assert server.arm != killed
         reasons = [line.finding.reason for line in arm.query(answers.EventLog).lines]
         assert "restarted" in reasons
-        arm.ask(requests.ClearStop())
+        clear_stop(arm)
         arm.ask(requests.ReleaseLease())
 
 
@@ -161,7 +174,7 @@ def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer
         status, _, body = ask(f"{server.url}/health")
         assert (status, b"supervisor" in body) == (503, True)
         with connect(server.url, "Driver") as arm:
-            arm.ask(requests.ClearStop())
+            clear_stop(arm)
             q = arm.query(answers.State).q
             arm.joints([q[0], *q[1:4], q[4] + 0.1])
     finally:

@@ -123,6 +123,7 @@ def application(
         Route("/viser/", viser_index),
         Route("/enter", enter, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),
+        _leave_route(hub, authenticator),
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),
         WebSocketRoute("/control", control),
@@ -130,6 +131,17 @@ def application(
     ]
     admission = Admission(Starlette(routes=routes), authenticator, acceptor)
     return security.SecurityMiddleware(admission, address)
+
+
+def _leave_route(hub: Hub, authenticator: Authenticator) -> Route:
+    async def leave(request: Request) -> Response:
+        """Free the arm of a page whose window was closed."""
+        identity = _signed_in(authenticator, request)
+        if PAGE.fullmatch(name := request.query_params.get("page", "")):
+            hub.close(identity, name)
+        return Response(status_code=204)
+
+    return Route("/leave", leave, methods=["POST"])
 
 
 def _signed_in(authenticator: Authenticator, request: Request) -> Identity:

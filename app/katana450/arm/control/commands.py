@@ -227,26 +227,26 @@ class GoToZero(BaseCommand):
 class Hold(BaseCommand):
     """Come to rest and drop the targets of arm and gripper.
 
-    With a ``cause``, which only the server gives, the arm pauses and reports the cause.
+    With a ``finding``, which only the server gives, the arm pauses and reports it as the cause.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
-    cause: Finding | None = None
+    finding: Finding | None = None
 
 
 @dataclass(frozen=True)
 class Stop(BaseCommand):
     """Come to rest as fast as the arm can, and accept no motion until ClearStop.
 
-    ``cause``: what the server noticed, where it stops the arm by itself.
+    ``finding``: the cause, where the server stops the arm by itself.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(
         while_stopped=True, joints_only=True, safety=True
     )
 
-    cause: Finding | None = None
+    finding: Finding | None = None
 
 
 @dataclass(frozen=True)

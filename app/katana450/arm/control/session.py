@@ -286,13 +286,13 @@ class Session:
     def _superseded(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` in the mode that ``command`` begins."""
         match command:
-            case cmd.Stop(cause=cause):
+            case cmd.Stop(finding=cause):
                 return self._stop_motion(state, cause)
             case cmd.ClearStop():
                 goal = self._stepper(state).stopping_point(state)[0]
                 free = with_mode(replace(state, stopped=None, goal=goal), IDLE)
                 return without_finding(free, Reason.STOPPED)
-            case cmd.Hold(cause=cause):
+            case cmd.Hold(finding=cause):
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 held = self._at_rest_soon(without_finding(held, Reason.CONTACT))
                 why = () if cause is None else (Finding(Reason.WAITING), cause)

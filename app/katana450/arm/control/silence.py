@@ -26,5 +26,5 @@ class SilenceProfile(Enum):
     def braking(self, cause: Finding, silence: float) -> Stop | Hold:
         """Return the command for a moving arm after ``silence`` [s], for the reason ``cause``."""
         if self is SilenceProfile.REAL_ARM or silence >= PAUSE_TIMEOUT:
-            return Stop(cause)
-        return Hold(cause)
+            return Stop(finding=cause)
+        return Hold(finding=cause)

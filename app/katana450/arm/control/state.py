@@ -85,6 +85,7 @@ class Reason(Enum):
     RESTARTED = "restarted"
     WAITING = "waiting"
     DRIVER_SILENT = "driver silent"
+    DRIVER_LEFT = "driver left"
     SERVER_SILENT = "server silent"
     LOOP_LATE = "loop late"
     MACHINE_BUSY = "machine busy"
@@ -93,6 +94,7 @@ class Reason(Enum):
 CAUSES = (
     Reason.RESTARTED,
     Reason.DRIVER_SILENT,
+    Reason.DRIVER_LEFT,
     Reason.SERVER_SILENT,
     Reason.LOOP_LATE,
     Reason.MACHINE_BUSY,

@@ -133,7 +133,11 @@ class CommandGate:
     def acquire(self, person: Person) -> None:
         """Acquire the free lease for ``person``. Raises LeaseError if another person holds it."""
         with self._lock:
-            self.lease = self.lease.acquire(person, self._clock())
+            lease = self.lease.acquire(person, self._clock())
+            if self.lease.holder is not None:
+                # That holder has closed its window.
+                self._revoke()
+            self.lease = lease
 
     def change(self, event: Callable[[Lease, float], Lease], by: Actor = SERVER) -> None:
         """Apply ``event`` to the lease at the present time. A change of holder holds the arm.
@@ -166,7 +170,7 @@ class CommandGate:
             self._waits = True
             self.settle()
             with suppress(InputError):
-                arm.deliver(cmd.Hold(cause), replace(SERVER, grounds=Grounds.SERVER))
+                arm.deliver(cmd.Hold(finding=cause), replace(SERVER, grounds=Grounds.SERVER))
 
     def settle(self) -> None:
         """Void every gesture, and refuse motion for SETTLE_TIME.

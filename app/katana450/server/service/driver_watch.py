@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from katana450.arm.control.lease import Person
@@ -59,25 +60,27 @@ class DriverWatch:
             why = "fell silent" if connected else "lost the connection"
             gate.protect(f"{driver.name} {why} while the arm moved.")
 
-    def follow(self, holder: Person | None, heard: float, t: float) -> None:
+    def brake_left(self, driver: Person) -> None:
+        """Brake the moving arm of ``driver``, whose window was closed."""
+        if self._gate.present().profile is SilenceProfile.SIMULATION:
+            self._gate.pause(Finding(Reason.DRIVER_LEFT))
+        else:
+            self._gate.protect(f"{driver.name} closed the window while the arm moved.")
+
+    def follow(self, holder: Person | None, heard: Callable[[Person], float], t: float) -> None:
         """End the pause when the driver is back, or latch the stop after PAUSE_TIMEOUT.
 
-        ``holder``: the present holder of the lease. ``heard``: time of the newest message of the
-        driver of the pause.
+        ``holder``: the present holder of the lease. ``heard``: returns the time of the newest
+        message of a person.
         """
         pause = self._pause
         if pause is None:
             return
         if self._gate.stopped is not None or holder not in (None, pause.driver):
             self._pause = None
-        elif heard > pause.since:
+        elif heard(pause.driver) > pause.since:
             self._pause = None
             self._gate.settle()
         elif t - pause.since >= PAUSE_TIMEOUT:
             self._pause = None
             self._gate.protect(f"{pause.driver.name} was silent for {PAUSE_TIMEOUT:g} s.")
-
-    @property
-    def paused(self) -> Person | None:
-        """The silent driver of the present pause; None without one."""
-        return None if self._pause is None else self._pause.driver

@@ -173,6 +173,17 @@ class Hub:
                 self.gate.protect(f"{person.name} left while the arm moved.")
             self.release_lease(window)
 
+    def close(self, identity: Identity, page: str) -> None:
+        """Free the arm of the page whose window was closed, and brake the arm.
+
+        The page keeps the lease if it returns before another person takes it, as on a reload.
+        """
+        person, _ = self._remembered.get(key_of(identity, page), (None, 0))
+        if person is not None and self.lease.holder == person:
+            if self.stopped is None and self.gate.moves():
+                self._driver_watch.brake_left(person)
+            self.gate.change(lambda lease, t: lease.close(person, t))
+
     def present(self) -> ArmInterface:
         """Return the arm. Raises LeaseError until it is ready."""
         return self.gate.present()
@@ -231,8 +242,8 @@ class Hub:
 
     def may_clear_stop(self, window: Window) -> bool:
         """Return whether ``window`` may clear a stop."""
-        holder = self.lease.holder
-        return window.person.role.may_drive and holder in (None, window.person)
+        driver = self.lease.driver
+        return window.person.role.may_drive and driver in (None, window.person)
 
     def acquire(self, window: Window) -> None:
         """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
@@ -337,7 +348,7 @@ class Hub:
 
     def _check_driver(self, t: float) -> bool:
         """Brake a moving arm if the driver is silent; return whether the driver is silent."""
-        self._follow_pause(t)
+        self._driver_watch.follow(self.lease.holder, self._heard, t)
         holder = self.lease.holder
         if holder is None or self.arm is None:
             return False
@@ -349,12 +360,10 @@ class Hub:
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
 
-    def _follow_pause(self, t: float) -> None:
-        paused = self._driver_watch.paused
-        if paused is not None:
-            window = self._windows.get(paused.key)
-            heard = -math.inf if window is None else window.heartbeat.newest
-            self._driver_watch.follow(self.lease.holder, heard, t)
+    def _heard(self, person: Person) -> float:
+        """Return the time of the newest heartbeat of ``person`` [s]."""
+        window = self._windows.get(person.key)
+        return -math.inf if window is None else window.heartbeat.newest
 
     def person_of(self, identity: Identity, page: str) -> Person:
         """Return the person at ``page``, whether or not its control socket is open now."""

@@ -64,7 +64,7 @@ def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | an
 def state(hub: Hub) -> answers.State:
     """Return the newest state. Raises LeaseError until there is an arm."""
     arm = hub.present()
-    snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
+    snapshot, holder, stopped = arm.snapshot, hub.lease.driver, hub.stopped
     return msgspec.structs.replace(
         once(snapshot, "state", lambda: _state(arm, snapshot)),
         sent=hub.clock(),

@@ -38,7 +38,7 @@ def health(hub: Hub) -> str | None:
 def common(hub: Hub) -> dict[str, Any]:
     """Return the part of the status that is the same for all pages."""
     state = hub.arm.state if hub.arm is not None else None
-    stopped, holder, age = hub.stopped, hub.lease.holder, silence(hub)
+    stopped, holder, age = hub.stopped, hub.lease.driver, silence(hub)
     now = StatusLine("starting", "Starting", "")
     if state is not None:
         now = StatusLine(mood(state), headline(state), sentence(state))
