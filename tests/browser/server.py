@@ -10,8 +10,8 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -129,6 +129,18 @@ class AppServer:
         if len(found) != 1:
             raise ServerError(f"{self._name} has {len(found)} processes {name!r}")
         return found[0]
+
+    @contextmanager
+    def frozen_arm(self) -> Iterator[None]:
+        """Suspend the arm's process, and the supervisor that would end it, inside the block."""
+        processes = (self.pid, self.arm)
+        for process in processes:
+            os.kill(process, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            for process in reversed(processes):
+                os.kill(process, signal.SIGCONT)
 
     def start(self) -> None:
         """Start the process and return when it is ready.

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import signal
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -46,19 +42,6 @@ if __name__ == "__main__":
 """
 
 
-@contextmanager
-def frozen(server: AppServer) -> Iterator[None]:
-    """Suspend the arm's process, and the supervisor that would end it, inside the block."""
-    processes = (server.pid, server.arm)
-    for process in processes:
-        os.kill(process, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        for process in reversed(processes):
-            os.kill(process, signal.SIGCONT)
-
-
 def state_of(server: AppServer) -> dict[str, object]:
     state: dict[str, object] = json.loads(ask(f"{server.url}/api/v1/state")[2])
     return state
@@ -70,7 +53,7 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
             with connect(server.url, "Driver") as arm:
                 before = await asyncio.to_thread(under_way, arm)
                 assert ask(f"{server.url}/health")[0] == 200
-                with frozen(server):
+                with server.frozen_arm():
                     began = time.monotonic()
                     await control.wait(headline="No answer from the arm")
                     assert time.monotonic() - began < 2 * REPORTED
@@ -110,7 +93,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         driver.say(do="joints", q=FAR.tolist())
         while driver.answer(do="query")["q"][0] < 0.2:
             time.sleep(0.02)
-        with frozen(server):
+        with server.frozen_arm():
             end = time.monotonic() + 10.0
             while state_of(server)["stopped"] is None:
                 driver.say(do="heartbeat")
