@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 from playwright.sync_api import Route
 
 from tests.browser.conftest import OpenPage
@@ -199,3 +203,28 @@ def test_closed_window_frees_the_arm_and_a_reloaded_one_keeps_it(open_page: Open
         other.page.get_by_role("button", name="Take", exact=True).click()
         other.page.locator("#holder", has_text="You drive").wait_for()
     print(f"free after {took:.2f} s")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the processes as Linux lists them")
+@pytest.mark.parametrize("process", ["arm", "front"])
+def test_page_outlasts_each_process_and_shows_the_truth(open_page: OpenPage, process: str) -> None:
+    with AppServer(APP) as server:
+        truth = Truth(server)
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        page.type_number("Axis 1", -150.0)
+        truth.wait(mood="moving")
+        os.kill(server.child(f"katana450 {process}"), signal.SIGSTOP)
+        frozen = time.monotonic()
+        # The same for both: what the page shows is marked as old.
+        lost = '[data-mood="lost"], [data-mood="starting"], #banner:not([hidden])'
+        page.page.wait_for_selector(lost, timeout=2000)
+        noticed = time.monotonic() - frozen
+        page.page.locator("#headline", has_text="Stopped").wait_for(timeout=60_000)
+        back = time.monotonic() - frozen
+        page.page.wait_for_selector("#banner", state="hidden", timeout=30_000)
+        page.wait_until(lambda: page.connected, "viser to come back")
+        clear_stop(page, truth)
+        rest = truth.status()["q"]
+        page.page.wait_for_timeout(500)
+        assert truth.status()["q"] == rest
+    print(f"{process}: noticed after {noticed:.2f} s, back after {back:.2f} s")

@@ -34,6 +34,8 @@ pytestmark = pytest.mark.skipif(
 
 NEAR = np.deg2rad((-120.0, -68.0, 85.0, 8.0, 0.0))
 
+POST = "#VRML V2.0 utf8\nShape { geometry Box { size 0.04 0.04 0.1 } }"
+
 FATES = [
     (process, number) for process in ("arm", "front") for number in (signal.SIGKILL, signal.SIGSTOP)
 ]
@@ -104,9 +106,9 @@ def strike(server: AppServer, process: str, number: signal.Signals, delay: float
     until(lambda: healthy(server), 20.0)
     back = time.monotonic() - struck
     assert not Path(f"/proc/{victim}").exists() or server.child(f"katana450 {process}") != victim
-    until(lambda: not look(server)["moving"], 5.0)
+    until(lambda: look(server)["stop"] == "confirmed" and not look(server)["moving"], 5.0)
     state = look(server)
-    assert (state["status"], state["stop"]) == ("stopped", "confirmed")
+    assert state["status"] == "stopped"
     q = state["q"]
     # The arm stands near its last known place, and has not reached its goal.
     assert abs(q[0] - before.q[0]) < 1.5
@@ -151,6 +153,8 @@ def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServe
         arm.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.05, 0.05, 0.05]))
         arm.joints(np.deg2rad((30.0, -68.0, 85.0, 8.0, 0.0)))
         before = arm.query(answers.State)
+        # The supervisor gets each state a moment later.
+        time.sleep(0.3)
         os.kill(killed, signal.SIGKILL)
         until(lambda: not healthy(server), 5.0)
         until(lambda: healthy(server), 20.0)
@@ -164,6 +168,27 @@ def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServe
         reasons = [line.finding.reason for line in arm.query(answers.EventLog).lines]
         assert "restarted" in reasons
         clear_stop(arm)
+        arm.ask(requests.ReleaseLease())
+
+
+def test_uploaded_mesh_outlasts_the_front_end(server: AppServer, tmp_path: Path) -> None:
+    (tmp_path / "post.wrl").write_text(POST, encoding="utf-8")
+    killed = server.front
+    with connect(server.url, "Driver") as arm:
+        mesh = arm.upload(tmp_path / "post.wrl")
+        arm.ask(requests.Place(name="post", mesh=mesh.key))
+        # The file is written beside the server's thread.
+        time.sleep(0.5)
+        with suppress(KatanaError):
+            os.kill(killed, signal.SIGKILL)
+            while True:
+                arm.query(answers.State)
+    until(lambda: healthy(server), 20.0)
+    with connect(server.url, "Driver") as arm:
+        # Only a mesh with its triangles can be saved.
+        assert b"post.wrl" in arm.save_scene() or mesh.key.encode() in arm.save_scene()
+        clear_stop(arm)
+        arm.ask(requests.Remove(name="post"))
         arm.ask(requests.ReleaseLease())
 
 
