@@ -51,6 +51,9 @@ RESTART_DELAYS = (0.0, 0.0, 0.0, 1.0, 5.0, 15.0)
 STABLE_SECONDS = 5.0
 """[s] A process that was ready for a longer time did not end early."""
 
+RETRY_SECONDS = 1.0
+"""[s] Delay after the system refused to start a process."""
+
 MAX_KEPT_STARTS = 2
 """Early ends in a row after which a new process gets no state of the one before: the state may be
 what ends it."""
@@ -253,7 +256,7 @@ class Supervisor:
     def _watch(self, child: Child) -> None:
         if child.due is not None:
             if time.monotonic() >= child.due:
-                child.start()
+                self._start(child)
             return
         alive = child.running
         child.read()
@@ -272,7 +275,15 @@ class Supervisor:
             log.error("%s%s", text, error)
             self._announce(child, text)
             if not delay:
-                child.start()
+                self._start(child)
+
+    @staticmethod
+    def _start(child: Child) -> None:
+        try:
+            child.start()
+        except OSError as error:
+            log.error("%s could not be started: %s.", child.spec.title, error)
+            child.due = time.monotonic() + RETRY_SECONDS
 
     def _announce(self, about: Child, text: str) -> None:
         for child in self._children.values():

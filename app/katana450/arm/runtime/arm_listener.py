@@ -98,7 +98,8 @@ class ArmListener:
         ``roles``: a function for each role. It is called in a thread of the connection.
         """
         # A process that was killed leaves its socket file. On Windows there is no such file.
-        Path(address.name).unlink(missing_ok=True)
+        with suppress(OSError):
+            Path(address.name).unlink()
         self._name = address.name
         self._key = address.key
         self._roles = roles
