@@ -133,7 +133,7 @@ def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | N
         fraction = None
         if idle:
             time.sleep(SETTLE_SECONDS)
-            pids = [server.pid] if app == "bare" else [server.pid, server.front]
+            pids = [server.pid] if app == "bare" else [server.pid, server.front, server.arm]
             before = cpu_seconds(pids)
             time.sleep(idle)
             fraction = (cpu_seconds(pids) - before) / idle

@@ -3,7 +3,7 @@
 (() => {
   const STALE = 1.0; // s, age from which a picture is marked as old
   const SLOW = 150; // ms, round trip from which a connection counts as slow
-  const QUIET = 1000; // ms without a message after which a connection counts as bad
+  const QUIET = 400; // ms without a message, of which ten come a second, from which a connection is bad
   const ANSWER = 250; // ms without an answer after which a STOP is also sent over HTTP
   const TOAST = 4000; // ms
   const KEPT_OUT = 403; // status of a sign-in of somebody whom an admin has disconnected
@@ -11,6 +11,8 @@
   const MUTED = 429; // status of a STOP that does not count
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
+  const SIMULATION =
+    "pauses after a quarter of a second, because it is simulated: its next command moves it. After five seconds it stops";
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
   /** @type {(id: string) => any} */
@@ -114,6 +116,9 @@
   window.addEventListener("blur", blur);
   window.katana = { key, blur, toast };
 
+  // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
+  window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page}`));
+
   // Display
 
   const text = (id, words) => {
@@ -193,6 +198,8 @@
     const percent = String(Math.round(100 * status.speed));
     if (document.activeElement !== speedInput) speedInput.value = percent;
     speedOutput.value = `${percent} %`;
+    const simulated = status.silence_profile === "simulation";
+    text("on-silence", simulated ? SIMULATION : "stops after a quarter of a second");
   }
 
   // Without a connection the state of the arm is unknown.

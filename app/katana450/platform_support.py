@@ -112,6 +112,19 @@ def without_interrupts() -> dict[str, Any]:
         return {"start_new_session": True}
 
 
+def name_process(name: str) -> None:
+    """Give this process a name of up to 15 letters in lists of processes, as on Linux."""
+    with suppress(OSError):
+        Path("/proc/self/comm").write_text(name, encoding="ascii")
+
+
+def pipe_address(folder: Path, name: str) -> str:
+    """Return the address of a listener for processes of this user, in the private ``folder``."""
+    if sys.platform == "win32":
+        return rf"\\.\pipe\{folder.name}-{name}"
+    return str(folder / name)
+
+
 def claim_port(sock: socket.socket) -> None:
     """Let ``sock`` bind a port whose last connections are closing, but no port that is in use."""
     if sys.platform == "win32":

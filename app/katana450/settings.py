@@ -21,7 +21,9 @@ class Settings:
         rate: control ticks per second [Hz].
         frame_rate: maximum rate of view updates [Hz].
         ready: posture in which the arm starts and to which Home returns [rad].
-        silence: heartbeat timeout of the driver, after which a moving arm is stopped [s].
+        silence: heartbeat timeout of the driver, after which a moving arm brakes [s].
+        strict_silence: whether a simulated arm reacts to silence as a real one: with a latched stop
+            in place of a pause.
         access: file of the access links; without it nobody has to sign in.
         insecure: whether other machines may connect without signing in.
         tls_cert, tls_key: files of a certificate and its key, for https.
@@ -36,6 +38,7 @@ class Settings:
     frame_rate: float = 60.0
     ready: tuple[float, ...] = tuple(math.radians(angle) for angle in READY_POSTURE_DEG)
     silence: float = 0.25
+    strict_silence: bool = False
     access: Path | None = None
     insecure: bool = False
     tls_cert: Path | None = None

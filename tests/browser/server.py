@@ -10,8 +10,8 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -22,7 +22,9 @@ from katana450.platform_support import without_interrupts
 ROOT = Path(__file__).resolve().parents[2]
 # A machine that draws without a graphics card delays its browsers, and their heartbeats come late.
 # APP therefore has longer timeouts than ATTENTIVE_APP, which has the default ones.
-ATTENTIVE_APP = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
+# SIMULATION_APP pauses after silence; the others stop, as with a real arm.
+SIMULATION_APP = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
+ATTENTIVE_APP = (*SIMULATION_APP, "--strict-silence")
 APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
@@ -108,14 +110,37 @@ class AppServer:
 
     @property
     def front(self) -> int:
-        """Id of the front end, a child process, as Linux lists it."""
-        (front,) = (
+        """Id of the front-end process, as Linux lists it."""
+        return self.child("katana450 front")
+
+    @property
+    def arm(self) -> int:
+        """Id of the arm's process, as Linux lists it."""
+        return self.child("katana450 arm")
+
+    def child(self, name: str) -> int:
+        """Return the id of the child process ``name``. Raises ServerError if there is none."""
+        found = [
             int(child)
             for children in Path(f"/proc/{self.pid}/task").glob("*/children")
             for child in children.read_text().split()
-            if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
-        )
-        return front
+            if Path(f"/proc/{child}/comm").read_text().strip() == name
+        ]
+        if len(found) != 1:
+            raise ServerError(f"{self._name} has {len(found)} processes {name!r}")
+        return found[0]
+
+    @contextmanager
+    def frozen_arm(self) -> Iterator[None]:
+        """Suspend the arm's process, and the supervisor that would end it, inside the block."""
+        processes = (self.pid, self.arm)
+        for process in processes:
+            os.kill(process, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            for process in reversed(processes):
+                os.kill(process, signal.SIGCONT)
 
     def start(self) -> None:
         """Start the process and return when it is ready.

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 from playwright.sync_api import Route
 
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
-from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.server import APP, ATTENTIVE_APP, AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, take
 from tests.browser.test_app import Robot
 from tests.gateway.slow_link import SlowLink
@@ -151,8 +155,7 @@ def test_reload_during_a_drag_stops_the_arm_with_a_reason(
         begin_drag(page, truth)
         name = truth.status()["holder"]
         goal = truth.status()["goal"]
-        # The mouse button stays pressed, so the drag never ends. The page takes longer to load than
-        # the heartbeat timeout; a quicker reload does not stop the arm.
+        # The mouse button stays pressed, so the drag never ends.
         held: list[Route] = []
 
         def hold(route: Route) -> None:
@@ -161,10 +164,9 @@ def test_reload_during_a_drag_stops_the_arm_with_a_reason(
         page.page.route("**/enter", hold)
         page.page.reload(wait_until="commit")
         truth.wait(5.0, stop="confirmed")
-        lost = f"{name} lost the connection while the arm moved."
-        silent = f"{name} fell silent while the arm moved."
+        reasons = ("closed the window", "lost the connection", "fell silent")
         why = truth.status()["stopped"]
-        assert why in (lost, silent), why
+        assert why in {f"{name} {reason} while the arm moved." for reason in reasons}, why
         truth.wait(5.0, moving=False)
         rest = truth.status()["q"]
         assert not np.allclose(rest, goal, atol=1e-3)
@@ -184,3 +186,45 @@ def test_reload_during_a_drag_stops_the_arm_with_a_reason(
         page.page.wait_for_timeout(1500)
         assert truth.status()["q"] == rest
         assert page.errors == []
+
+
+def test_closed_window_frees_the_arm_and_a_reloaded_one_keeps_it(open_page: OpenPage) -> None:
+    with AppServer(APP) as server:
+        truth = Truth(server)
+        first, other = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
+        take(first)
+        name = truth.status()["holder"]
+        first.page.reload(wait_until="commit")
+        first.page.locator("#holder", has_text="You drive").wait_for()
+        truth.wait(holder=name)
+        first.page.close(run_before_unload=True)
+        # The arm would be free after three seconds of silence even without a word of the page.
+        took = truth.wait(2.0, holder=None)
+        other.page.get_by_role("button", name="Take", exact=True).click()
+        other.page.locator("#holder", has_text="You drive").wait_for()
+    print(f"free after {took:.2f} s")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the processes as Linux lists them")
+@pytest.mark.parametrize("process", ["arm", "front"])
+def test_page_outlasts_each_process_and_shows_the_truth(open_page: OpenPage, process: str) -> None:
+    with AppServer(APP) as server:
+        truth = Truth(server)
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        page.type_number("Axis 1", -150.0)
+        truth.wait(mood="moving")
+        os.kill(server.child(f"katana450 {process}"), signal.SIGSTOP)
+        frozen = time.monotonic()
+        # The same for both: what the page shows is marked as old.
+        lost = '[data-mood="lost"], [data-mood="starting"], #banner:not([hidden])'
+        page.page.wait_for_selector(lost, timeout=2000)
+        noticed = time.monotonic() - frozen
+        page.page.locator("#headline", has_text="Stopped").wait_for(timeout=60_000)
+        back = time.monotonic() - frozen
+        page.page.wait_for_selector("#banner", state="hidden", timeout=30_000)
+        page.wait_until(lambda: page.connected, "viser to come back")
+        clear_stop(page, truth)
+        rest = truth.status()["q"]
+        page.page.wait_for_timeout(500)
+        assert truth.status()["q"] == rest
+    print(f"{process}: noticed after {noticed:.2f} s, back after {back:.2f} s")

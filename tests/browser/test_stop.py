@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -38,8 +36,7 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
     driver, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
     take(driver)
     me = bar(driver, "name").partition(",")[0]
-    os.kill(server.pid, signal.SIGSTOP)
-    try:
+    with server.frozen_arm():
         wait_headline(other, "No answer from the arm")
         assert mood(other.page) == "lost"
         other.page.keyboard.press("Space")
@@ -49,8 +46,6 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
             assert "The arm has not confirmed the stop." in bar(page, "why")
         assert other.page.locator("#stop.asked").count() == 1
         other.keep(artefacts / "stop-requested.png")
-    finally:
-        os.kill(server.pid, signal.SIGCONT)
     for page in (driver, other):
         wait_headline(page, "Stopped")
         assert mood(page.page) == "stopped"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.arm.control.lease import LEASE_TIMEOUT, Lease, Person, Role
+from katana450.arm.control.lease import LEASE_TIMEOUT, RETURN_TIME, Lease, Person, Role
 from katana450.errors import LeaseError
 
 ANNA = Person("a", "Anna", Role.OPERATOR)
@@ -29,6 +30,7 @@ EVENTS: dict[str, Event] = {
     "hand over": lambda lease, person, to, t: lease.hand_over(person, to, t),
     "release": lambda lease, person, _, __: lease.release(person),
     "hear": lambda lease, person, _, t: lease.hear(person, t),
+    "close": lambda lease, person, _, t: lease.close(person, t),
     "leave": lambda lease, person, _, __: lease.leave(person),
     "expire": lambda lease, _, __, t: lease.expire(t),
 }
@@ -36,7 +38,9 @@ EVENTS: dict[str, Event] = {
 
 def legal(event: str, lease: Lease, person: Person, to: Person) -> bool:
     """Return whether the rules of the lease allow the event, written independently of the code."""
-    free, mine = lease.holder is None, lease.holder == person
+    mine = lease.holder == person
+    # An arm whose holder has closed its window is free for others.
+    free = lease.holder is None or (lease.left < math.inf and not mine)
     drives = person.role is not Role.VIEWER
     match event:
         case "acquire":
@@ -49,7 +53,7 @@ def legal(event: str, lease: Lease, person: Person, to: Person) -> bool:
             return person in lease.waiting
         case "hand over":
             return mine and to != person and to.role is not Role.VIEWER
-        case "release" | "hear":
+        case "release" | "hear" | "close":
             return mine
     return True
 
@@ -61,8 +65,8 @@ def leases() -> list[Lease]:
         others = [each for each in (ANNA, BERT, CARA) if each != holder]
         for size in range(len(others) + 1):
             for waiting in itertools.permutations(others, size):
-                found.append(Lease(holder, 10.0 if holder else -float("inf"), waiting))
-    return found
+                found.append(Lease(holder, 10.0 if holder else -math.inf, waiting))
+    return found + [replace(each, left=10.5) for each in found if each.holder is not None]
 
 
 @pytest.mark.parametrize("event", EVENTS)
@@ -109,9 +113,10 @@ def test_lease_has_at_most_one_holder_who_never_waits_for_it(
         assert DORA not in lease.waiting
         if lease.holder != before.holder and before.holder is not None:
             # Only these events take the arm from its holder.
-            assert event in {"take", "hand over", "release", "expire"}
+            taken = {"take", "hand over", "release", "expire"}
+            assert event in taken or (event == "acquire" and before.left < math.inf)
         if event == "hear":
-            assert lease == replace(before, heard=t)
+            assert replace(lease, left=before.left) == replace(before, heard=t)
 
 
 def test_only_a_free_lease_is_granted() -> None:
@@ -165,3 +170,15 @@ def test_lease_of_a_departed_driver_expires_after_the_timeout() -> None:
     lease = Lease().acquire(ANNA, 1.0).request(BERT)
     assert lease.leave(BERT).waiting == ()
     assert lease.leave(ANNA).holder == ANNA
+
+
+def test_closed_window_frees_the_arm_until_its_page_is_back() -> None:
+    lease = Lease().acquire(ANNA, 1.0).request(BERT).close(ANNA, 2.0)
+    assert (lease.holder, lease.driver) == (ANNA, None)
+    assert lease.acquire(BERT, 2.1).driver == BERT
+    with pytest.raises(LeaseError, match="is free"):
+        lease.request(CARA)
+    # A heartbeat that was under way when the window was closed is no return.
+    assert lease.hear(ANNA, 2.1).driver is None
+    assert lease.hear(ANNA, 2.1 + RETURN_TIME).driver == ANNA
+    assert lease.expire(1.0 + LEASE_TIMEOUT).holder is None

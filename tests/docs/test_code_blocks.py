@@ -34,6 +34,7 @@ NOT_CHECKED = {
     "text": "a diagram, or a summary of options, which is compared with the help",
     "caddy": "the configuration of another program, which is not installed here",
     "nginx": "the configuration of another program, which is not installed here",
+    "ini": "the configuration of another program, which is not installed here",
 }
 # Commands of shell blocks that are neither ours nor targets of make, and where they are run.
 ELSEWHERE = {

@@ -247,7 +247,7 @@ def test_values_and_findings_are_recorded(session: tuple[Path, dict[str, str], s
     assert stops[0]["what"]["began"]
     assert stops[1]["what"]["began"] is False
     (restart,) = (each for each in found if each["kind"] == "restart")
-    assert restart["what"] == {"process": "front end", "status": -signal.SIGKILL}
+    assert restart["what"] == {"process": "katana450 front", "status": -signal.SIGKILL}
 
 
 def test_participants_are_named_by_role_link_and_address(

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import signal
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from katana450.client import connect
 from katana450.server.api import answers, requests
-from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer, free_port
+from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import ask, controlling
 from tests.gateway.lines import speaking
 from tests.gateway.test_isolation import FAR, under_way
@@ -29,7 +25,8 @@ pytestmark = pytest.mark.skipif(
 REPORTED = 0.5
 """Time [s] after which missing states are reported; a busy machine gets twice as long."""
 
-# Ends the control thread as soon as the arm moves, like an unexpected error.
+# Ends the control thread as soon as the arm moves, like an unexpected error. Every process of the
+# server imports this file.
 FATAL = """
 import sys
 from katana450.cli.main import main
@@ -39,20 +36,10 @@ def fatal(loop):
     tick(loop)
     if loop.state_publisher.snapshot.state.moving:
         raise SystemExit
+ControlLoop.tick = fatal
 if __name__ == "__main__":
-    ControlLoop.tick = fatal
-    sys.exit(main(["serve", "--port", sys.argv[1], "--silence", "2.0"]))
+    sys.exit(main(["serve", "--port", sys.argv[1]]))
 """
-
-
-@contextmanager
-def frozen(process: int) -> Iterator[None]:
-    """Suspend ``process`` inside the ``with`` block."""
-    os.kill(process, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(process, signal.SIGCONT)
 
 
 def state_of(server: AppServer) -> dict[str, object]:
@@ -66,7 +53,7 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
             with connect(server.url, "Driver") as arm:
                 before = await asyncio.to_thread(under_way, arm)
                 assert ask(f"{server.url}/health")[0] == 200
-                with frozen(server.pid):
+                with server.frozen_arm():
                     began = time.monotonic()
                     await control.wait(headline="No answer from the arm")
                     assert time.monotonic() - began < 2 * REPORTED
@@ -106,7 +93,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         driver.say(do="joints", q=FAR.tolist())
         while driver.answer(do="query")["q"][0] < 0.2:
             time.sleep(0.02)
-        with frozen(server.pid):
+        with server.frozen_arm():
             end = time.monotonic() + 10.0
             while state_of(server)["stopped"] is None:
                 driver.say(do="heartbeat")
@@ -124,25 +111,19 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 
 
-def test_server_ends_when_its_control_loop_has_ended() -> None:
-    port = free_port()
-    with subprocess.Popen(
-        [sys.executable, "-c", FATAL, str(port)],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        try:
-            assert process.stdout is not None
-            for line in process.stdout:
-                if "is ready" in line:
-                    break
-            with connect(f"http://127.0.0.1:{port}", "Driver") as arm:
-                arm.ask(requests.Joints(q=FAR.tolist()))
-                assert process.wait(timeout=15.0) == 1
-            assert "control loop has ended" in process.stdout.read()
-        finally:
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
+def test_control_loop_that_ended_is_started_again_stopped(tmp_path: Path) -> None:
+    app = tmp_path / "fatal.py"
+    app.write_text(FATAL, encoding="utf-8")
+    with AppServer((sys.executable, str(app), "{port}")) as server:
+        killed = server.arm
+        with connect(server.url, "Driver") as arm:
+            arm.ask(requests.Joints(q=FAR.tolist()))
+            end = time.monotonic() + 15.0
+            while (state := arm.query(answers.State)).stopped is None or state.age > REPORTED:
+                assert time.monotonic() < end
+                time.sleep(0.05)
+            assert not state.moving
+            assert server.arm != killed
+            reasons = [line.finding.reason for line in arm.query(answers.EventLog).lines]
+            assert "restarted" in reasons
+        assert "The arm's process ended with status 1" in server.output

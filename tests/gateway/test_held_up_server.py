@@ -57,7 +57,8 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
                 assert look(server, "state")["stopped"] is None
                 return
         state = look(server, "state")
-        assert state["stopped"] == "Driver fell silent while the arm moved."
+        # The server was late, but the kernel knows when messages arrived.
+        assert "No message of Driver arrived" in state["stopped"]
         stopped = [
             line["when"]
             for line in look(server, "event_log")["lines"]

@@ -18,7 +18,8 @@ from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State, StoppingDistance
+from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.state import Finding, Reason, State, StoppingDistance
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -54,6 +55,8 @@ class FakeArm:
 
     def __init__(self, state: State) -> None:
         self.rest = state
+        self.profile = SilenceProfile.REAL_ARM
+        self.cause: Finding | None = None
         self.moves = False
         self.holds = 0
         self.stops = 0
@@ -70,9 +73,9 @@ class FakeArm:
     @property
     def state(self) -> State:
         stopped = StoppingDistance(0.0, 0.0) if self.stopped else None
-        if not self.moves:
-            return replace(self.rest, stopped=stopped)
-        return replace(self.rest, goal=self.rest.setpoint + 0.1, stopped=stopped)
+        findings = () if self.cause is None else (Finding(Reason.WAITING), self.cause)
+        state = replace(self.rest, stopped=stopped, findings=findings)
+        return replace(state, goal=state.setpoint + 0.1) if self.moves else state
 
     @property
     def snapshot(self) -> Snapshot:
@@ -104,9 +107,10 @@ class FakeArm:
                 return self.stops
             case cmd.ClearStop():
                 self.stopped = False
-            case cmd.Hold():
+            case cmd.Hold(finding=cause):
                 self.holds += 1
                 self.moves = False
+                self.cause = cause
             case cmd.Jog(rates=rates, frame=frame):
                 self.jogs.append((tuple(rates.tolist()), frame))
             case _:

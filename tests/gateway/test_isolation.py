@@ -76,7 +76,8 @@ def test_frozen_front_end_causes_a_stop_in_time() -> None:
         before = under_way(arm)
         front = server.front
         os.kill(front, signal.SIGSTOP)
-        time.sleep(1.5)
+        # Shorter than the time after which the supervisor ends it.
+        time.sleep(1.0)
         os.kill(front, signal.SIGCONT)
         # Messages that arrived meanwhile are read first.
         while (state := arm.query(answers.State)).stopped is None:
@@ -87,7 +88,7 @@ def test_frozen_front_end_causes_a_stop_in_time() -> None:
         assert "STOP" in server.output
 
 
-def test_front_end_ends_with_the_process_of_the_arm(server: AppServer) -> None:
+def test_front_end_ends_with_the_supervisor(server: AppServer) -> None:
     front = server.front
     os.kill(server.pid, signal.SIGKILL)
     end = time.monotonic() + 10.0

@@ -39,4 +39,4 @@ def test_only_the_link_makes_command_messages() -> None:
         for path in PACKAGE.rglob("*.py")
         if "CommandMessage(" in path.read_text(encoding="utf-8")
     }
-    assert made == {"arm/runtime/link.py"}
+    assert made == {"arm/runtime/front_end.py"}

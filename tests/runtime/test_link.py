@@ -7,19 +7,23 @@ import os
 import socket
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 
 import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control import silence
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, Verdict
+from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.state import Finding, Reason, Verdict
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.link import ArmEnd, FrontEnd
+from katana450.arm.runtime.front_end import FrontEnd
+from katana450.arm.runtime.link import ArmEnd, CommandMessage
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES
@@ -31,11 +35,18 @@ SILENCE = 0.3
 class Ends:
     """Both ends of the link, and the control loop."""
 
-    def __init__(self, arm: ArmModel, session: Session) -> None:
+    def __init__(
+        self,
+        arm: ArmModel,
+        session: Session,
+        profile: SilenceProfile = SilenceProfile.REAL_ARM,
+    ) -> None:
         self.session = session
         self.mailbox = Mailbox(session.check)
         driver = SimulatedDriver(arm, session.ready, 0.0)
-        self.loop = ControlLoop(session, driver, self.mailbox, MonotonicClock(), 100.0)
+        self.loop = ControlLoop(
+            session, driver, self.mailbox, MonotonicClock(), 100.0, profile=profile
+        )
         self.loop.start()
         self.arm_end, self.front = self.connect()
 
@@ -129,6 +140,7 @@ def test_event_log_crosses_the_pipe_entry_by_entry(ends: Ends) -> None:
     assert entries == [(e.t, e.finding, e.began) for e in ends.loop.state_publisher.event_log]
     # A front end that connects later receives the event log too.
     ends.arm_end.close()
+    until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
     ends.arm_end, late = ends.connect()
     assert [e.t for e in late.state_publisher.event_log] == [
         e.t for e in ends.loop.state_publisher.event_log
@@ -143,6 +155,46 @@ def test_silent_front_end_stops_a_moving_arm(ends: Ends) -> None:
     until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
     assert SILENCE < time.monotonic() - began < 2 * SILENCE
     until(lambda: not ends.loop.state_publisher.snapshot.state.moving)
+
+
+def test_silent_front_end_pauses_a_simulated_arm(
+    arm: ArmModel, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(silence, "PAUSE_TIMEOUT", 1.0)
+    ends = Ends(arm, session, SilenceProfile.SIMULATION)
+    front, publisher = ends.front, ends.loop.state_publisher
+    assert front.profile is SilenceProfile.SIMULATION
+    front.deliver(cmd.SetJoint(0, 2.0))
+    until(lambda: publisher.snapshot.state.waits)
+    until(lambda: front.state_publisher.snapshot.state.waits)
+    until(lambda: not publisher.snapshot.state.moving)
+    assert publisher.snapshot.state.stopped is None
+    # The next command moves the arm.
+    front.deliver(cmd.SetJoint(0, 1.0))
+    wait_with_heartbeats(ends, lambda: publisher.snapshot.state.q[0] == 1.0)
+    assert not publisher.snapshot.state.waits
+    # Longer silence latches the stop.
+    front.deliver(cmd.SetJoint(0, -2.0))
+    until(lambda: publisher.snapshot.state.stopped is not None)
+    assert Reason.SERVER_SILENT in {each.reason for each in publisher.snapshot.state.findings}
+    ends.arm_end.close()
+    ends.loop.stop()
+
+
+def test_command_older_than_a_pause_is_refused(arm: ArmModel, session: Session) -> None:
+    ends = Ends(arm, session, SilenceProfile.SIMULATION)
+    front, publisher = ends.front, ends.loop.state_publisher
+    front.deliver(cmd.SetJoint(0, 2.0))
+    wait_with_heartbeats(ends, lambda: publisher.snapshot.state.moving)
+    ends.loop.brake(Finding(Reason.LOOP_LATE, 0.3), 0.3)
+    # The front end does not know of the pause yet.
+    ends.theirs.send(CommandMessage(99, cmd.SetJoint(0, 2.0), None, ends.loop.paused_at - 0.01))
+    wait_with_heartbeats(ends, lambda: publisher.snapshot.state.waits)
+    wait_with_heartbeats(ends, lambda: not publisher.snapshot.state.moving)
+    assert publisher.snapshot.state.waits
+    assert "just paused" in front.state_publisher.outcomes.of(99).result(5.0).why
+    ends.arm_end.close()
+    ends.loop.stop()
 
 
 def test_broken_pipe_stops_the_arm_and_a_new_front_end_moves_nothing(ends: Ends) -> None:
@@ -241,3 +293,48 @@ def test_command_for_a_full_mailbox_is_refused(ends: Ends) -> None:
     outcome = ends.front.state_publisher.outcomes.of(ticket).result(5.0)
     assert outcome.verdict is Verdict.REFUSED
     assert "slower" in outcome.why
+
+
+def test_front_end_connects_to_a_new_process_of_the_arm(arm: ArmModel, session: Session) -> None:
+    old, new = Ends(arm, session), Ends(arm, session)
+    pipes: list[Connection] = []
+    numbers: list[int] = []
+
+    def reconnect(number: int) -> Connection:
+        numbers.append(number)
+        if not pipes:
+            raise ConnectionRefusedError
+        return pipes.pop()
+
+    ours, theirs = multiprocessing.Pipe()
+    arm_end = ArmEnd(ours, old.loop, old.mailbox, SILENCE)
+    arm_end.start()
+    front = FrontEnd(theirs, session.check, reconnect)
+    front.start()
+    front.deliver(cmd.SetJoint(0, 2.0))
+    until(lambda: front.state_publisher.snapshot.ticket == 1)
+    # The end of the process closes its end of the pipe.
+    with socket.socket(fileno=os.dup(ours.fileno())) as line:
+        line.shutdown(socket.SHUT_RDWR)
+    until(lambda: bool(numbers))
+    assert front.age > 0.0
+    with pytest.raises(InputError, match="only STOP"):
+        front.deliver(cmd.SetJoint(0, 1.0))
+    stop = front.deliver(cmd.Stop())
+    until(lambda: numbers[-1] == stop)
+    ours, theirs = multiprocessing.Pipe()
+    later = ArmEnd(ours, new.loop, new.mailbox, SILENCE, numbers[-1])
+    later.start()
+    pipes.append(theirs)
+    until(lambda: front.state_publisher.snapshot.ticket == stop)
+    # No command to the process that ended has reached the new one.
+    assert new.mailbox.last_ticket == 0
+    assert front.last_ticket == stop
+    ticket = front.deliver(cmd.SetJoint(0, 0.1))
+    until(lambda: front.state_publisher.snapshot.ticket == ticket)
+    # Another front end replaces this one.
+    later.close()
+    assert front.cut.wait(2.0)
+    for each in (old, new):
+        each.arm_end.close()
+        each.loop.stop()

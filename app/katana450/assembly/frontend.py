@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from multiprocessing.connection import Connection
+from threading import Event
 
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.link import FrontEnd
+from katana450.arm.runtime.arm_listener import FRONT, Greeting, connect, connect_when_ready
+from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
 from katana450.assembly.gateway import Gateway
@@ -26,9 +27,9 @@ from katana450.server.view.view_updater import ViewUpdater
 
 
 def build_frontend(
-    gateway: Gateway, config: FrontendConfig, meshes: Meshes, pipe: Connection
+    gateway: Gateway, config: FrontendConfig, meshes: Meshes, ended: Event
 ) -> tuple[FrontEnd, ViewUpdater]:
-    """Connect ``gateway`` to the arm and return this process's end of ``pipe`` and the view.
+    """Connect ``gateway`` to the arm and return the link to its process and the view.
 
     The link runs when this function returns, so no answer contains a state older than the link. The
     view is not started.
@@ -37,16 +38,21 @@ def build_frontend(
         gateway: the server of the page.
         config: settings and options of the front end.
         meshes: the meshes of scene objects.
-        pipe: the connection to the arm's process.
+        ended: set when the server ends.
 
     Raises:
         ConfigurationError: an option needs an arm, but the robot has none.
-        EOFError: the arm's process has closed the pipe.
+        EOFError: the server ends, or the arm's process has closed the link.
     """
     settings, layers = config.settings, _layers(config.options)
     found = find_robot(settings, config.urdf, config.tool)
     robot, session, _ = found
-    link = FrontEnd(pipe, session.check)
+    address = config.address
+    link = FrontEnd(
+        connect_when_ready(address, Greeting(FRONT), ended),
+        session.check,
+        lambda number: connect(address, Greeting(FRONT, number)),
+    )
     nodes = _nodes(config.options, robot, session.environment)
     if robot.arm is None:
         for layer in layers:

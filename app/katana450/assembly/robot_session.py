@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import gc
-import logging
 from dataclasses import replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
 from katana450.arm.control.messages import UNCHECKED
 from katana450.arm.control.scene_objects import Hand, SceneObject
 from katana450.arm.control.session import Session
-from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
-from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.water import water_environment
-from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.link import ArmEnd
-from katana450.arm.runtime.loop import ControlLoop
-from katana450.arm.runtime.mailbox import Mailbox
 from katana450.errors import RobotDescriptionError
-from katana450.platform_support import raise_priority
 from katana450.settings import Settings
-
-log = logging.getLogger(__name__)
 
 
 class DescribedRobot(NamedTuple):
@@ -91,68 +79,3 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         water_environment=water_environment(props) if objects else None,
     )
     return DescribedRobot(robot, session, tuple(notes))
-
-
-class RunningArm:
-    """A simulated arm with its control loop, driven by the front end at the end of a pipe."""
-
-    def __init__(
-        self, settings: Settings, found: DescribedRobot, scene: InitialScene | None = None
-    ) -> None:
-        """Prepare the arm; it does not run yet.
-
-        ``scene``: scene in place of the robot's own, and initial joint angles.
-        """
-        robot, session, self.notes = found
-        arm = robot.joint_group if robot.arm is None else robot.arm
-        start = session.ready if scene is None or scene.joints is None else scene.joints
-        driver = SimulatedDriver(arm, start, gripper=0.0)
-        self._mailbox = Mailbox(session.check)
-        if scene is not None:
-            self._mailbox.put(scene.command)
-        self._loop = ControlLoop(
-            session, driver, self._mailbox, MonotonicClock(), settings.rate, settings.silence
-        )
-        self._silence_timeout = settings.silence
-        self._link: ArmEnd | None = None
-
-    def start(self) -> None:
-        """Run the control loop in a separate thread."""
-        _be_prompt()
-        self._loop.start()
-
-    def attach(self, pipe: Connection) -> None:
-        """Execute the commands from the other end of ``pipe``, in place of any previous pipe."""
-        if self._link is not None:
-            self._link.close()
-        self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence_timeout)
-        self._link.start()
-
-    @property
-    def running(self) -> bool:
-        """True while the control loop runs."""
-        return self._loop.running
-
-    @property
-    def silence(self) -> float:
-        """[s] Time since the last message of the front end."""
-        return 0.0 if self._link is None else self._link.silence
-
-    def stop(self) -> None:
-        """Close the pipe, and end the loop."""
-        if self._link is not None:
-            self._link.close()
-        self._loop.stop()
-
-    def join(self) -> None:
-        """Wait for the threads of the link; call it after ``stop``, when the front end ended."""
-        if self._link is not None:
-            self._link.join()
-
-
-def _be_prompt() -> None:
-    """Keep garbage collection and other processes from delaying the ticks."""
-    # Exempt all present objects from garbage collection, which would delay a tick too much.
-    gc.collect()
-    gc.freeze()
-    raise_priority()

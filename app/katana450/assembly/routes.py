@@ -129,6 +129,7 @@ def application(
         Route("/viser/", viser_index),
         Route("/enter", enter, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),
+        _leave_route(hub, authenticator),
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),
         WebSocketRoute("/control", control),
@@ -144,6 +145,17 @@ async def _muted(_request: Request, error: Exception) -> Response:
     assert isinstance(error, MutedError)
     retry = {"Retry-After": str(math.ceil(error.retry))}
     return PlainTextResponse(str(error), TOO_MANY, retry)
+
+
+def _leave_route(hub: Hub, authenticator: Authenticator) -> Route:
+    async def leave(request: Request) -> Response:
+        """Free the arm of a page whose window was closed."""
+        identity = _signed_in(authenticator, request)
+        if PAGE.fullmatch(name := request.query_params.get("page", "")):
+            hub.close(identity, name)
+        return Response(status_code=204)
+
+    return Route("/leave", leave, methods=["POST"])
 
 
 def _check_admitted(authenticator: Authenticator, request: Request, token: str) -> None:

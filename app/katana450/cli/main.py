@@ -7,8 +7,8 @@ import errno
 import sys
 from collections.abc import Sequence
 
+from katana450.assembly.output import drop_output
 from katana450.cli.core_commands import CORE_COMMANDS
-from katana450.cli.output import drop_output
 from katana450.cli.version import version
 from katana450.errors import KatanaError
 from katana450.extension import CliCommand, extensions, missing_extension

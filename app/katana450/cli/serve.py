@@ -1,46 +1,43 @@
-"""``katana450 serve``: open the port, run the arm, and keep a front end running."""
+"""``katana450 serve``: open the ports, and supervise the processes of the server."""
 
 from __future__ import annotations
 
-import logging
+import multiprocessing
+import secrets
+import shutil
 import signal
-import sys
+import tempfile
 import threading
-import time
 from argparse import Namespace
+from functools import partial
+from multiprocessing.connection import Connection
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import Any
 
-from katana450.assembly.frontend_process import OPEN, READY, FrontendConfig, FrontendProcess
+from katana450.arm.runtime.arm_listener import ArmAddress
+from katana450.assembly.arm_process import ArmConfig, run_arm
+from katana450.assembly.frontend_process import OPEN, FrontendConfig, run_frontend
 from katana450.assembly.log_lines import start_log
-from katana450.cli.output import say
+from katana450.assembly.output import say
+from katana450.assembly.supervised import READY
+from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.extension import serve_extensions
-from katana450.platform_support import stop_signals
+from katana450.platform_support import pipe_address, stop_signals
 from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
 from katana450.server.web.listen import LOOPBACK, listen
 from katana450.settings import Settings
 
-if TYPE_CHECKING:
-    from katana450.arm.control.session import Session
-    from katana450.arm.robot.initial_scene import InitialScene
-    from katana450.assembly.robot_session import DescribedRobot
+ARM, FRONT_END = "katana450 arm", "katana450 front"
+"""Names of the processes."""
 
-WAKE_INTERVAL = 0.2
-"""[s] Interval at which signals and the end of a front end are checked."""
+ARM_DEADLINE = 1.0
+"""[s] Time without a tick of the control loop after which the arm's process is ended."""
 
-RESTART_DELAYS = (0.0, 1.0, 5.0, 15.0)
-"""[s] Delay before a front end is started again: after a stable run, then after the first, second
-and each further early end in a row."""
-
-STABLE_SECONDS = 30.0
-"""[s] A front end that ended after a longer time did not end early."""
-
-HANG_TIMEOUT = 10.0
-"""[s] A front end that sends nothing for so long has hung."""
-
-log = logging.getLogger(__name__)
+FRONT_END_DEADLINE = 1.5
+"""[s] Silence after which a front end is ended. A thread of its own sends the heartbeats, so load
+does not cause silence."""
 
 
 def serve_with(options: Namespace) -> int:
@@ -49,6 +46,7 @@ def serve_with(options: Namespace) -> int:
         host=options.host,
         port=options.port,
         silence=options.silence,
+        strict_silence=options.strict_silence,
         access=options.access,
         insecure=options.insecure,
         tls_cert=options.tls_cert,
@@ -68,7 +66,7 @@ def serve(
     tool: str | None = None,
     options: Namespace | None = None,
 ) -> int:
-    """Run the app until SIGINT or SIGTERM; return the exit status, 1 if the control loop ended.
+    """Run the app until SIGINT or SIGTERM; return the exit status.
 
     Args:
         settings: settings of the server.
@@ -77,92 +75,63 @@ def serve(
         options: options of the extensions; None if no extension takes part.
     """
     start_log()
-    # Read first: the front end gets this scene each time it is started.
-    robot, scene = _with_scene(settings, urdf, tool, options)
     stopping = threading.Event()
     _set_on_signals(stopping)
     # Held by this process, so that the port stays taken while the front end is started again.
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
-
     event_log = _server_log(options, listening.getsockname()[1])
-    meshes = () if scene is None else scene.meshes
-    config = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
-    front, arm = FrontendProcess(config, event_log), None
+    # Only this user can open it.
+    folder = Path(tempfile.mkdtemp(prefix="katana450-"))
+    address = ArmAddress(pipe_address(folder, "arm"), secrets.token_bytes(32))
+    front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
+    arm = ArmConfig(settings, urdf, tool, options, address, folder)
+    specs = (
+        ChildSpec(
+            FRONT_END, "The page's server", _FrontendWork(front, event_log), FRONT_END_DEADLINE
+        ),
+        child_spec(ARM, "The arm's process", run_arm, arm, ARM_DEADLINE, keeps=True),
+    )
+    supervisor = Supervisor(specs, stopping, event_log.restart)
     try:
-        # Importing the libraries that read the robot takes most of a second. The front end starts
-        # meanwhile.
-        from katana450.assembly.robot_session import RunningArm, find_robot
-
-        found = find_robot(settings, urdf, tool) if robot is None else robot
-        arm = RunningArm(settings, found, scene)
-        for note in arm.notes:
-            print(f"katana450: {note}", file=sys.stderr)
-        front.wait_for(OPEN)
-        say(f"Open {url} in a browser.")
-        arm.start()
-        arm.attach(front.pipe)
-        front.wait_for(READY)
-        if lines is not None:
-            say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
-        for line in event_log.description:
-            say(line)
-        say(f"katana450 is ready: {url} (Ctrl-C stops)")
-        early_ends, started = 0, time.monotonic()
-        # A signal that another thread receives does not wake this one from its wait.
-        while arm.running and not stopping.wait(WAKE_INTERVAL):
-            if front.running:
-                if time.monotonic() - started > STABLE_SECONDS and arm.silence > HANG_TIMEOUT:
-                    log.error("The page's server has sent nothing for %g s.", HANG_TIMEOUT)
-                    front.kill()
-                continue
-            log.error(
-                "The page's server ended with status %s and is started again; the arm holds.",
-                front.exit_code,
-            )
-            event_log.restart("front end", front.exit_code)
-            early_ends = 0 if time.monotonic() - started > STABLE_SECONDS else early_ends + 1
-            stopping.wait(RESTART_DELAYS[min(early_ends, len(RESTART_DELAYS) - 1)])
-            front.stop()
-            front, started = FrontendProcess(config, event_log), time.monotonic()
-            arm.attach(front.pipe)
+        supervisor.start()
+        supervisor.wait_for(ARM, READY)
+        supervisor.wait_for(FRONT_END, OPEN)
         if not stopping.is_set():
-            log.critical("The control loop has ended, so the server ends too. Start it again.")
+            say(f"Open {url} in a browser.")
+        supervisor.wait_for(FRONT_END, READY)
+        if not stopping.is_set():
+            if lines is not None:
+                say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
+            for line in event_log.description:
+                say(line)
+            say(f"katana450 is ready: {url} (Ctrl-C stops)")
+        supervisor.run()
     finally:
-        # The arm first: a front end whose arm closes the link ends by itself.
-        if arm is not None:
-            arm.stop()
-        front.stop()
-        if arm is not None:
-            arm.join()
+        supervisor.stop()
         listening.close()
         event_log.close(requested=stopping.is_set())
-    return 0 if stopping.is_set() else 1
+        shutil.rmtree(folder, ignore_errors=True)
+    return 0
 
 
-def _with_scene(
-    settings: Settings, urdf: Path, tool: str | None, options: Namespace | None
-) -> tuple[DescribedRobot | None, InitialScene | None]:
-    """Return the scene that an extension starts with, and the robot if it was read for that."""
-    if options is None:
-        return None, None
-    found_robots: list[DescribedRobot] = []
+class _FrontendWork:
+    """Returns the function of each front end that is started, with a new pipe to the event log."""
 
-    def session() -> Session:
-        from katana450.assembly.robot_session import describe_robot
+    def __init__(self, config: FrontendConfig, event_log: ServerLog) -> None:
+        self._config = config
+        self._event_log = event_log
+        self._sender: Connection | None = None
 
-        if not found_robots:
-            found_robots.append(describe_robot(settings, urdf, tool))
-        return found_robots[0].session
-
-    scene = None
-    for part in serve_extensions():
-        if scene is None and part.initial_scene is not None:
-            scene = part.initial_scene(options, session)
-    for note in () if scene is None else scene.notes:
-        say(f"katana450: {note}")
-    return (found_robots[0] if found_robots else None), scene
+    def __call__(self, _kept: object) -> Work:
+        if self._sender is not None:
+            # The front end before has ended, so its pipe must end too.
+            self._sender.close()
+        ends: Any = multiprocessing.get_context("spawn").Pipe()
+        receiver, self._sender = ends
+        self._event_log.attach(receiver)
+        return partial(run_frontend, self._config, self._sender)
 
 
 def _set_on_signals(stopping: threading.Event) -> None:

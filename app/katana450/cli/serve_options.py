@@ -29,8 +29,14 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         type=_silence,
         default=Settings.silence,
         metavar="SECONDS",
-        help="heartbeat timeout of the driver, after which a moving arm is stopped; the page sends "
+        help="heartbeat timeout of the driver, after which a moving arm brakes; the page sends "
         f"ten a second ({MIN_SILENCE:g} to {MAX_SILENCE:g}, default: %(default)s)",
+    )
+    parser.add_argument(
+        "--strict-silence",
+        action="store_true",
+        help="after the heartbeat timeout, stop a simulated arm like a real one until the stop is "
+        "cleared; without this option it pauses, and the next command moves it",
     )
     parser.add_argument(
         "--access",

@@ -30,6 +30,7 @@ from katana450.arm.control.object_commands import (
     ReplaceScene,
     SetAppearance,
 )
+from katana450.arm.control.state import Finding
 from katana450.arm.control.traits import (
     BaseCommand,
     CommandTraits,
@@ -224,18 +225,28 @@ class GoToZero(BaseCommand):
 
 @dataclass(frozen=True)
 class Hold(BaseCommand):
-    """Come to rest and drop the targets of arm and gripper."""
+    """Come to rest and drop the targets of arm and gripper.
+
+    With a ``finding``, which only the server gives, the arm pauses and reports it as the cause.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits(protective=True, joints_only=True)
+
+    finding: Finding | None = None
 
 
 @dataclass(frozen=True)
 class Stop(BaseCommand):
-    """Come to rest as fast as the arm can, and accept no motion until ClearStop."""
+    """Come to rest as fast as the arm can, and accept no motion until ClearStop.
+
+    ``finding``: the cause, where the server stops the arm by itself.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits(
         while_stopped=True, protective=True, joints_only=True, safety=True
     )
+
+    finding: Finding | None = None
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from katana450.arm.control.modes import (
     Servoing,
     Tracking,
 )
-from katana450.arm.control.state import GRIPPER_LIMITS, Finding, Reason, State
+from katana450.arm.control.state import CAUSES, GRIPPER_LIMITS, Finding, Reason, State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.chain import Chain
@@ -57,9 +57,16 @@ def with_goal(
     return with_mode(aimed, Positioning(JointTarget(goal)) if mode is None else mode)
 
 
-def without_finding(state: State, reason: Reason) -> State:
-    """Return ``state`` without the findings of that ``reason``."""
-    return replace(state, findings=tuple(f for f in state.findings if f.reason is not reason))
+def without_finding(state: State, *reasons: Reason) -> State:
+    """Return ``state`` without the findings of those ``reasons``."""
+    return replace(state, findings=tuple(f for f in state.findings if f.reason not in reasons))
+
+
+def without_cause(state: State) -> State:
+    """Return ``state`` after a command that ends a pause or a stop by the server."""
+    if not any(f.reason is Reason.WAITING or f.reason in CAUSES for f in state.findings):
+        return state
+    return without_finding(state, Reason.WAITING, *CAUSES)
 
 
 def end_drag(state: State) -> State:

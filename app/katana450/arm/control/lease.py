@@ -21,6 +21,10 @@ LEASE_TIMEOUT = 3.0
 keep the arm."""
 
 
+RETURN_TIME = 0.5
+"""[s] Heartbeats that arrive sooner after a window was closed may have been sent before that."""
+
+
 class Role(Enum):
     """The rights of a person; each role includes those of the roles before it."""
 
@@ -70,19 +74,27 @@ class Lease:
         heard: time of the holder's last heartbeat [s].
         waiting: the persons who have asked for the arm, in the order of their requests; never the
             holder.
+        left: time at which the holder closed its window [s]; infinite while it is open. Others may
+            then take the arm at once; a page that returns before that keeps it.
     """
 
     holder: Person | None = None
     heard: float = -math.inf
     waiting: tuple[Person, ...] = ()
+    left: float = math.inf
+
+    @property
+    def driver(self) -> Person | None:
+        """The holder; None while the arm is free or the holder has closed its window."""
+        return self.holder if self.left == math.inf else None
 
     def acquire(self, person: Person, t: float) -> Self:
         """Return the lease with ``person`` as its holder, if the arm is free."""
         _check_may_drive(person)
         if self.holder == person:
             raise LeaseError("You hold the arm already.")
-        if self.holder is not None:
-            raise LeaseError(f"{self.holder.name} holds the arm: ask for it.")
+        if self.driver is not None:
+            raise LeaseError(f"{self.driver.name} holds the arm: ask for it.")
         return self._given(person, t)
 
     def take(self, person: Person, t: float) -> Self:
@@ -93,19 +105,19 @@ class Lease:
         _check_may_drive(person)
         if self.holder == person:
             raise LeaseError("You hold the arm already.")
-        if self.holder is not None and not person.role.may_take:
-            raise LeaseError(f"Only an admin may take the arm from {self.holder.name}: ask for it.")
+        if self.driver is not None and not person.role.may_take:
+            raise LeaseError(f"Only an admin may take the arm from {self.driver.name}: ask for it.")
         return self._given(person, t)
 
     def request(self, person: Person) -> Self:
         """Return the lease with the request of ``person`` to the holder."""
         _check_may_drive(person)
-        if self.holder is None:
+        if self.driver is None:
             raise LeaseError("The arm is free: use it without a request.")
         if self.holder == person:
             raise LeaseError("You hold the arm already.")
         if person in self.waiting:
-            raise LeaseError(f"You have asked {self.holder.name} already.")
+            raise LeaseError(f"You have asked {self.driver.name} already.")
         return replace(self, waiting=(*self.waiting, person))
 
     def withdraw(self, person: Person) -> Self:
@@ -132,12 +144,21 @@ class Lease:
     def release(self, person: Person) -> Self:
         """Return the free lease, released by its holder; the requests stay."""
         self._check_holds(person)
-        return replace(self, holder=None, heard=-math.inf)
+        return self._free()
 
     def hear(self, person: Person, t: float) -> Self:
-        """Return the lease with a heartbeat of the holder at ``t`` [s]."""
+        """Return the lease with a heartbeat of the holder at ``t`` [s].
+
+        A heartbeat RETURN_TIME after its window was closed shows that the holder is back.
+        """
         self._check_holds(person)
-        return replace(self, heard=max(t, self.heard))
+        back = t > self.left + RETURN_TIME
+        return replace(self, heard=max(t, self.heard), left=math.inf if back else self.left)
+
+    def close(self, person: Person, t: float) -> Self:
+        """Return the lease whose holder closed its window at ``t`` [s]."""
+        self._check_holds(person)
+        return replace(self, left=t)
 
     def leave(self, person: Person) -> Self:
         """Return the lease after ``person`` has disconnected.
@@ -151,14 +172,17 @@ class Lease:
         """Return the lease, freed if its holder has been silent for LEASE_TIMEOUT at ``t`` [s]."""
         if self.holder is None or self.silence(t) < LEASE_TIMEOUT:
             return self
-        return replace(self, holder=None, heard=-math.inf)
+        return self._free()
 
     def silence(self, t: float) -> float:
         """Return the time since the last heartbeat of the holder [s]; 0 if the arm is free."""
         return 0.0 if self.holder is None else max(t - self.heard, 0.0)
 
+    def _free(self) -> Self:
+        return replace(self, holder=None, heard=-math.inf, left=math.inf)
+
     def _given(self, person: Person, t: float) -> Self:
-        return replace(self._without(person), holder=person, heard=t)
+        return replace(self._without(person), holder=person, heard=t, left=math.inf)
 
     def _without(self, person: Person) -> Self:
         return replace(self, waiting=tuple(each for each in self.waiting if each != person))

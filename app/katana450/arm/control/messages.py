@@ -104,6 +104,19 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"{_short(math.degrees(f.amount))}° off, or the arm still moves; go to its start first"
     ),
     Reason.INTERNAL: lambda _: "internal error: the arm holds; see the server's log",
+    Reason.RESTARTED: lambda _: "the arm's process was started again; see the server's log",
+    Reason.WAITING: lambda _: "paused: the next command moves the arm",
+    Reason.DRIVER_SILENT: lambda f: f"no message of the driver arrived for {f.amount:.2f} s",
+    Reason.DRIVER_LEFT: lambda _: "the driver's window was closed",
+    Reason.SERVER_SILENT: lambda f: (
+        f"the page's server was silent for {f.amount:.2f} s: it hangs, or this machine is too busy"
+    ),
+    Reason.LOOP_LATE: lambda f: (
+        f"the control loop was {f.amount:.2f} s late: this machine is too busy"
+    ),
+    Reason.MACHINE_BUSY: lambda f: (
+        f"the server was {f.amount:.2f} s late: this machine is too busy"
+    ),
 }
 
 STATUS: dict[Status, str] = {

@@ -7,10 +7,18 @@ from collections.abc import Callable
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.scene_objects import MAX_OBJECTS, named
-from katana450.arm.control.state import ACCEPTED, Outcome, PartRefusal, Reason, State, Verdict
+from katana450.arm.control.state import (
+    ACCEPTED,
+    CAUSES,
+    Outcome,
+    PartRefusal,
+    Reason,
+    State,
+    Verdict,
+)
 from katana450.arm.control.transitions import Effect, effect_of
 
-INTENDED_REASONS = (Reason.STOPPED, Reason.PAUSED)
+INTENDED_REASONS = (Reason.STOPPED, Reason.PAUSED, Reason.WAITING, *CAUSES)
 """Reasons that are the purpose of a command, and limit nothing."""
 
 

@@ -25,6 +25,7 @@ from katana450.arm.control.goals import (
     with_mode,
     with_stream_sample,
     with_time,
+    without_cause,
     without_finding,
 )
 from katana450.arm.control.grip import gripped
@@ -244,9 +245,11 @@ class Session:
             case Effect.ACCEPTED:
                 return self._accepted(state, command)
             case Effect.CONTINUES:
-                return self._continued(state, command)
+                return self._continued(without_cause(state), command)
             case Effect.SUPERSEDES:
-                return self._superseded(state, command)
+                # A stopped arm keeps the cause of its stop, however often it is stopped again.
+                again = isinstance(command, cmd.Stop)
+                return self._superseded(state if again else without_cause(state), command)
             case Effect.REFUSED:
                 return state
 
@@ -266,7 +269,7 @@ class Session:
             case cmd.EndDrag():
                 return end_drag(state)
             case cmd.SetGripper(angle=angle):
-                return self._grip(state, angle)
+                return self._grip(without_cause(state), angle)
         return with_scene_change(self.environment, self.pouring, state, command)
 
     def _continued(self, state: State, command: cmd.Command) -> State:
@@ -286,15 +289,17 @@ class Session:
     def _superseded(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` in the mode that ``command`` begins."""
         match command:
-            case cmd.Stop():
-                return self._stop_motion(state)
+            case cmd.Stop(finding=cause):
+                return self._stop_motion(state, cause)
             case cmd.ClearStop():
                 goal = self._stepper(state).stopping_point(state)[0]
                 free = with_mode(replace(state, stopped=None, goal=goal), IDLE)
                 return without_finding(free, Reason.STOPPED)
-            case cmd.Hold():
+            case cmd.Hold(finding=cause):
                 held = replace(state, gripper_goal=state.gripper_setpoint)
-                return self._at_rest_soon(without_finding(held, Reason.CONTACT))
+                held = self._at_rest_soon(without_finding(held, Reason.CONTACT))
+                why = () if cause is None else (Finding(Reason.WAITING), cause)
+                return replace(held, findings=(*why, *held.findings))
             case cmd.AxisCommand():
                 return self._aim(state, command.targets(state.goal))
             case cmd.SetJoints(q=q):
@@ -355,8 +360,8 @@ class Session:
         """Return ``state`` that brakes and holds, without a target."""
         return with_mode(self._aim(state, self._stepper(state).stopping_point(state)[0]), IDLE)
 
-    def _stop_motion(self, state: State) -> State:
-        """Return ``state`` that brakes and drops every target.
+    def _stop_motion(self, state: State, cause: Finding | None) -> State:
+        """Return ``state`` that brakes and drops every target, for the reason ``cause``.
 
         The grip stays, so that a held object does not fall.
         """
@@ -372,7 +377,8 @@ class Session:
             goal=goal,
             gripper_goal=state.gripper_setpoint,
         )
-        return replace(stopped, findings=(Finding(Reason.STOPPED, travel, time=time),))
+        why = () if cause is None else (cause,)
+        return replace(stopped, findings=(Finding(Reason.STOPPED, travel, time=time), *why))
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.require_arm().gripper

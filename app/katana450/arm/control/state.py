@@ -82,7 +82,24 @@ class Reason(Enum):
     NOT_AT_START = "not at the start"
     LOPSIDED = "one finger only"
     INTERNAL = "internal error"
+    RESTARTED = "restarted"
+    WAITING = "waiting"
+    DRIVER_SILENT = "driver silent"
+    DRIVER_LEFT = "driver left"
+    SERVER_SILENT = "server silent"
+    LOOP_LATE = "loop late"
+    MACHINE_BUSY = "machine busy"
 
+
+CAUSES = (
+    Reason.RESTARTED,
+    Reason.DRIVER_SILENT,
+    Reason.DRIVER_LEFT,
+    Reason.SERVER_SILENT,
+    Reason.LOOP_LATE,
+    Reason.MACHINE_BUSY,
+)
+"""The reasons for which the server itself stops or pauses the arm."""
 
 GRIPPER_LIMITS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT)
 """The reasons that concern only the fingers."""
@@ -97,7 +114,7 @@ class Finding:
         amount: the size of the effect [m or rad]. For a limit, the limit itself [rad or m]; for a
             gap, the leap across it [rad]; for a contact, the remaining distance [m]; for a
             stop, the travel of the tool, or else of any link, until rest [m]; for a plan, the
-            distance of the arm from its start [rad].
+            distance of the arm from its start [rad]; for silence and lateness, the time [s].
         axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
         parts: the two links or objects that the finding concerns; None if it concerns none.
         time: for a stop, the time until rest [s].
@@ -247,13 +264,18 @@ class State:
             return Status.FAULT
         if self.stopped is not None:
             return Status.STOPPED
-        if self.paused:
+        if self.paused or self.waits:
             return Status.PAUSED
         if any(finding.reason is Reason.CONTACT for finding in self.findings):
             return Status.BLOCKED
         if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
             return Status.GAP
         return Status.LIMITED if self.findings else Status.OK
+
+    @property
+    def waits(self) -> bool:
+        """True if the server has paused the arm, which waits for a new command."""
+        return any(finding.reason is Reason.WAITING for finding in self.findings)
 
     @property
     def intent(self) -> Idle | Positioning | Tracking | Jogging | Servoing | Following:

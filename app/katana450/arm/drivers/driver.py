@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from katana450.arm.control.silence import SilenceProfile
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -17,7 +18,13 @@ class SentSetpoint:
 
 
 class Driver(Protocol):
-    """An arm that takes a position setpoint each tick. Only the control loop calls it."""
+    """An arm that takes a position setpoint each tick. Only the control loop calls it.
+
+    Attributes:
+        silence_profile: reaction of the moving arm to silence.
+    """
+
+    silence_profile: SilenceProfile
 
     def start(self, t: float) -> SentSetpoint:
         """Connect to the arm, and return where it stands. ``t``: now [s]."""

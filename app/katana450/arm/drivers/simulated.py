@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from katana450.arm.control.arm import GripperModel
+from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.drivers.driver import SentSetpoint
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -29,6 +30,8 @@ class JointLimitsSource(Protocol):
 
 class SimulatedDriver:
     """A simulated arm that enforces limits and speeds itself, which reveals faults upstream."""
+
+    silence_profile = SilenceProfile.SIMULATION
 
     def __init__(self, arm: JointLimitsSource, q: FloatArray, gripper: float) -> None:
         """Create an arm at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad or m].

@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 import hashlib
+import logging
+import pickle
 import threading
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 from katana450.arm.control.solid import Solid
 from katana450.arm.robot import creases
 from katana450.arm.robot.creases import Colours
+from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+log = logging.getLogger(__name__)
 
 MAX_MESHES = 64
 """Maximum number of stored meshes."""
 
 MAX_BYTES = 200_000_000
 """[bytes] Maximum size of all stored meshes together."""
+
+
+SUFFIX = ".mesh"
+"""Suffix of the files of the meshes in a folder."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +83,32 @@ class Mesh:
 class Meshes:
     """A bounded, thread-safe store of meshes. Meshes in use are never removed."""
 
-    def __init__(self, maximum: int = MAX_MESHES, max_bytes: int = MAX_BYTES) -> None:
+    def __init__(
+        self,
+        folder: Path | None = None,
+        *,
+        maximum: int = MAX_MESHES,
+        max_bytes: int = MAX_BYTES,
+    ) -> None:
+        """Create a store.
+
+        ``folder``: private folder in which the meshes outlast this process; another process of this
+        server may have put some there. None keeps them in memory alone.
+        """
+        self._folder = folder
         self._limit = maximum
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
+        self._storing = threading.Lock()
         self._kept: dict[str, Mesh] = {}
 
     def get(self, key: str) -> Mesh | None:
         """Return the mesh with ``key``, or None if it is not stored."""
         with self._lock:
+            if key not in self._kept and self._folder is not None and key.isalnum():
+                # A file that is being written or removed counts as missing.
+                with suppress(OSError, EOFError, pickle.UnpicklingError):
+                    self._kept[key] = pickle.loads((self._folder / f"{key}{SUFFIX}").read_bytes())
             return self._kept.get(key)
 
     def need(self, key: str) -> Mesh:
@@ -108,7 +136,23 @@ class Meshes:
                     f"There is room for {self._limit} meshes of {self._max_bytes // 1_000_000} MB "
                     "in total. Remove objects first."
                 )
-            self._kept = kept
+            removed, self._kept = self._kept.keys() - kept.keys(), kept
+            if self._folder is not None:
+                # In a thread, because the server's thread must not wait for a disk.
+                work = (self._folder, tuple(new.values()), tuple(removed))
+                threading.Thread(target=self._store, args=work, name="meshes").start()
+
+    def _store(self, folder: Path, new: tuple[Mesh, ...], removed: tuple[str, ...]) -> None:
+        """Write the files of the ``new`` meshes to ``folder``, and remove those of ``removed``."""
+        with self._storing:
+            for key in removed:
+                (folder / f"{key}{SUFFIX}").unlink(missing_ok=True)
+            for mesh in new:
+                try:
+                    content = writer_of(pickle.dumps(mesh))
+                    write_files({folder / f"{mesh.key}{SUFFIX}": content}, 0o600)
+                except InputError as error:
+                    log.warning("A mesh will be lost if the page's server ends: %s", error)
 
     def _fits(self, kept: dict[str, Mesh]) -> bool:
         total = sum(mesh.bytes for mesh in kept.values())

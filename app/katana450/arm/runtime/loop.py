@@ -5,14 +5,16 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Protocol
 
 from katana450.arm.control.commands import Command, Stop
 from katana450.arm.control.event_log import LogEntry, entries_between
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import DROPPED, FAILED
-from katana450.arm.control.state import State
+from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
@@ -55,6 +57,8 @@ class ControlLoop:
         clock: Clock,
         rate: float,
         held_up: float = math.inf,
+        first: Callable[[State], State] | None = None,
+        profile: SilenceProfile = SilenceProfile.REAL_ARM,
     ) -> None:
         """Create the loop, and start the driver.
 
@@ -64,8 +68,10 @@ class ControlLoop:
             mailbox: the source of commands.
             clock: the clock of the ticks.
             rate: ticks per second [Hz].
-            held_up: lateness of a tick [s] that stops a moving arm, because the loop did not
+            held_up: lateness of a tick [s] for which a moving arm brakes, because the loop did not
                 supervise it meanwhile.
+            first: makes the first state from that with which the session begins; None keeps it.
+            profile: reaction of a moving arm to lateness and silence.
         """
         self._session = session
         self._driver = driver
@@ -73,15 +79,22 @@ class ControlLoop:
         self._clock = clock
         self._period = 1.0 / rate
         self._held_up = held_up
+        self.profile = profile
+        self.paused_at = -math.inf
+        """Time of the newest command with which the arm's process itself brakes the arm [s]."""
         t = clock.now()
         sent = driver.start(t)
-        self._state = session.begin(sent.q, sent.gripper, t)
+        begun = session.begin(sent.q, sent.gripper, t)
+        self._state = begun if first is None else first(begun)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
         self._newest: Submission | None = None
         self.state_publisher = StatePublisher(Snapshot(self._state, 0), self.loop_timing)
         """Publisher of the states of the loop."""
+        self.state_publisher.publish(
+            self.state_publisher.snapshot, entries_between(begun, self._state)
+        )
         self.ticks = 0
         """Number of completed ticks."""
 
@@ -138,14 +151,25 @@ class ControlLoop:
             self._thread.join()
         self._driver.stop()
 
+    def brake(self, cause: Finding, silence: float) -> None:
+        """Stop or pause a moving arm after ``silence`` [s], for the reason ``cause``."""
+        state = self.state_publisher.snapshot.state
+        latched = isinstance(command := self.profile.braking(cause, silence), Stop)
+        if state.stopped is not None or not (state.moving or (latched and state.waits)):
+            return
+        if state.waits and not latched:
+            return
+        log.error("%s: %s.", "STOP" if latched else "Paused", finding_text(cause))
+        self.paused_at = self._clock.now()
+        self._mailbox.put(command)
+
     def _run(self) -> None:
         due = self._clock.now()
         while not self._stopping.is_set():
             late = self._clock.now() - due
             self._punctuality.note(late)
-            if late > self._held_up and self._state.moving and self._state.stopped is None:
-                log.error("The control loop was %.2f s late while the arm moved: STOP.", late)
-                self._mailbox.put(Stop())
+            if late > self._held_up:
+                self.brake(Finding(Reason.LOOP_LATE, late), late)
             if late > self._period:
                 # Skip lost ticks: the next step covers the time that passed.
                 due += late

@@ -81,6 +81,7 @@ class PlanningWorker:
     def _find(
         self, command: cmd.TakeBranch, actor: Actor | None, cancelled: threading.Event
     ) -> None:
+        waited = self._state_publisher.snapshot.state.waits
         try:
             state = self._at_rest(actor, cancelled)
             arm = self._session.require_arm()
@@ -88,7 +89,9 @@ class PlanningWorker:
             if (goal != state.setpoint).any():
                 world = self._session.world_at(state)
                 plan = plan_to(arm, world, state, goal)
-                self._unless(cancelled, cmd.Follow(plan), actor)
+                # An arm that the server has paused meanwhile moves only by a newer command.
+                if waited or not self._state_publisher.snapshot.state.waits:
+                    self._unless(cancelled, cmd.Follow(plan), actor)
         except KatanaError as error:
             self.notify(str(error))
         except Exception:

@@ -169,6 +169,9 @@ class State(Answer, frozen=True, kw_only=True):
         stop: requested, then confirmed once a state newer than the request is stopped; null
             without a stop.
         revocations: Number of stops and of losses of the lease so far.
+        silence_profile: Reaction of the moving arm to a silent driver or a busy machine: "real arm"
+            stops until the stop is cleared; "simulation" pauses until the next command, and stops
+            after 5 s of silence.
         age: Time since the arm's process last answered [s]. From 0.3 s the state counts as unknown.
         windows: Number of open pages and programs.
         water: Water of the cup; null without one.
@@ -205,6 +208,7 @@ class State(Answer, frozen=True, kw_only=True):
     stopped: str | None
     stop: str | None
     revocations: int
+    silence_profile: str
     age: float
     windows: int
     water: Water | None

@@ -13,11 +13,12 @@ from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
+from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Outcome, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
-from katana450.arm.runtime.link import FrontEnd
+from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.outcomes import TicketOutcome
@@ -68,6 +69,11 @@ class ArmHandle:
     def ready(self) -> FloatArray:
         """(n,) Posture to which Home moves [rad]."""
         return self.session.ready
+
+    @property
+    def profile(self) -> SilenceProfile:
+        """The reaction of the moving arm to silence."""
+        return self._link.profile
 
     @property
     def environment(self) -> Environment:

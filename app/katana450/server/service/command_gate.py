@@ -12,12 +12,18 @@ from typing import NamedTuple
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.messages import finding_text
+from katana450.arm.control.state import CAUSES, Finding, State
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import StopRecord
 
 log = logging.getLogger(__name__)
+
+SETTLE_TIME = 0.3
+"""[s] Time after a pause in which commands are refused: three intervals of the heartbeats, so that
+messages which waited meanwhile have arrived."""
 
 
 class RunningProgram(NamedTuple):
@@ -53,6 +59,8 @@ class CommandGate:
         self.recorder = Recorder()
         """Notes commands, stops and changes of the lease for the event log."""
         self._jogged = -cmd.JOG_TIME
+        self._waits = False
+        self._settled = -SETTLE_TIME
 
     def submit(self, command: cmd.Command, actor: Actor) -> int:
         """Send ``command`` of ``actor`` to the arm; return its ticket.
@@ -81,6 +89,7 @@ class CommandGate:
         """Return ``actor`` with the grounds for ``command``. Raises LeaseError without any."""
         if not all(each.traits.while_stopped for each in command.parts):
             self.check_runs()
+            self._check_settled(actor)
         if actor.channel is CommandChannel.SERVER and not command.traits.protective:
             raise LeaseError("The server itself may not move the arm.")
         granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
@@ -98,6 +107,7 @@ class CommandGate:
         with self._lock:
             try:
                 self.check_runs()
+                self._check_settled(actor)
                 return self._granted(actor, pacing=pacing)
             except LeaseError as error:
                 self.recorder.refuse("gesture", actor, error)
@@ -137,8 +147,12 @@ class CommandGate:
         """Acquire the free lease for ``actor``. Raises LeaseError if another person holds it."""
         with self._lock:
             before = self.lease
-            self.lease = before.acquire(actor.person, self._clock())
-            self.recorder.lease(before, self.lease, actor)
+            lease = before.acquire(actor.person, self._clock())
+            if before.holder is not None:
+                # That holder has closed its window.
+                self._revoke()
+            self.lease = lease
+            self.recorder.lease(before, lease, actor)
 
     def change(self, event: Callable[[Lease, float], Lease], by: Actor = SERVER) -> None:
         """Apply ``event`` to the lease at the present time. A change of holder holds the arm.
@@ -164,12 +178,50 @@ class CommandGate:
         with self._lock:
             self._stop(StopRecord(None, why), SERVER)
 
+    def pause(self, cause: Finding) -> None:
+        """Pause the arm in the name of the server: the next command moves it."""
+        with self._lock:
+            arm = self.present()
+            log.warning("Paused: %s.", finding_text(cause))
+            self._waits = True
+            self.settle()
+            with suppress(InputError):
+                arm.deliver(cmd.Hold(finding=cause), replace(SERVER, grounds=Grounds.SERVER))
+
+    def settle(self) -> None:
+        """Void every gesture, and refuse motion for SETTLE_TIME.
+
+        Messages that waited while a connection or a process hung are not new commands.
+        """
+        with self._lock:
+            self._revoke()
+            self._settled = self._clock() + SETTLE_TIME
+
+    def _note_pause(self) -> None:
+        """Take note of a pause by the process of the arm, which is newer than all gestures."""
+        arm = self.arm
+        if arm is None:
+            return
+        if not arm.state.waits:
+            self._waits = self._waits and not arm.caught_up
+        elif not self._waits:
+            causes = [each for each in arm.state.findings if each.reason in CAUSES]
+            # Also ends what is being planned for this arm.
+            self.pause(causes[0])
+
+    def _check_settled(self, actor: Actor) -> None:
+        """Raise LeaseError for a motion just after a pause."""
+        self._note_pause()
+        if actor.channel is not CommandChannel.SERVER and self._clock() < self._settled:
+            raise LeaseError("The arm has just paused. Give the command again.")
+
     def reconcile(self) -> None:
-        """Make gate and arm agree on whether the arm is stopped. Call this often."""
+        """Make gate and arm agree on whether the arm is stopped or paused. Call this often."""
         with self._lock:
             arm = self.arm
             if arm is None:
                 return
+            self._note_pause()
             snapshot = arm.snapshot
             stopped = snapshot.state.stopped is not None
             if self.stopped is not None:
@@ -181,7 +233,7 @@ class CommandGate:
                         self.stopped, arm, replace(SERVER, grounds=Grounds.SERVER)
                     )
             elif stopped and arm.caught_up:
-                self.protect("The arm lost the connection to the server and stopped.")
+                self.protect(_why_stopped(snapshot.state))
 
     def moves(self) -> bool:
         """Return whether the arm moves or is about to move."""
@@ -224,3 +276,11 @@ class CommandGate:
         self.acquire(actor)
         log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
         return replace(actor, grounds=Grounds.FREE_LEASE)
+
+
+def _why_stopped(state: State) -> str:
+    """Return why the process of the arm itself has stopped the arm."""
+    causes = [each for each in state.findings if each.reason in CAUSES]
+    if not causes:
+        return "The arm lost the connection to the server and stopped."
+    return f"{finding_text(causes[0])}."

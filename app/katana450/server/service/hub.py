@@ -5,6 +5,7 @@ Runs in the gateway's one thread; ``CommandGate`` decides which commands reach t
 
 from __future__ import annotations
 
+import math
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,10 +14,13 @@ from typing import Any, NamedTuple
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.messages import sentence
+from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.command_gate import CommandGate
+from katana450.server.service.driver_watch import DriverWatch
 from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
@@ -98,6 +102,15 @@ class Hub:
         self._numbers = 0
         self._presses = Presses()
         self._takeover: Takeover | None = None
+        self._ticked = clock()
+        self._driver_watch = DriverWatch(self.gate, self._ticked)
+        self.supervisor_problem: Callable[[], str | None] = lambda: None
+        """Returns what is wrong with the supervisor of this process, in words."""
+
+    @property
+    def held_up(self) -> float:
+        """Time since the last tick [s], which is longer than ``TICK`` if the thread hangs."""
+        return self.clock() - self._ticked
 
     @property
     def arm(self) -> ArmInterface | None:
@@ -118,6 +131,14 @@ class Hub:
     def stopped(self) -> StopRecord | None:
         """The present stop; None while the arm is not stopped."""
         return self.gate.stopped
+
+    @property
+    def halted(self) -> str | None:
+        """Reason of the present stop or pause by the server; None without one."""
+        arm = self.arm
+        if self.stopped is None and arm is not None and arm.caught_up and arm.state.waits:
+            return sentence(arm.state)
+        return None if self.stopped is None else self.stopped.why
 
     # Participants
 
@@ -166,6 +187,17 @@ class Hub:
         # A program on the server is noted where it begins and ends.
         if window.channel is not CommandChannel.PROGRAM:
             self.recorder.note(kind, window.actor, {"number": window.number})
+
+    def close(self, identity: Identity, page: str) -> None:
+        """Free the arm of the page whose window was closed, and brake the arm.
+
+        The page keeps the lease if it returns before another person takes it, as on a reload.
+        """
+        person, _ = self._remembered.get(key_of(identity, page), (None, 0))
+        if person is not None and self.lease.holder == person:
+            if self.stopped is None and self.gate.moves():
+                self._driver_watch.brake_left(person)
+            self.gate.change(lambda lease, t: lease.close(person, t))
 
     def present(self) -> ArmInterface:
         """Return the arm. Raises LeaseError until it is ready."""
@@ -243,8 +275,8 @@ class Hub:
 
     def may_clear_stop(self, window: Window) -> bool:
         """Return whether ``window`` may clear a stop."""
-        holder = self.lease.holder
-        return window.person.role.may_drive and holder in (None, window.person)
+        driver = self.lease.driver
+        return window.person.role.may_drive and driver in (None, window.person)
 
     def acquire(self, window: Window) -> None:
         """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
@@ -319,6 +351,8 @@ class Hub:
     def tick(self) -> None:
         """Check that the driver and the arm are alive. Call this every ``TICK``."""
         arm = self.arm
+        before, self._ticked = self._ticked, self.clock()
+        self._driver_watch.note_lateness(self._ticked - before - TICK, self._ticked)
         self._update_lease()
         silent = self._check_driver(self.clock())
         if arm is not None:
@@ -342,21 +376,30 @@ class Hub:
     def _watch(self, arm: ArmInterface) -> None:
         """Stop an arm whose process does not answer; it stops once the process answers again."""
         age, due = arm.age, self.gate.moves() or not arm.caught_up
-        if self.stopped is None and due and age > 2 * self._hold_after:
+        # A simulated arm that answers late pauses by itself.
+        strict = arm.profile is SilenceProfile.REAL_ARM
+        limit = 2 * self._hold_after if strict else PAUSE_TIMEOUT
+        if self.stopped is None and due and age > limit:
             self.gate.protect(f"The arm's process did not answer for {age:.1f} s.")
 
     def _check_driver(self, t: float) -> bool:
-        """Stop a moving arm if the driver is silent; return whether the driver is silent."""
+        """Brake a moving arm if the driver is silent; return whether the driver is silent."""
+        self._driver_watch.follow(self.lease.holder, self._heard, t)
         holder = self.lease.holder
         if holder is None or self.arm is None:
             return False
-        silent = self.lease.silence(t) >= self._hold_after
+        silence = self.lease.silence(t)
+        silent = silence >= self._hold_after
         if silent and self.stopped is None and self.gate.moves():
             connected = holder.key in self._windows
-            why = "fell silent" if connected else "lost the connection"
-            self.gate.protect(f"{holder.name} {why} while the arm moved.")
+            self._driver_watch.brake(holder, silence, t, connected=connected)
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
+
+    def _heard(self, person: Person) -> float:
+        """Return the time of the newest heartbeat of ``person`` [s]."""
+        window = self._windows.get(person.key)
+        return -math.inf if window is None else window.heartbeat.newest
 
     def person_of(self, identity: Identity, page: str) -> Person:
         """Return the person at ``page``, whether or not its control socket is open now."""

@@ -14,6 +14,7 @@ from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
+from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Outcome, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -57,6 +58,10 @@ class ArmInterface(Protocol):
     @property
     def loop_timing(self) -> LoopTiming:
         """The recent timing of the control loop."""
+
+    @property
+    def profile(self) -> SilenceProfile:
+        """The reaction of the moving arm to silence."""
 
     @property
     def environment(self) -> Environment:

@@ -64,7 +64,7 @@ def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | an
 def state(hub: Hub) -> answers.State:
     """Return the newest state. Raises LeaseError until there is an arm."""
     arm = hub.present()
-    snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
+    snapshot, holder, stopped = arm.snapshot, hub.lease.driver, hub.stopped
     return msgspec.structs.replace(
         once(snapshot, "state", lambda: _state(arm, snapshot)),
         sent=hub.clock(),
@@ -113,6 +113,7 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         stopped=None,
         stop=None,
         revocations=0,
+        silence_profile=arm.profile.value,
         age=0.0,
         windows=0,
         water=water(arm.pouring, now),

@@ -30,13 +30,15 @@ def health(hub: Hub) -> str | None:
     if hub.arm is None:
         return "The arm is not ready yet."
     age = silence(hub)
-    return None if age is None else f"No answer from the arm's process for {age:.1f} s."
+    if age is not None:
+        return f"No answer from the arm's process for {age:.1f} s."
+    return hub.supervisor_problem()
 
 
 def common(hub: Hub) -> dict[str, Any]:
     """Return the part of the status that is the same for all pages."""
     state = hub.arm.state if hub.arm is not None else None
-    stopped, holder, age = hub.stopped, hub.lease.holder, silence(hub)
+    stopped, holder, age = hub.stopped, hub.lease.driver, silence(hub)
     now = StatusLine("starting", "Starting", "")
     if state is not None:
         now = StatusLine(mood(state), headline(state), sentence(state))
@@ -54,6 +56,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "stop": None if stopped is None else stopped.stage,
         "stopped": None if stopped is None else stopped.why,
         "holder": None if holder is None else holder.name,
+        "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
         "speed": 1.0 if state is None else state.speed,
         "windows": len(hub.windows),
     }

@@ -233,8 +233,8 @@ class ProgramRunner(Runner):
             self._leave_with(Phase.STOPPED, "The lease was taken from the program.")
             return
         owner = self._owner.window
-        if hub.stopped is not None:
-            self._leave_with(Phase.STOPPED, hub.stopped.why)
+        if (why := hub.halted) is not None:
+            self._leave_with(Phase.STOPPED, why)
             return
         if owner is not None and self._owner.is_missing(t):
             why = "sends no heartbeats" if self._owner.is_here else "left"

@@ -1,0 +1,30 @@
+"""Reaction of a moving arm to silence: a latched stop, or a pause that may become one."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from katana450.arm.control.commands import Hold, Stop
+from katana450.arm.control.state import Finding
+
+PAUSE_TIMEOUT = 5.0
+"""[s] Silence after which a pause becomes a latched stop."""
+
+
+class SilenceProfile(Enum):
+    """Reaction of a moving arm to a silent driver, a silent process or a late control loop.
+
+    The heartbeat timeout is the same in both. The driver in use chooses the profile.
+    """
+
+    REAL_ARM = "real arm"
+    """The arm stops, and the stop is latched: somebody may stand beside it."""
+    SIMULATION = "simulation"
+    """The arm pauses: it brakes and drops its targets, and the next command moves it. Silence of
+    PAUSE_TIMEOUT latches the stop."""
+
+    def braking(self, cause: Finding, silence: float) -> Stop | Hold:
+        """Return the command for a moving arm after ``silence`` [s], for the reason ``cause``."""
+        if self is SilenceProfile.REAL_ARM or silence >= PAUSE_TIMEOUT:
+            return Stop(finding=cause)
+        return Hold(finding=cause)

@@ -1,0 +1,228 @@
+"""The front end's end of the pipe to the arm's process; ``link`` is the other end."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.outcome import DROPPED
+from katana450.arm.control.scene_objects import same
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.link import (
+    PIPE_ERRORS,
+    PULSE,
+    CommandMessage,
+    Heartbeat,
+    StateMessage,
+)
+from katana450.arm.runtime.readiness import readable, writable
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.arm.runtime.wire import PlanStore
+from katana450.errors import InputError
+
+COMMAND_TIMEOUT = 0.5
+"""[s] Silence of the arm's process after which only a stop is sent to it."""
+
+RECONNECT_INTERVAL = 0.05
+"""[s] Interval of the attempts to connect to a new process of the arm."""
+
+
+class FrontEnd:
+    """The end of the link in the front end: it takes commands and publishes the arm's states."""
+
+    def __init__(
+        self,
+        pipe: Connection,
+        check: Callable[[cmd.Command], None],
+        reconnect: Callable[[int], Connection] | None = None,
+    ) -> None:
+        """Create the end, and wait for the first snapshot.
+
+        Args:
+            pipe: the pipe to the arm's process.
+            check: see ``Mailbox``.
+            reconnect: makes a pipe to a new process of the arm, to which it gives the number of the
+                newest command. Raises OSError or EOFError while there is none. Without it the link
+                is cut when the arm's process ends.
+
+        Raises:
+            EOFError: the arm's process has closed the pipe.
+        """
+        self._pipe = pipe
+        self._check = check
+        self._reconnect = reconnect
+        self._connected = True
+        self._sending = threading.Lock()
+        self._unsent: deque[CommandMessage] = deque()
+        self._number = 0
+        self._plans = PlanStore()
+        first = _loaded(pipe.recv_bytes(), self._plans)
+        if first is None:
+            raise EOFError
+        self._heard = time.monotonic()
+        self.profile = first.profile
+        """Reaction of the moving arm to silence."""
+        self.state_publisher = StatePublisher(first.snapshot, first.loop_timing)
+        self.state_publisher.publish(first.snapshot, first.event_log)
+        self.cut = threading.Event()
+        """Set once this front end is no longer the one of the arm."""
+        self._thread = threading.Thread(target=self._listen, name="link", daemon=True)
+
+    def start(self) -> None:
+        """Read all states that have arrived, then follow the arm in a thread of its own.
+
+        Between construction and start the arm may have moved, or stopped. After this call
+        ``state_publisher`` holds the newest state.
+        """
+        with suppress(*PIPE_ERRORS):
+            while readable(self._pipe.fileno()):
+                self._take(self._pipe.recv_bytes())
+        self._thread.start()
+
+    @property
+    def last_ticket(self) -> int:
+        """The ticket of the newest command."""
+        with self._sending:
+            return self._number
+
+    def deliver(self, command: cmd.Command, actor: Actor | None = None) -> int:
+        """Send ``command`` of ``actor`` to the arm, and return its ticket.
+
+        Raises InputError for a command that the arm does not support. If the arm's process does not
+        answer or has ended, every command but a stop is refused.
+        """
+        self._check(command)
+        age = self.age
+        if isinstance(command, cmd.Servo):
+            # An early stamp keeps delays in this process from looking like motion.
+            command = replace(command, t=MonotonicClock().now())
+        with self._sending:
+            if command.traits.safety:
+                # Unsent commands are dropped; an earlier stop is fulfilled by this one.
+                unsent = (each for each in self._unsent if not each.command.traits.safety)
+                self.state_publisher.outcomes.note((each.number, DROPPED) for each in unsent)
+                self._unsent.clear()
+            elif age > COMMAND_TIMEOUT or not self._connected:
+                raise InputError(
+                    f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
+                )
+            self._number += 1
+            if isinstance(command, cmd.Follow):
+                self._plans.note(self._number, command.plan)
+            seen = self.state_publisher.snapshot.state.t
+            self._unsent.append(CommandMessage(self._number, command, actor, seen))
+            self._flush()
+            return self._number
+
+    @property
+    def age(self) -> float:
+        """Time since the newest message of the arm's process [s]; a running loop has sent it.
+
+        A message that has arrived and is not read yet counts as new.
+        """
+        if self.cut.is_set() or not self._connected:
+            return time.monotonic() - self._heard
+        return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
+
+    def heartbeat(self) -> None:
+        """Send a heartbeat, unless commands still wait to be sent."""
+        with self._sending:
+            if self._flush() and self._connected:
+                self._send(Heartbeat())
+
+    def close(self) -> None:
+        """Cut the link; a thread that reads from the pipe ends with its process."""
+        self.cut.set()
+
+    def _flush(self) -> bool:
+        """Send the waiting commands; return whether none is left. A full pipe does not block."""
+        while self._connected and self._unsent and self._send(self._unsent[0]):
+            self._unsent.popleft()
+        return not self._unsent
+
+    def _send(self, message: CommandMessage | Heartbeat) -> bool:
+        try:
+            if not writable(self._pipe.fileno()):
+                return False
+            self._pipe.send(message)
+        except PIPE_ERRORS:
+            # The thread that reads notices it too, and connects again.
+            self._connected = False
+        return True
+
+    def _listen(self) -> None:
+        while not self.cut.is_set():
+            with suppress(*PIPE_ERRORS):
+                while self._take(self._pipe.recv_bytes()):
+                    pass
+                # Another front end has taken the place of this one.
+                self.cut.set()
+                return
+            self._connected = False
+            if self._reconnect is None or not self._connect(self._reconnect):
+                self.cut.set()
+
+    def _connect(self, reconnect: Callable[[int], Connection]) -> bool:
+        """Connect to a new process of the arm; return whether it succeeded before a cut."""
+        while not self.cut.wait(RECONNECT_INTERVAL):
+            with self._sending:
+                # No command to the process that ended reaches the new one, which is stopped.
+                self.state_publisher.outcomes.note((each.number, DROPPED) for each in self._unsent)
+                self._unsent.clear()
+                number = self._number
+            with suppress(*PIPE_ERRORS):
+                pipe, plans = reconnect(number), PlanStore()
+                first = _loaded(pipe.recv_bytes(), plans)
+                if first is None:
+                    continue
+                known = self.state_publisher.event_log
+                entries = [each for each in first.event_log if not known or each.t > known[-1].t]
+                self.state_publisher.publish(first.snapshot, entries)
+                with self._sending:
+                    self._pipe, self._plans, self._heard = pipe, plans, time.monotonic()
+                    self._connected = True
+                    self._flush()
+                return True
+        return False
+
+    def _take(self, data: bytes) -> bool:
+        """Publish the content of ``data`` from the arm's end; return False if that closes."""
+        self._heard = time.monotonic()
+        if self._unsent:
+            with self._sending:
+                self._flush()
+        if data == PULSE:
+            return True
+        message = _loaded(data, self._plans)
+        if message is None:
+            return False
+        self.state_publisher.loop_timing = message.loop_timing
+        seen = self.state_publisher.snapshot
+        if message.snapshot.state.t != seen.state.t or message.snapshot.ticket != seen.ticket:
+            self.state_publisher.publish(_known(message.snapshot, seen), message.event_log)
+        # The state comes first: a client with an answer must find its command in the state.
+        self.state_publisher.outcomes.note(message.outcomes)
+        return True
+
+
+def _known(message: Snapshot, seen: Snapshot) -> Snapshot:
+    """Return ``message`` with the objects of ``seen`` if they are the same.
+
+    Objects from the pipe are new Python objects each time, which would be taken for a change.
+    """
+    if not same(message.state.objects, seen.state.objects):
+        return message
+    return Snapshot(replace(message.state, objects=seen.state.objects), message.ticket)
+
+
+def _loaded(data: bytes, plans: PlanStore) -> StateMessage | None:
+    """Return the message in ``data`` from the arm's end; None when that closes."""
+    message: StateMessage | None = plans.loaded(data)
+    return message

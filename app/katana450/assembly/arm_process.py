@@ -1,0 +1,147 @@
+"""The arm's process: the control loop, and the address at which other processes reach it."""
+
+from __future__ import annotations
+
+import logging
+import os
+import pickle
+import shutil
+import sys
+import threading
+from argparse import Namespace
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from katana450.arm.runtime.arm_listener import FRONT, ArmAddress, ArmListener
+from katana450.assembly.output import say
+from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorLink
+from katana450.extension import serve_extensions
+from katana450.settings import Settings
+
+if TYPE_CHECKING:
+    from katana450.arm.control.state import State
+    from katana450.arm.robot.initial_scene import InitialScene
+    from katana450.arm.runtime.state_publisher import StatePublisher
+    from katana450.assembly.robot_session import DescribedRobot
+
+WAKE_INTERVAL = 0.05
+"""[s] Interval at which the end of the control loop is checked."""
+
+KEEP_INTERVAL = 0.02
+"""[s] Minimum time between two states that the supervisor keeps."""
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class ArmConfig:
+    """Configuration of the arm's process, used each time it is started.
+
+    Attributes:
+        settings: of the server.
+        urdf, tool: see ``robot.loader.load``.
+        options: options of the extensions; None if no extension takes part.
+        address: address at which the process listens.
+        folder: private folder for the meshes of scene objects.
+    """
+
+    settings: Settings
+    urdf: Path
+    tool: str | None
+    options: Namespace | None
+    address: ArmAddress
+    folder: Path
+
+
+def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: SupervisorLink) -> None:
+    """Run the arm in this process, from start to end. Raises KatanaError.
+
+    kept: what an earlier process gave to the supervisor; None at the first start.
+    """
+    from katana450.assembly.robot_session import find_robot
+    from katana450.assembly.running_arm import RunningArm
+
+    state = None if kept is None else _unpacked(kept)
+    robot, scene = _with_scene(config) if state is None else (None, None)
+    found = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
+    again = kept is not None
+    arm = RunningArm(config.settings, found, scene, again=again, kept=state)
+    listener = ArmListener(config.address, {FRONT: arm.attach})
+    if not again:
+        for note in arm.notes:
+            print(f"katana450: {note}", file=sys.stderr, flush=True)
+    arm.start()
+    listener.start()
+    keeper = threading.Thread(
+        target=_keep, args=(arm.state_publisher, supervisor), name="keep", daemon=True
+    )
+    keeper.start()
+    supervisor.prove(arm.ticks_again)
+    supervisor.report(READY)
+    while arm.running and not supervisor.ended.wait(WAKE_INTERVAL):
+        pass
+    if not supervisor.ended.is_set():
+        log.critical("The control loop has ended, so the arm's process ends.")
+        # At once, without waiting for other threads: a new process begins stopped.
+        os._exit(1)
+    arm.stop()
+    listener.close()
+    keeper.join()
+    # A supervisor that was killed leaves it.
+    shutil.rmtree(config.folder, ignore_errors=True)
+
+
+def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene | None]:
+    """Return the robot if it was read for the scene that an extension starts with, and that."""
+    from katana450.arm.control.session import Session
+    from katana450.arm.robot.object_meshes import Meshes
+    from katana450.assembly.robot_session import describe_robot
+
+    if config.options is None:
+        return None, None
+    found_robots: list[DescribedRobot] = []
+
+    def session() -> Session:
+        if not found_robots:
+            found_robots.append(describe_robot(config.settings, config.urdf, config.tool))
+        return found_robots[0].session
+
+    scene = None
+    for part in serve_extensions():
+        if scene is None and part.initial_scene is not None:
+            scene = part.initial_scene(config.options, session)
+    if scene is not None:
+        Meshes(config.folder).put(scene.meshes, ())
+        for note in scene.notes:
+            say(f"katana450: {note}")
+    return (found_robots[0] if found_robots else None), scene
+
+
+def _keep(state_publisher: StatePublisher, supervisor: SupervisorLink) -> None:
+    """Let the supervisor keep each new state for the next process."""
+    seen = None
+    while not supervisor.ended.wait(KEEP_INTERVAL):
+        snapshot = state_publisher.snapshot
+        state = snapshot.state
+        sent = True
+        if seen is None or state.objects is not seen.objects:
+            sent = supervisor.keep(SCENE, pickle.dumps(state.objects))
+        if state is not seen:
+            sent = supervisor.keep(KEPT, _packed(state)) and sent
+        seen = state if sent else None
+        state_publisher.wait_for_change(snapshot, WAKE_INTERVAL)
+
+
+def _packed(state: State) -> bytes:
+    from katana450.arm.control.restart import at_rest
+
+    return pickle.dumps(replace(at_rest(state), objects=()))
+
+
+def _unpacked(kept: dict[bytes, bytes]) -> State | None:
+    """Return the state that the supervisor kept; None if it has none."""
+    if not (KEPT in kept and SCENE in kept):
+        return None
+    state: State = pickle.loads(kept[KEPT])
+    return replace(state, objects=pickle.loads(kept[SCENE]))

@@ -1,0 +1,133 @@
+"""A simulated arm with its control loop, driven by the front end at the end of a pipe."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import time
+from functools import partial
+from multiprocessing.connection import Connection
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.restart import restarted
+from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.state import State
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.initial_scene import InitialScene
+from katana450.arm.runtime.arm_listener import Greeting
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.link import ArmEnd
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.state_publisher import StatePublisher
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.platform_support import raise_priority
+from katana450.settings import Settings
+
+BRAKING_TIMEOUT = 2.0
+"""[s] Timeout for a moving arm to come to rest before its process ends."""
+
+
+class RunningArm:
+    """A simulated arm with its control loop, driven by the front end at the end of a pipe."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        found: DescribedRobot,
+        scene: InitialScene | None = None,
+        *,
+        again: bool = False,
+        kept: State | None = None,
+    ) -> None:
+        """Prepare the arm; it does not run yet.
+
+        Args:
+            settings: settings of the server.
+            found: the robot.
+            scene: scene in place of the robot's own, and initial joint angles.
+            again: whether the arm ran before in another process. It then begins stopped.
+            kept: last known state of that process, where the arm and its objects begin.
+        """
+        robot, session, self.notes = found
+        arm = robot.joint_group if robot.arm is None else robot.arm
+        q, gripper = session.ready, 0.0
+        if kept is not None:
+            q, gripper = kept.q, kept.gripper
+        elif scene is not None and scene.joints is not None:
+            q = scene.joints
+        driver = SimulatedDriver(arm, q, gripper)
+        strict = settings.strict_silence
+        self._mailbox = Mailbox(session.check)
+        if scene is not None:
+            self._mailbox.put(scene.command)
+        self._loop = ControlLoop(
+            session,
+            driver,
+            self._mailbox,
+            MonotonicClock(),
+            settings.rate,
+            settings.silence,
+            partial(restarted, kept=kept) if again else None,
+            SilenceProfile.REAL_ARM if strict else driver.silence_profile,
+        )
+        self._silence_timeout = settings.silence
+        self._link: ArmEnd | None = None
+        self._attaching = threading.Lock()
+        self._proven = -1
+
+    def start(self) -> None:
+        """Run the control loop in a separate thread."""
+        _be_prompt()
+        self._loop.start()
+
+    def attach(self, pipe: Connection, greeting: Greeting) -> None:
+        """Execute the commands from the other end of ``pipe``, in place of any previous pipe."""
+        with self._attaching:
+            if self._link is not None:
+                self._link.close()
+            self._link = ArmEnd(
+                pipe, self._loop, self._mailbox, self._silence_timeout, greeting.number
+            )
+            self._link.start()
+
+    @property
+    def state_publisher(self) -> StatePublisher:
+        """Publisher of the states of the arm."""
+        return self._loop.state_publisher
+
+    @property
+    def running(self) -> bool:
+        """True while the control loop runs."""
+        return self._loop.running
+
+    def ticks_again(self) -> bool:
+        """Return whether the control loop has ticked since the last call."""
+        ticks = self._loop.ticks
+        proven, self._proven = self._proven, ticks
+        return ticks != proven
+
+    def stop(self) -> None:
+        """Brake to rest, end the loop, and close the pipe."""
+        if self._moves():
+            self._mailbox.put(cmd.Stop())
+        end = time.monotonic() + BRAKING_TIMEOUT
+        while self._moves() and self.running and time.monotonic() < end:
+            time.sleep(0.01)
+        self._loop.stop()
+        if self._link is not None:
+            self._link.close()
+            self._link.join()
+        # Let Python collect reference cycles when it ends.
+        gc.unfreeze()
+
+    def _moves(self) -> bool:
+        return self.state_publisher.snapshot.state.moving
+
+
+def _be_prompt() -> None:
+    """Keep garbage collection and other processes from delaying the ticks."""
+    # Exempt all present objects from garbage collection, which would delay a tick too much.
+    gc.collect()
+    gc.freeze()
+    raise_priority()

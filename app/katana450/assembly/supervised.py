@@ -1,0 +1,158 @@
+"""A process under supervision: its heartbeats, its reports, and the end of its supervisor."""
+
+from __future__ import annotations
+
+import logging
+import os
+import pickle
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+
+from katana450.arm.runtime.readiness import writable
+from katana450.assembly.log_lines import start_log
+from katana450.errors import KatanaError
+from katana450.platform_support import name_process, stop_signals
+
+HEARTBEAT, REPORT, KEPT, SCENE = b".", b"r", b"k", b"s"
+"""First bytes of the messages to the supervisor: a heartbeat; a status word or an error; and the
+last known state of the arm, without and with its scene, which only the arm's process reads."""
+
+END, NOTICE = b"e", b"n"
+"""First bytes of the messages of the supervisor, beside heartbeats: the process must end; and a
+notice, which follows."""
+
+HEARTBEAT_INTERVAL = 0.1
+"""[s] Interval of the heartbeats, in both directions."""
+
+QUIET_SECONDS = 1.0
+"""[s] Silence of the supervisor after which its processes report it."""
+
+END_SECONDS = 4.0
+"""[s] Time in which a process must end after its supervisor."""
+
+READY = "ready"
+"""Report of a process that does its work. Until then its supervisor waits longer for heartbeats."""
+
+log = logging.getLogger(__name__)
+
+
+class SupervisorLink:
+    """The pipe from a process to its supervisor, as the process sees it."""
+
+    def __init__(self, pipe: Connection) -> None:
+        """Create the link; ``start`` runs it."""
+        self._pipe = pipe
+        self._sending = threading.Lock()
+        self._heard = time.monotonic()
+        self._alive: Callable[[], bool] = lambda: True
+        self.ended = threading.Event()
+        """Set when the supervisor ends this process, or has ended itself."""
+        self.notify: Callable[[str], None] = lambda _: None
+        """Called, in a thread of the link, with each notice about another process."""
+
+    def start(self) -> None:
+        """Send heartbeats in a thread of the link."""
+        threading.Thread(target=self._run, name="supervisor link", daemon=True).start()
+
+    def prove(self, alive: Callable[[], bool]) -> None:
+        """Send heartbeats only while ``alive`` returns True; it is called at each of them."""
+        self._alive = alive
+
+    @property
+    def problem(self) -> str | None:
+        """The problem of the supervisor in words; None if it answers."""
+        silent = time.monotonic() - self._heard
+        if silent < QUIET_SECONDS:
+            return None
+        return (
+            f"The supervisor has not answered for {silent:.1f} s. "
+            "A process that ends now is not started again."
+        )
+
+    def report(self, status: str | KatanaError) -> None:
+        """Send a status word, or the error that ends this process."""
+        self._send(REPORT + pickle.dumps(status))
+
+    def keep(self, kind: bytes, content: bytes) -> bool:
+        """Let the supervisor keep ``content`` for the next process, in place of the last ``kind``.
+
+        Returns False, and sends nothing, while the supervisor does not read.
+
+        kind: KEPT or SCENE.
+        """
+        if not writable(self._pipe.fileno()):
+            return False
+        self._send(kind + content)
+        return True
+
+    def _send(self, message: bytes) -> None:
+        with suppress(OSError), self._sending:
+            self._pipe.send_bytes(message)
+
+    def _run(self) -> None:
+        try:
+            self._converse()
+        except (EOFError, OSError):
+            # The supervisor has ended.
+            pass
+        except Exception:
+            log.exception("The link to the supervisor met an error; this process ends.")
+        self.ended.set()
+        # This thread keeps no object of a process that ends.
+        del self._alive, self.notify
+        time.sleep(END_SECONDS)
+        # Nothing may outlive its supervisor, not even a process whose threads hang.
+        os._exit(1)
+
+    def _converse(self) -> None:
+        """Exchange heartbeats until the supervisor ends this process."""
+        quiet = False
+        due = time.monotonic()
+        while True:
+            if self._pipe.poll(max(due - time.monotonic(), 0.0)):
+                message = self._pipe.recv_bytes()
+                self._heard = time.monotonic()
+                if message == END:
+                    return
+                if message.startswith(NOTICE):
+                    self.notify(message[len(NOTICE) :].decode())
+            if time.monotonic() >= due:
+                due = time.monotonic() + HEARTBEAT_INTERVAL
+                # A supervisor that hangs reads nothing, and the pipe fills.
+                if self._alive() and writable(self._pipe.fileno()):
+                    self._send(HEARTBEAT)
+                quiet = self._report_silence(quiet)
+
+    def _report_silence(self, reported: bool) -> bool:
+        problem = self.problem
+        if problem is not None and not reported:
+            log.error("%s", problem)
+        elif problem is None and reported:
+            log.warning("The supervisor answers again.")
+        return problem is not None
+
+
+def run_supervised(name: str, work: Callable[[SupervisorLink], None], pipe: Connection) -> None:
+    """Do ``work`` in this process, which the supervisor has just started.
+
+    Args:
+        name: name of the process.
+        work: ends when ``SupervisorLink.ended`` is set. A KatanaError is reported.
+        pipe: the pipe to the supervisor.
+    """
+    # Ctrl-C reaches all processes of a terminal; the supervisor ends this one.
+    for number in stop_signals():
+        signal.signal(number, signal.SIG_IGN)
+    name_process(name)
+    start_log()
+    link = SupervisorLink(pipe)
+    link.start()
+    try:
+        work(link)
+    except KatanaError as error:
+        link.report(error)
+        raise SystemExit(1) from None

@@ -1,0 +1,322 @@
+"""The supervisor: starts the processes of the server, watches each, and starts it again.
+
+It imports almost nothing and does no other work, so that it is always there. A process that ends is
+noticed at once. A process that hangs is noticed by the silence of its pipe, and is ended.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import pickle
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from katana450.arm.runtime.readiness import writable
+from katana450.assembly.supervised import (
+    END,
+    HEARTBEAT,
+    HEARTBEAT_INTERVAL,
+    KEPT,
+    NOTICE,
+    READY,
+    REPORT,
+    SCENE,
+    SupervisorLink,
+    run_supervised,
+)
+from katana450.errors import ConfigurationError, KatanaError
+
+TURN = 0.05
+"""[s] Interval at which signals and messages are read; the end of a process wakes earlier."""
+
+START_SECONDS = 60.0
+"""[s] Timeout for a process to be ready."""
+
+START_SILENCE = 10.0
+"""[s] Maximum silence of a process that is not ready yet: imports delay its heartbeats."""
+
+GOODBYE_SECONDS = 5.0
+"""[s] Timeout for a process to end by itself."""
+
+RESTART_DELAYS = (0.0, 0.0, 0.0, 1.0, 5.0, 15.0)
+"""[s] Delay before a process is started again, by the number of its early ends in a row, from 0."""
+
+STABLE_SECONDS = 5.0
+"""[s] A process that was ready for a longer time did not end early."""
+
+RETRY_SECONDS = 1.0
+"""[s] Delay after the system refused to start a process."""
+
+MAX_KEPT_STARTS = 2
+"""Early ends in a row after which a new process gets no state of the one before: the state may be
+what ends it."""
+
+log = logging.getLogger(__name__)
+
+Kept = dict[bytes, bytes]
+"""The last known state of the arm, by the kinds KEPT and SCENE; None of it is read here."""
+
+Work = Callable[[SupervisorLink], None]
+
+
+@dataclass(frozen=True)
+class ChildSpec:
+    """A process that the server needs.
+
+    Attributes:
+        name: name of the process, of up to 15 letters.
+        title: its name for people, at the beginning of a sentence.
+        work: returns its function; None as its argument at the first start, later the kept state.
+        deadline: silence [s] after which the process is ended, once it is ready.
+    """
+
+    name: str
+    title: str
+    work: Callable[[Kept | None], Work]
+    deadline: float
+
+
+class Child:
+    """One process of a kind at a time, as the supervisor sees it."""
+
+    def __init__(self, spec: ChildSpec) -> None:
+        """Create the child; ``start`` starts its process."""
+        self.spec = spec
+        self.statuses: set[str] = set()
+        self.error: KatanaError | None = None
+        self.kept: Kept = {}
+        self.due: float | None = None
+        """Time of the next start [s]; None while a process runs."""
+        self._early_ends = 0
+        self._ready_at: float | None = None
+        self._started = self._heard = self._beaten = 0.0
+        self._first = True
+
+    def start(self) -> None:
+        """Start a process."""
+        spawn = multiprocessing.get_context("spawn")
+        # The ends are of another class on Windows, with the same methods.
+        ends: Any = spawn.Pipe()
+        self._pipe: Connection
+        self._pipe, theirs = ends
+        kept = None if self._first else self.kept if self._early_ends <= MAX_KEPT_STARTS else {}
+        self.process = spawn.Process(
+            target=run_supervised,
+            args=(self.spec.name, self.spec.work(kept), theirs),
+            name=self.spec.name,
+            daemon=True,
+        )
+        self.process.start()
+        # Closed here, so that each side notices when the other is gone.
+        theirs.close()
+        self._first, self.due, self._ready_at, self.error = False, None, None, None
+        self._started = self._heard = time.monotonic()
+        self.statuses.clear()
+
+    @property
+    def running(self) -> bool:
+        """True while the process runs."""
+        return self.due is None and self.process.is_alive()
+
+    def read(self) -> None:
+        """Read all messages of the process."""
+        with suppress(EOFError, OSError):
+            while self._pipe.poll():
+                message = self._pipe.recv_bytes()
+                self._heard = time.monotonic()
+                kind, content = message[:1], message[1:]
+                if kind in (KEPT, SCENE):
+                    self.kept[kind] = content
+                elif kind == REPORT:
+                    self._note(pickle.loads(content))
+
+    def _note(self, report: str | KatanaError) -> None:
+        if isinstance(report, KatanaError):
+            self.error = report
+            return
+        self.statuses.add(report)
+        if report == READY:
+            self._ready_at = time.monotonic()
+
+    def excuse(self, late: float) -> None:
+        """Do not count the time ``late`` [s], in which the supervisor itself was held up."""
+        self._started += late
+        self._heard += late
+
+    @property
+    def hangs(self) -> str | None:
+        """Why the process counts as hung, in words; None if it does not."""
+        now = time.monotonic()
+        ready = self._ready_at is not None
+        if not ready and now - self._started > START_SECONDS:
+            return f"was not ready after {START_SECONDS:g} s"
+        silent = now - self._heard
+        if silent > (self.spec.deadline if ready else START_SILENCE):
+            return f"has not answered for {silent:.1f} s"
+        return None
+
+    def beat(self) -> None:
+        """Send a heartbeat to the process if it is time."""
+        now = time.monotonic()
+        if now - self._beaten >= HEARTBEAT_INTERVAL:
+            self._beaten = now
+            self.send(HEARTBEAT)
+
+    def send(self, message: bytes) -> None:
+        """Send ``message``, unless the process hangs so that its pipe is full."""
+        with suppress(OSError):
+            if writable(self._pipe.fileno()):
+                self._pipe.send_bytes(message)
+
+    def ended(self) -> float:
+        """Note the end of the process; return the delay until the next start [s]."""
+        self.process.join()
+        self._pipe.close()
+        stable = self._ready_at is not None and time.monotonic() - self._ready_at > STABLE_SECONDS
+        self._early_ends = 0 if stable else self._early_ends + 1
+        delay = RESTART_DELAYS[min(self._early_ends, len(RESTART_DELAYS) - 1)]
+        self.due = time.monotonic() + delay
+        return delay
+
+    def end(self) -> None:
+        """Wait until the process ends by itself; kill it after a timeout."""
+        if self.due is not None:
+            return
+        self.process.join(GOODBYE_SECONDS if READY in self.statuses else 0.0)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+
+
+class Supervisor:
+    """Keeps all processes running."""
+
+    def __init__(
+        self,
+        specs: Sequence[ChildSpec],
+        stopping: threading.Event,
+        on_restart: Callable[[str, int | None], None] = lambda _name, _status: None,
+    ) -> None:
+        """Create the supervisor.
+
+        ``stopping``: ends ``wait_for`` and ``run`` once it is set. ``on_restart``: called with the
+        name and the exit status of each process that is started again.
+        """
+        self._on_restart = on_restart
+        self._children = {spec.name: Child(spec) for spec in specs}
+        self._stopping = stopping
+        self._turned = time.monotonic()
+
+    def start(self) -> None:
+        """Start all processes, in the given order."""
+        self._turned = time.monotonic()
+        for child in self._children.values():
+            child.start()
+
+    def wait_for(self, name: str, word: str) -> None:
+        """Wait until the process ``name`` reports ``word``, at the start of the server.
+
+        Raises the error that a process reports, and ConfigurationError if one ends.
+        """
+        while word not in self._children[name].statuses and not self._stopping.is_set():
+            self._wait()
+            for child in self._children.values():
+                alive = child.running
+                child.read()
+                if child.error is not None:
+                    raise child.error
+                if not alive or child.hangs is not None:
+                    raise ConfigurationError(
+                        f"{child.spec.title} did not start; see the log above."
+                    )
+
+    def run(self) -> None:
+        """Watch all processes until ``stopping`` is set."""
+        while not self._stopping.is_set():
+            self._wait()
+            for child in self._children.values():
+                self._watch(child)
+
+    def stop(self) -> None:
+        """End all processes."""
+        for child in self._children.values():
+            if child.due is None:
+                child.send(END)
+        for child in self._children.values():
+            child.end()
+
+    def _wait(self) -> None:
+        """Wait for a turn, or until a process ends."""
+        wait([each.process.sentinel for each in self._children.values() if each.due is None], TURN)
+        before, self._turned = self._turned, time.monotonic()
+        late = self._turned - before - 2 * TURN
+        for child in self._children.values():
+            if child.due is None:
+                if late > 0.0:
+                    child.excuse(late)
+                child.beat()
+
+    def _watch(self, child: Child) -> None:
+        if child.due is not None:
+            if time.monotonic() >= child.due:
+                self._start(child)
+            return
+        alive = child.running
+        child.read()
+        if alive and (why := child.hangs) is not None:
+            log.error("%s %s and is ended.", child.spec.title, why)
+            child.process.kill()
+            child.process.join()
+            child.read()
+            alive = False
+        if not alive:
+            code = child.process.exitcode
+            error = "" if child.error is None else f" {child.error}"
+            delay = child.ended()
+            when = f" in {delay:g} s" if delay else ""
+            text = f"{child.spec.title} ended with status {code} and is started again{when}."
+            log.error("%s%s", text, error)
+            self._on_restart(child.spec.name, code)
+            self._announce(child, text)
+            if not delay:
+                self._start(child)
+
+    @staticmethod
+    def _start(child: Child) -> None:
+        try:
+            child.start()
+        except OSError as error:
+            log.error("%s could not be started: %s.", child.spec.title, error)
+            child.due = time.monotonic() + RETRY_SECONDS
+
+    def _announce(self, about: Child, text: str) -> None:
+        for child in self._children.values():
+            if child is not about and child.due is None:
+                child.send(NOTICE + text.encode())
+
+
+def child_spec(
+    name: str,
+    title: str,
+    function: Callable[..., None],
+    config: Any,
+    deadline: float,
+    *,
+    keeps: bool = False,
+) -> ChildSpec:
+    """Return the specification of a process that runs ``function(config, link)``.
+
+    keeps: whether the function takes the kept state too: ``function(config, kept, link)``.
+    """
+
+    def work(kept: Kept | None) -> Work:
+        return partial(function, config, kept) if keeps else partial(function, config)
+
+    return ChildSpec(name, title, work, deadline)

@@ -1,0 +1,83 @@
+"""A pause and a stop by the server, and the first state after a restart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.restart import at_rest, restarted
+from katana450.arm.control.session import Session
+from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.velocity import JogFrame
+from tests.control.test_session import reasons, run
+
+LATE = Finding(Reason.LOOP_LATE, 0.3)
+
+
+def test_profile_chooses_between_stop_and_pause() -> None:
+    assert SilenceProfile.REAL_ARM.braking(LATE, 0.3) == cmd.Stop(finding=LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, 0.3) == cmd.Hold(finding=LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT) == cmd.Stop(finding=LATE)
+
+
+@pytest.fixture
+def paused(session: Session, state: State) -> State:
+    """Return a state after a pause in a motion."""
+    moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
+    return run(session, moving, [cmd.Hold(finding=LATE)], ticks=100)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        cmd.SetJoint(0, 1.5),
+        cmd.SetGripper(0.3),
+        cmd.MoveTool(np.array((0.3, 0.0, 0.2))),
+        cmd.Hold(),
+        cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE),
+    ],
+    ids=lambda command: type(command).__name__,
+)
+def test_paused_arm_rests_until_the_next_command(
+    session: Session, paused: State, command: cmd.Command
+) -> None:
+    assert paused.status is Status.PAUSED
+    assert reasons(paused) == {Reason.WAITING, Reason.LOOP_LATE}
+    assert not paused.moving
+    later = run(session, paused, [], ticks=100)
+    np.testing.assert_array_equal(later.q, paused.q)
+    assert not run(session, later, [command]).waits
+
+
+@pytest.mark.parametrize("command", [cmd.SpeedScale(0.5), cmd.SetPriority(Priority.PITCH)])
+def test_settings_keep_a_pause(session: Session, paused: State, command: cmd.Command) -> None:
+    assert run(session, paused, [command]).waits
+
+
+def test_stop_keeps_its_cause_until_it_is_cleared(session: Session, state: State) -> None:
+    moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
+    stopped = run(session, moving, [cmd.Stop(finding=LATE)], ticks=100)
+    assert reasons(stopped) == {Reason.STOPPED, Reason.LOOP_LATE}
+    again = run(session, stopped, [cmd.Stop()])
+    assert reasons(again) == {Reason.STOPPED, Reason.LOOP_LATE}
+    assert reasons(run(session, again, [cmd.ClearStop()])) == set()
+
+
+def test_restarted_arm_is_stopped_with_the_scene_of_the_kept_state(
+    session: Session, state: State
+) -> None:
+    moving = run(session, state, [cmd.SpeedScale(0.5), cmd.SetJoint(0, 1.0)], ticks=20)
+    assert moving.moving
+    kept = at_rest(moving)
+    begun = session.begin(kept.q, kept.gripper, 5.0)
+    first = restarted(begun, kept)
+    assert reasons(first) == {Reason.STOPPED, Reason.RESTARTED}
+    assert (first.speed, first.objects, first.status) == (0.5, moving.objects, Status.STOPPED)
+    later = run(session, first, [], ticks=50)
+    np.testing.assert_array_equal(later.q, moving.q)
+    cleared = run(session, later, [cmd.ClearStop()], ticks=50)
+    np.testing.assert_array_equal(cleared.q, moving.q)
+    assert restarted(begun, None).stopped is not None

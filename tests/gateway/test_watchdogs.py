@@ -1,0 +1,221 @@
+"""Test killed and frozen processes of a server: each is started again, and nothing moves by itself.
+
+The supervisor is the process of the command itself; the others are its children.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.client import Client, connect
+from katana450.client.files import RefusedError
+from katana450.errors import KatanaError
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import Shape
+from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.gateway.client import ask
+from tests.gateway.test_isolation import FAR
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="finds the server's processes as Linux lists them"
+)
+
+NEAR = np.deg2rad((-120.0, -68.0, 85.0, 8.0, 0.0))
+
+POST = "#VRML V2.0 utf8\nShape { geometry Box { size 0.04 0.04 0.1 } }"
+
+FATES = [
+    (process, number) for process in ("arm", "front") for number in (signal.SIGKILL, signal.SIGSTOP)
+]
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer(ATTENTIVE_APP) as server:
+        yield server
+
+
+def until(true: Callable[[], bool], seconds: float) -> float:
+    """Wait until ``true`` returns True; return the time that it took [s]."""
+    began = time.monotonic()
+    while not true():
+        assert time.monotonic() - began < seconds
+        time.sleep(0.02)
+    return time.monotonic() - began
+
+
+def look(server: AppServer) -> dict[str, Any]:
+    """Return the state of the arm."""
+    state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
+    return state
+
+
+def healthy(server: AppServer) -> bool:
+    with suppress(OSError):
+        return ask(f"{server.url}/health")[0] == 200
+    return False
+
+
+def clear_stop(arm: Client) -> None:
+    """Clear the stop as soon as the server allows it."""
+
+    def cleared() -> bool:
+        with suppress(RefusedError):
+            arm.ask(requests.ClearStop())
+            return True
+        return False
+
+    until(cleared, 5.0)
+
+
+def strike(server: AppServer, process: str, number: signal.Signals, delay: float) -> float:
+    """Send ``number`` to ``process`` ``delay`` [s] into a motion; check the restart.
+
+    Returns the time until the server works again [s].
+    """
+    victim = server.child(f"katana450 {process}")
+    with suppress(KatanaError, OSError), connect(server.url, "Driver") as arm:
+        clear_stop(arm)
+        start = arm.query(answers.State).q[0]
+        goal = NEAR if start > 0.0 else FAR
+        arm.ask(requests.Joints(q=goal.tolist()))
+        time.sleep(delay)
+        before = arm.query(answers.State)
+        os.kill(victim, number)
+        struck = time.monotonic()
+        if process == "arm":
+            until(lambda: not healthy(server), 2.0)
+            assert time.monotonic() - struck < 1.0
+        else:
+            # The client of a dead front end is disconnected.
+            with suppress(KatanaError, OSError):
+                while True:
+                    arm.query(answers.State)
+    until(lambda: healthy(server), 20.0)
+    back = time.monotonic() - struck
+    assert not Path(f"/proc/{victim}").exists() or server.child(f"katana450 {process}") != victim
+    until(lambda: look(server)["stop"] == "confirmed" and not look(server)["moving"], 5.0)
+    state = look(server)
+    assert state["status"] == "stopped"
+    q = state["q"]
+    # The arm stands near its last known place, and has not reached its goal.
+    assert abs(q[0] - before.q[0]) < 1.5
+    with connect(server.url, "Driver") as arm:
+        with suppress(KatanaError):
+            assert isinstance(arm.ask(requests.Joints(q=goal.tolist())), answers.Refused)
+        clear_stop(arm)
+        time.sleep(0.3)
+        assert arm.query(answers.State).q == q
+        there = q[0] + (0.1 if q[0] < 0.0 else -0.1)
+        assert arm.joints([there, *q[1:]]).q[0] == pytest.approx(there)
+    return back
+
+
+@pytest.mark.parametrize(("process", "number"), FATES)
+def test_lost_process_is_started_again_with_a_stopped_arm(
+    server: AppServer, process: str, number: signal.Signals
+) -> None:
+    strike(server, process, number, 0.4)
+    title = "The arm's process" if process == "arm" else "The page's server"
+    assert f"{title} ended with status -9 and is started again" in server.output
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("process", "number"), FATES)
+def test_lost_processes_at_random_moments_of_a_motion(process: str, number: signal.Signals) -> None:
+    moments = random.Random(f"{process} {number}")
+    with AppServer(ATTENTIVE_APP) as server:
+        took = []
+        for _ in range(50):
+            took.append(strike(server, process, number, moments.uniform(0.0, 1.2)))
+            # A process that ends soon after its start waits longer for the next.
+            time.sleep(4.0)
+    print(f"{process} {number.name}: back after {np.median(took):.2f} s, {max(took):.2f} s at most")
+    assert max(took) < 3.0
+
+
+def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServer) -> None:
+    front, killed = server.front, server.arm
+    with connect(server.url, "Driver") as arm:
+        clear_stop(arm)
+        arm.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.05, 0.05, 0.05]))
+        arm.joints(np.deg2rad((30.0, -68.0, 85.0, 8.0, 0.0)))
+        before = arm.query(answers.State)
+        # The supervisor gets each state a moment later.
+        time.sleep(0.3)
+        os.kill(killed, signal.SIGKILL)
+        until(lambda: not healthy(server), 5.0)
+        until(lambda: healthy(server), 20.0)
+        after = arm.query(answers.State)
+        assert (after.q, after.gripper, after.holder) == (before.q, before.gripper, "Driver")
+        assert after.status == "stopped"
+        assert "started again" in str(after.stopped)
+        assert "block" in ask(f"{server.url}/api/v1/objects")[2].decode()
+        assert server.front == front
+        assert server.arm != killed
+        reasons = [line.finding.reason for line in arm.query(answers.EventLog).lines]
+        assert "restarted" in reasons
+        clear_stop(arm)
+        arm.ask(requests.ReleaseLease())
+
+
+def test_uploaded_mesh_outlasts_the_front_end(server: AppServer, tmp_path: Path) -> None:
+    (tmp_path / "post.wrl").write_text(POST, encoding="utf-8")
+    killed = server.front
+    with connect(server.url, "Driver") as arm:
+        mesh = arm.upload(tmp_path / "post.wrl")
+        arm.ask(requests.Place(name="post", mesh=mesh.key))
+        # The file is written beside the server's thread.
+        time.sleep(0.5)
+        with suppress(KatanaError):
+            os.kill(killed, signal.SIGKILL)
+            while True:
+                arm.query(answers.State)
+    until(lambda: healthy(server), 20.0)
+    with connect(server.url, "Driver") as arm:
+        # Only a mesh with its triangles can be saved.
+        assert b"post.wrl" in arm.save_scene() or mesh.key.encode() in arm.save_scene()
+        clear_stop(arm)
+        arm.ask(requests.Remove(name="post"))
+        arm.ask(requests.ReleaseLease())
+
+
+def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer) -> None:
+    os.kill(server.pid, signal.SIGSTOP)
+    try:
+        until(lambda: not healthy(server), 5.0)
+        status, _, body = ask(f"{server.url}/health")
+        assert (status, b"supervisor" in body) == (503, True)
+        with connect(server.url, "Driver") as arm:
+            clear_stop(arm)
+            q = arm.query(answers.State).q
+            arm.joints([q[0], *q[1:4], q[4] + 0.1])
+    finally:
+        os.kill(server.pid, signal.SIGCONT)
+    until(lambda: healthy(server), 5.0)
+    # Its own absence is no silence of the others.
+    assert look(server)["stopped"] is None
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_no_process_outlives_the_supervisor(number: signal.Signals) -> None:
+    with AppServer(ATTENTIVE_APP) as server:
+        others = [server.arm, server.front]
+        with suppress(KatanaError, OSError), connect(server.url, "Driver") as arm:
+            arm.ask(requests.Joints(q=FAR.tolist()))
+            time.sleep(0.3)
+            os.kill(server.pid, number)
+            until(lambda: not any(Path(f"/proc/{each}").exists() for each in others), 10.0)
+        assert not any(Path(f"/proc/{each}").exists() for each in others)

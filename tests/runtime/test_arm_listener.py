@@ -1,0 +1,82 @@
+"""Connections to the arm's process: by role, with a key, and never held up by another client."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from multiprocessing.connection import Client, Connection
+from pathlib import Path
+from queue import SimpleQueue
+
+import pytest
+
+from katana450.arm.runtime.arm_listener import (
+    ArmAddress,
+    ArmListener,
+    Greeting,
+    connect,
+    connect_when_ready,
+)
+from katana450.platform_support import pipe_address
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> ArmAddress:
+    return ArmAddress(pipe_address(tmp_path, "arm"), b"a key")
+
+
+@pytest.fixture
+def greetings(address: ArmAddress) -> Iterator[SimpleQueue[Greeting]]:
+    found: SimpleQueue[Greeting] = SimpleQueue()
+    kept: list[Connection] = []
+
+    def attach(connection: Connection, greeting: Greeting) -> None:
+        kept.append(connection)
+        found.put(greeting)
+
+    listener = ArmListener(address, {"front": attach})
+    listener.start()
+    yield found
+    listener.close()
+
+
+def test_connection_is_attached_by_its_role(
+    address: ArmAddress, greetings: SimpleQueue[Greeting]
+) -> None:
+    with connect(address, Greeting("front", 7)):
+        assert greetings.get(timeout=5.0) == Greeting("front", 7)
+    with connect(address, Greeting("unknown")) as unknown, pytest.raises(EOFError):
+        unknown.recv()
+
+
+def test_wrong_key_is_refused(address: ArmAddress, greetings: SimpleQueue[Greeting]) -> None:
+    with pytest.raises(OSError, match="refused the key"):
+        connect(ArmAddress(address.name, b"another"), Greeting("front"))
+    assert greetings.empty()
+
+
+def test_client_that_stalls_keeps_no_other_out(
+    address: ArmAddress, greetings: SimpleQueue[Greeting]
+) -> None:
+    with Client(address.name), connect(address, Greeting("front")):
+        assert greetings.get(timeout=5.0).role == "front"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no socket files")
+def test_socket_file_of_a_killed_process_is_replaced(address: ArmAddress) -> None:
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(address.name)
+    listener = ArmListener(address, {})
+    listener.start()
+    connect(address, Greeting("unknown")).close()
+    listener.close()
+    assert not Path(address.name).exists()
+
+
+def test_waiting_for_the_arm_ends_with_the_server(address: ArmAddress) -> None:
+    ended = threading.Event()
+    ended.set()
+    with pytest.raises(EOFError):
+        connect_when_ready(address, Greeting("front"), ended)

@@ -1,0 +1,123 @@
+"""The supervisor with small processes: ends, hangs, errors, kept states and notices."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from katana450.assembly.supervised import KEPT, READY, SupervisorLink
+from katana450.assembly.supervisor import ChildSpec, Supervisor, child_spec
+from katana450.errors import ConfigurationError
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals of Linux and macOS")
+
+
+def worker(folder: Path, kept: dict[bytes, bytes] | None, link: SupervisorLink) -> None:
+    """Write what happens to ``folder``, until the supervisor ends this process."""
+    count = 0 if kept is None else int(kept[KEPT])
+    (folder / f"pid{count}").write_text(str(os.getpid()))
+    link.keep(KEPT, str(count + 1).encode())
+    link.report(READY)
+    link.ended.wait()
+    (folder / f"ended{count}").touch()
+
+
+def idler(folder: Path, link: SupervisorLink) -> None:
+
+    def note(text: str) -> None:
+        (folder / "notice").write_text(text)
+
+    link.notify = note
+    link.report(READY)
+    link.ended.wait()
+
+
+def stubborn(folder: Path, link: SupervisorLink) -> None:
+    """Report ready, and send no heartbeats."""
+    with (folder / "started").open("a") as file:
+        file.write("x")
+    link.prove(lambda: False)
+    link.report(READY)
+    time.sleep(60.0)
+
+
+def refusing(_folder: Path, _link: SupervisorLink) -> None:
+    raise ConfigurationError("The reason.")
+
+
+def failing(_folder: Path, _link: SupervisorLink) -> None:
+    raise SystemExit(3)
+
+
+class Running:
+    """A supervisor that runs in a thread."""
+
+    def __init__(self, *specs: ChildSpec) -> None:
+        self._stopping = threading.Event()
+        self.supervisor = Supervisor(specs, self._stopping)
+        self.supervisor.start()
+        for spec in specs:
+            self.supervisor.wait_for(spec.name, READY)
+        self._thread = threading.Thread(target=self.supervisor.run)
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self.supervisor.stop()
+
+
+def until(true: Callable[[], bool], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_lost_process_starts_again_with_its_state(tmp_path: Path, number: signal.Signals) -> None:
+    running = Running(
+        child_spec("worker", "The worker", worker, tmp_path, 1.0, keeps=True),
+        child_spec("idler", "The idler", idler, tmp_path, 1.0),
+    )
+    try:
+        until((tmp_path / "pid0").exists)
+        time.sleep(0.2)
+        os.kill(int((tmp_path / "pid0").read_text()), number)
+        until((tmp_path / "pid1").exists)
+        until((tmp_path / "notice").exists)
+        notice = (tmp_path / "notice").read_text()
+        assert notice == "The worker ended with status -9 and is started again."
+    finally:
+        running.stop()
+    # Each process ends by itself when the supervisor asks it to.
+    assert (tmp_path / "ended1").exists()
+    assert not (tmp_path / "ended0").exists()
+
+
+def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
+    running = Running(child_spec("stubborn", "It", stubborn, tmp_path, 0.5))
+    try:
+        until(lambda: len((tmp_path / "started").read_text()) >= 2)
+    finally:
+        running.stop()
+
+
+@pytest.mark.parametrize(
+    ("work", "message"), [(refusing, "The reason."), (failing, "It did not start; see the log")]
+)
+def test_error_of_the_first_start_ends_the_server(
+    tmp_path: Path, work: Callable[[Path, SupervisorLink], None], message: str
+) -> None:
+    supervisor = Supervisor([child_spec("it", "It", work, tmp_path, 1.0)], threading.Event())
+    supervisor.start()
+    with pytest.raises(ConfigurationError, match=message):
+        supervisor.wait_for("it", READY)
+    supervisor.stop()
