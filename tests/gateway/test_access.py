@@ -101,7 +101,7 @@ def test_roles_grant_exactly_their_rights(guarded: tuple[AppServer, Path]) -> No
             assert (status, last["finding"]["reason"], last["who"]) == (200, "stopped", "Viewer")
             await watcher.say("clear_stop")
             await watcher.notice("refused")
-            await driver.say("clear_stop")
+            await driver.clear_stop()
             await watcher.wait(stopped=None)
 
     asyncio.run(act())

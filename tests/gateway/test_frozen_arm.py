@@ -119,7 +119,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         while (state := state_of(server))["stop"] != "confirmed" or state["moving"]:
             assert time.monotonic() < end
             time.sleep(0.05)
-        assert driver.answer(do="clear_stop")["is"] == "done"
+        assert driver.clear_stop()["is"] == "done"
         time.sleep(0.5)
         np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 

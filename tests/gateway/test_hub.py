@@ -18,7 +18,7 @@ from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State, StoppingDistance
+from katana450.arm.control.state import ActiveStop, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -60,6 +60,7 @@ class FakeArm:
         self.beats = 0
         self.stopped = False
         self.age = 0.0
+        self.clear_refusal = ""
         self.taken: int | None = None
         self.jogs: list[tuple[tuple[float, ...], JogFrame]] = []
         self.fraction = 1.0
@@ -69,7 +70,7 @@ class FakeArm:
 
     @property
     def state(self) -> State:
-        stopped = StoppingDistance(0.0, 0.0) if self.stopped else None
+        stopped = ActiveStop(0.0, 0.0) if self.stopped else None
         if not self.moves:
             return replace(self.rest, stopped=stopped)
         return replace(self.rest, goal=self.rest.setpoint + 0.1, stopped=stopped)

@@ -203,7 +203,7 @@ def test_server_names_the_refused_parts_of_a_request(server: AppServer) -> None:
 def test_request_without_a_command_has_no_outcome(program: Client) -> None:
     answer = done(program.ask(requests.ReleaseLease()))
     assert (answer.outcome, answer.ticket) == (None, None)
-    program.ask(requests.ClearStop())
+    program.clear_stop()
 
 
 def test_every_channel_reports_the_outcome(server: AppServer) -> None:

@@ -30,6 +30,7 @@ from katana450.arm.control.object_commands import (
     ReplaceScene,
     SetAppearance,
 )
+from katana450.arm.control.stop_commands import ClearStop, Stop
 from katana450.arm.control.traits import (
     BaseCommand,
     CommandTraits,
@@ -227,22 +228,6 @@ class Hold(BaseCommand):
     """Come to rest and drop the targets of arm and gripper."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
-
-
-@dataclass(frozen=True)
-class Stop(BaseCommand):
-    """Come to rest as fast as the arm can, and accept no motion until ClearStop."""
-
-    traits: ClassVar[CommandTraits] = CommandTraits(
-        while_stopped=True, joints_only=True, safety=True
-    )
-
-
-@dataclass(frozen=True)
-class ClearStop(BaseCommand):
-    """Accept motion again after a stop; nothing moves."""
-
-    traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.scene_objects import MAX_OBJECTS, named
 from katana450.arm.control.state import ACCEPTED, Outcome, PartRefusal, Reason, State, Verdict
+from katana450.arm.control.stopping import clear_refusal
 from katana450.arm.control.transitions import Effect, effect_of
 
 INTENDED_REASONS = (Reason.STOPPED, Reason.PAUSED)
@@ -51,6 +52,8 @@ def refusal(state: State, command: cmd.Command) -> str:
     if effect_of(command, state) is Effect.REFUSED:
         return _why_refused(state, command)
     match command:
+        case cmd.ClearStop(t=t):
+            return clear_refusal(state, max(t, state.t))
         case cmd.PlaceObject(scene_object=scene_object):
             known = named(state.objects, scene_object.name)
             if known is None and len(state.objects) >= MAX_OBJECTS:

@@ -45,12 +45,14 @@ from katana450.arm.control.scene_changes import with_scene_change
 from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
 from katana450.arm.control.state import (
     ACCEPTED,
+    ActiveStop,
     Finding,
     Outcome,
     Reason,
     State,
-    StoppingDistance,
 )
+from katana450.arm.control.stop_cause import StopCause
+from katana450.arm.control.stopping import stopped_again, with_presses
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld
@@ -284,7 +286,7 @@ class Session:
         """Return ``state`` in the mode that ``command`` begins."""
         match command:
             case cmd.Stop():
-                return self._stop_motion(state)
+                return with_presses(self._stop_motion(state, command.cause), command)
             case cmd.ClearStop():
                 goal = self._stepper(state).stopping_point(state)[0]
                 free = with_mode(replace(state, stopped=None, goal=goal), IDLE)
@@ -352,19 +354,19 @@ class Session:
         """Return ``state`` that brakes and holds, without a target."""
         return with_mode(self._aim(state, self._stepper(state).stopping_point(state)[0]), IDLE)
 
-    def _stop_motion(self, state: State) -> State:
+    def _stop_motion(self, state: State, cause: StopCause) -> State:
         """Return ``state`` that brakes and drops every target.
 
         The grip stays, so that a held object does not fall.
         """
         if state.stopped is not None:
-            return state
+            return stopped_again(state)
         free = state.following is None or self._stepper(state).may_leave(state)
         state = replace(state, mode=IDLE) if free else with_mode(state, IDLE)
         goal, travel, time = self._stepper(state).stopping_point(state)
         stopped = replace(
             state,
-            stopped=StoppingDistance(travel, time),
+            stopped=ActiveStop(travel, time, cause, state.t),
             paused=False,
             goal=goal,
             gripper_goal=state.gripper_setpoint,

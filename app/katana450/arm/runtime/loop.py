@@ -12,7 +12,7 @@ from typing import Protocol
 from katana450.arm.control.commands import Command, Stop
 from katana450.arm.control.event_log import LogEntry, entries_between
 from katana450.arm.control.outcome import DROPPED, FAILED
-from katana450.arm.control.state import State
+from katana450.arm.control.state import ACCEPTED, State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
@@ -107,7 +107,7 @@ class ControlLoop:
             state = replace(self._session.fail(before), outcomes=(FAILED,) * len(drained.commands))
         self._state = state
         # A state that differs only in its time is not published.
-        if drained.commands or _differs(before, state):
+        if drained.last != self.state_publisher.snapshot.ticket or _differs(before, state):
             self.state_publisher.note(_outcomes(drained, state))
             self.state_publisher.publish(
                 Snapshot(state, drained.last), self._entries(before, state)
@@ -158,6 +158,8 @@ def _outcomes(drained: Drained, state: State) -> Iterator[TicketOutcome]:
     """Yield the outcome of each ticket of ``drained`` in the tick that ended in ``state``."""
     for ticket in drained.dropped:
         yield ticket, DROPPED
+    for ticket in drained.repeated:
+        yield ticket, ACCEPTED
     for tickets, outcome in zip(drained.tickets, state.outcomes, strict=False):
         for ticket in tickets:
             yield ticket, outcome

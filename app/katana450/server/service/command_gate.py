@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from enum import Enum
 from typing import NamedTuple
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
-from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.lease import Lease, Person, Role
+from katana450.arm.control.stop_cause import StopCause, pressed
+from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.stop_state import StopRecord
@@ -20,6 +24,15 @@ log = logging.getLogger(__name__)
 
 PROTECTIVE = (cmd.Stop, cmd.Hold, cmd.SpeedScale)
 """Commands that the server itself may give."""
+
+
+class ClearBy(Enum):
+    """Rule on the persons who may clear a stop."""
+
+    DRIVER = "driver"
+    """The driver, or any operator while nobody drives."""
+    PRESSER = "presser"
+    """The person who pressed STOP, or an admin. A stop by a watchdog: as ``DRIVER``."""
 
 
 class RunningProgram(NamedTuple):
@@ -38,8 +51,8 @@ class CommandGate:
     refuses an older number.
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        """Create a gate without an arm. ``clock`` is in seconds."""
+    def __init__(self, clock: Callable[[], float], clear_by: ClearBy = ClearBy.DRIVER) -> None:
+        """Create a gate without an arm. ``clock`` is in seconds. ``clear_by``: see ``ClearBy``."""
         self._clock = clock
         self._lock = threading.RLock()
         self.lease = Lease()
@@ -52,6 +65,11 @@ class CommandGate:
         """Number of stops and of losses of the lease."""
         self.on_stop: Callable[[], None] = lambda: None
         """Callback at each stop, before the arm gets it."""
+        self.name_of: Callable[[StopCause], str | None] = lambda cause: cause.by
+        """Function that returns the display name of the participant that pressed STOP."""
+        self._clear_by = clear_by
+        self._presses = Presses()
+        self._cleared = 0
         self._jogged = -cmd.JOG_TIME
 
     def submit(self, command: cmd.Command, actor: Actor) -> int:
@@ -63,20 +81,17 @@ class CommandGate:
         """
         with self._lock:
             if isinstance(command, cmd.Stop):
-                return self._stop(StopRecord(actor.name, f"{actor.name} pressed STOP."), actor)
+                return self._press(command, actor)
             if not all(each.traits.while_stopped for each in command.parts):
                 self.check_runs()
             if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
                 raise LeaseError("The server itself may not move the arm.")
+            if isinstance(command, cmd.ClearStop):
+                return self._clear_stop(command, actor)
             granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
-            clears = isinstance(command, cmd.ClearStop)
-            if not clears:
-                # Without an arm only a stop can be cleared.
-                self.present()
-            ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
-            if clears:
-                self.stopped = None
-            elif isinstance(command, cmd.Jog):
+            arm = self.present()
+            ticket = arm.deliver(command, granted)
+            if isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
             return ticket
 
@@ -146,7 +161,33 @@ class CommandGate:
     def protect(self, why: str) -> None:
         """Stop the arm in the name of the server, for the reason ``why``."""
         with self._lock:
-            self._stop(StopRecord(None, why), SERVER)
+            self._stop(StopCause(why, at=time.time()), SERVER)
+
+    def may_clear_stop(self, person: Person) -> bool:
+        """Return whether ``person`` may clear the present stop, once that is possible."""
+        if self._by_presser:
+            assert self.stopped is not None
+            own = _session(person.key) == _session(self.stopped.cause.key)
+            return own or person.role is Role.ADMIN
+        return person.role.may_drive and self.lease.holder in (None, person)
+
+    @property
+    def clears(self) -> str:
+        """Name of the persons who may clear the present stop, other than by ``may_clear_stop``."""
+        if self._by_presser:
+            assert self.stopped is not None
+            return f"{self.stopped.cause.by} or an admin"
+        return "an operator" if self.lease.holder is None else self.lease.holder.name
+
+    @property
+    def clear_refusal(self) -> str:
+        """Reason for which nobody can clear the present stop yet; empty if it can be cleared."""
+        stopped, arm = self.stopped, self.arm
+        if arm is None:
+            return ""
+        if stopped is not None and not stopped.seen(arm.snapshot).confirmed:
+            return "The arm has not answered the stop yet: it is not confirmed."
+        return arm.clear_refusal
 
     def reconcile(self) -> None:
         """Make gate and arm agree on whether the arm is stopped. Call this often."""
@@ -155,15 +196,19 @@ class CommandGate:
             if arm is None:
                 return
             snapshot = arm.snapshot
-            stopped = snapshot.state.stopped is not None
+            stopped = snapshot.state.stopped
+            if snapshot.state.presses:
+                self._presses.counts(cmd.Stop(others=snapshot.state.presses))
             if self.stopped is not None:
                 self.stopped = self.stopped.seen(snapshot)
                 sent = self.stopped.ticket
-                if not stopped and (sent is None or snapshot.ticket >= sent):
+                if stopped is None and (sent is None or snapshot.ticket >= sent):
                     # The arm started after the stop, or an error undid the stop.
-                    self.stopped = self._requested(self.stopped, arm, SERVER)
-            elif stopped and arm.caught_up:
-                self.protect("The arm lost the connection to the server and stopped.")
+                    again = cmd.Stop(replace(self.stopped.cause, press=""))
+                    self.stopped = self._requested(self.stopped, again, arm, SERVER)
+            elif stopped is not None and snapshot.ticket >= self._cleared:
+                # By the process of STOP, or by the arm's process itself.
+                self._adopt(stopped.cause)
 
     def moves(self) -> bool:
         """Return whether the arm moves or is about to move."""
@@ -171,21 +216,66 @@ class CommandGate:
             jogged = self._clock() - self._jogged < cmd.JOG_TIME
             return self.arm is not None and (self.arm.state.moving or jogged)
 
-    def _stop(self, stopped: StopRecord, actor: Actor) -> int:
+    def _press(self, stop: cmd.Stop, actor: Actor) -> int:
+        """Stop the arm; return the ticket, which is 0 for a repeated press."""
+        cause = pressed(actor.name, actor.key, stop.cause.press, time.time())
+        # A press that came by another path is in the state, even if its stop was cleared since.
+        known = () if self.arm is None else self.arm.state.presses
+        if not self._presses.counts(stop) or cause.press in known:
+            return 0
+        return self._stop(cause, actor)
+
+    def _stop(self, cause: StopCause, actor: Actor) -> int:
         self._revoke()
         self.on_stop()
         if self.stopped is None:
-            self.stopped = stopped
-            log.warning("Stopped: %s", stopped.why)
+            self.stopped = StopRecord(cause)
+            log.warning("Stopped: %s", cause.why)
         if self.arm is None:
             return 0
-        self.stopped = self._requested(self.stopped, self.arm, actor)
+        self.stopped = self._requested(self.stopped, cmd.Stop(cause), self.arm, actor)
         return self.stopped.ticket or 0
 
+    def _adopt(self, cause: StopCause) -> None:
+        """Record a stop that the arm has executed and this gate has not sent."""
+        name = self.name_of(cause)
+        if name is not None and name != cause.by:
+            cause = pressed(name, cause.key, cause.press, cause.at)
+        self._revoke()
+        self.on_stop()
+        self.stopped = StopRecord(cause, confirmed=True)
+        log.warning("Stopped: %s", cause.why)
+
     @staticmethod
-    def _requested(stopped: StopRecord, arm: ArmInterface, actor: Actor) -> StopRecord:
+    def _requested(
+        stopped: StopRecord, stop: cmd.Stop, arm: ArmInterface, actor: Actor
+    ) -> StopRecord:
         grounds = Grounds.SERVER if actor is SERVER else Grounds.SAFETY
-        return stopped.requested(arm.deliver(cmd.Stop(), replace(actor, grounds=grounds)))
+        return stopped.requested(arm.deliver(stop, replace(actor, grounds=grounds)))
+
+    def _clear_stop(self, command: cmd.ClearStop, actor: Actor) -> int:
+        """Clear the stop for ``actor``; return the ticket, which is 0 while there is no arm."""
+        # The arm may have been stopped on another path just now.
+        self.reconcile()
+        may = self.may_clear_stop(actor.person)
+        if may and self.clear_refusal:
+            raise LeaseError(self.clear_refusal)
+        if not self._by_presser:
+            granted = self._granted(actor, pacing=False)
+        elif may:
+            granted = replace(actor, grounds=Grounds.PRESSER)
+        else:
+            raise LeaseError(f"Only {self.clears} may clear this stop.")
+        ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
+        self.stopped, self._cleared = None, ticket
+        return ticket
+
+    @property
+    def _by_presser(self) -> bool:
+        """True if only the presser of the present stop, or an admin, may clear it."""
+        stopped = self.stopped
+        pressed_by_person = stopped is not None and stopped.cause.by is not None
+        return self._clear_by is ClearBy.PRESSER and pressed_by_person
 
     def _revoke(self) -> None:
         """Void every gesture received so far."""
@@ -205,3 +295,10 @@ class CommandGate:
         self.acquire(actor.person)
         log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
         return replace(actor, grounds=Grounds.FREE_LEASE)
+
+
+def _session(key: str) -> str:
+    """Return the part of ``key`` that the windows of one person, or of one browser, share."""
+    session = key.partition("/")[0]
+    # Programs without access links share that part.
+    return key if session == "programs" else session

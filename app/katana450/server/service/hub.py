@@ -13,17 +13,19 @@ from typing import Any, NamedTuple
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
-from katana450.server.service.command_gate import CommandGate
+from katana450.server.service.command_gate import ClearBy, CommandGate
 from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
-from katana450.server.service.stop_state import Presses, StopRecord
+from katana450.server.service.stop_path import StopPath
+from katana450.server.service.stop_state import StopRecord
 from katana450.settings import Settings
 
 TICK = 0.02
@@ -73,16 +75,19 @@ class Hub:
         hold_after: float = Settings.silence,
         meshes: Meshes | None = None,
         runner: Callable[[Hub], Runner] | None = None,
+        clear_by: ClearBy = ClearBy.DRIVER,
     ) -> None:
         """Create a hub without participants.
 
         ``hold_after``: heartbeat timeout of the driver [s] after which a moving arm is stopped.
         ``meshes``: initial meshes. ``runner``: factory of the ``Runner``; None for one that never
-        drives.
+        drives. ``clear_by``: persons who may clear a stop.
         """
         self.clock = clock
         self._hold_after = hold_after
-        self.gate = CommandGate(clock)
+        self.gate = CommandGate(clock, clear_by)
+        self.gate.name_of = self._name_of
+        self.stop_path = StopPath()
         self.event_log = EventLog()
         self.runner = Runner(self, Namespace()) if runner is None else runner(self)
         self.requests = RequestDecoder(self.runner.request_types)
@@ -93,7 +98,6 @@ class Hub:
         self._pictures: dict[MeasuresAge, str] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
-        self._presses = Presses()
         self._takeover: Takeover | None = None
 
     @property
@@ -206,12 +210,7 @@ class Hub:
 
         A repeated ``press`` counts once: it changes nothing, and the ticket is 0.
         """
-        return self.gate.submit(cmd.Stop(), actor) if self._presses.is_new(press) else 0
-
-    def may_clear_stop(self, window: Window) -> bool:
-        """Return whether ``window`` may clear a stop."""
-        holder = self.lease.holder
-        return window.person.role.may_drive and holder in (None, window.person)
+        return self.gate.submit(cmd.Stop(pressed(actor.name, actor.key, press, 0.0)), actor)
 
     def acquire(self, window: Window) -> None:
         """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
@@ -325,6 +324,11 @@ class Hub:
     def person_of(self, identity: Identity, page: str) -> Person:
         """Return the person at ``page``, whether or not its control socket is open now."""
         return self._known(key_of(identity, page), identity)[0]
+
+    def _name_of(self, cause: StopCause) -> str | None:
+        """Return the display name of the page that pressed STOP on the port of STOP."""
+        known = self._remembered.get(cause.key)
+        return cause.by if known is None else known[0].name
 
     def _known(self, key: str, identity: Identity) -> tuple[Person, int]:
         """Return person and number of the page of ``key``; a new page gets new ones."""

@@ -30,7 +30,9 @@ def health(hub: Hub) -> str | None:
     if hub.arm is None:
         return "The arm is not ready yet."
     age = silence(hub)
-    return None if age is None else f"No answer from the arm's process for {age:.1f} s."
+    if age is not None:
+        return f"No answer from the arm's process for {age:.1f} s."
+    return hub.stop_path.problem or None
 
 
 def common(hub: Hub) -> dict[str, Any]:
@@ -53,6 +55,9 @@ def common(hub: Hub) -> dict[str, Any]:
         **now._asdict(),
         "stop": None if stopped is None else stopped.stage,
         "stopped": None if stopped is None else stopped.why,
+        "stopped_at": None if stopped is None else stopped.cause.at or None,
+        "wait": hub.gate.clear_refusal,
+        "stop_path": hub.stop_path.problem,
         "holder": None if holder is None else holder.name,
         "speed": 1.0 if state is None else state.speed,
         "windows": len(hub.windows),
@@ -68,9 +73,8 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     program = hub.runner.progress()
     taker = hub.taken_by(window)
     age = hub.age(window)
-    clears = hub.may_clear_stop(window)
-    other = lease.holder.name if lease.holder is not None else "an operator"
-    until = "Clear stop is pressed" if clears else f"{other} clears the stop"
+    clears = hub.gate.may_clear_stop(person)
+    until = "Clear stop is pressed" if clears else f"{hub.gate.clears} clears the stop"
     return {
         "may_clear_stop": clears,
         "until": "" if hub.stopped is None else f"Nothing moves until {until}.",
