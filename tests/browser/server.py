@@ -27,8 +27,10 @@ APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
 # Below the ports of outgoing connections, so that none of those takes the port of a killed server.
-PORTS = range(8200, 8300)
+# Even, because the next port serves STOP.
+PORTS = range(8200, 8300, 2)
 READY = re.compile(r"is ready: (https?://\S+)")
+STOP_PORT = re.compile(r"STOP also on port (\d+)")
 KEPT_LINES = 400
 
 
@@ -108,14 +110,28 @@ class AppServer:
 
     @property
     def front(self) -> int:
-        """Id of the front end, a child process, as Linux lists it."""
-        (front,) = (
+        """Id of the front end, as Linux lists it."""
+        return self._child("katana450 front")
+
+    @property
+    def stop_process(self) -> int:
+        """Id of the process of STOP, as Linux lists it."""
+        return self._child("katana450 stop")
+
+    @property
+    def stop_url(self) -> str:
+        """Address of the port of STOP, which the process has printed."""
+        found = next(filter(None, map(STOP_PORT.search, reversed(self._lines))))
+        return f"{self.url.rpartition(':')[0]}:{found[1]}"
+
+    def _child(self, name: str) -> int:
+        (number,) = (
             int(child)
             for children in Path(f"/proc/{self.pid}/task").glob("*/children")
             for child in children.read_text().split()
-            if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
+            if Path(f"/proc/{child}/comm").read_text().rstrip() == name
         )
-        return front
+        return number
 
     def start(self) -> None:
         """Start the process and return when it is ready.

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from katana450.assembly.log_lines import start_log
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.extension import serve_extensions
-from katana450.platform_support import reset_priority
+from katana450.platform_support import name_process, reset_priority
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
@@ -135,6 +135,7 @@ def _run(config: FrontendConfig, pipe: Connection, status_sender: Connection) ->
     """Run the front end in this process, from start to end."""
     # Ctrl-C reaches all processes of a terminal; the arm's process ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    name_process("katana450 front")
     reset_priority()
     start_log()
     try:

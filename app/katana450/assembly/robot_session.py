@@ -24,6 +24,7 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.stop_end import StopEnd
 from katana450.errors import RobotDescriptionError
 from katana450.platform_support import raise_priority
 from katana450.settings import Settings
@@ -115,6 +116,7 @@ class RunningArm:
         )
         self._silence_timeout = settings.silence
         self._link: ArmEnd | None = None
+        self._stop_end: StopEnd | None = None
 
     def start(self) -> None:
         """Run the control loop in a separate thread."""
@@ -128,6 +130,13 @@ class RunningArm:
         self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence_timeout)
         self._link.start()
 
+    def attach_stop(self, pipe: Connection) -> None:
+        """Execute each STOP from the other end of ``pipe``, in place of any previous pipe."""
+        if self._stop_end is not None:
+            self._stop_end.close()
+        self._stop_end = StopEnd(pipe, self._loop, self._mailbox)
+        self._stop_end.start()
+
     @property
     def running(self) -> bool:
         """True while the control loop runs."""
@@ -140,14 +149,16 @@ class RunningArm:
 
     def stop(self) -> None:
         """Close the pipe, and end the loop."""
-        if self._link is not None:
-            self._link.close()
+        for end in (self._link, self._stop_end):
+            if end is not None:
+                end.close()
         self._loop.stop()
 
     def join(self) -> None:
-        """Wait for the threads of the link; call it after ``stop``, when the front end ended."""
-        if self._link is not None:
-            self._link.join()
+        """Wait for the threads of the links; call it after ``stop``, when the others ended."""
+        for end in (self._link, self._stop_end):
+            if end is not None:
+                end.join()
 
 
 def _be_prompt() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from urllib.parse import urlsplit
 
 import msgspec
 from starlette.applications import Starlette
@@ -20,7 +21,7 @@ from katana450.server.api.fields import MAX_PRESS_LENGTH
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub, actor_of
-from katana450.server.service.identity import Identity
+from katana450.server.service.identity import PAGE, Identity
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web import control_socket, security, static_files
@@ -28,7 +29,6 @@ from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.bodies import body_of
-from katana450.server.web.control_socket import PAGE
 from katana450.server.web.http_api import Api, RouteProvider
 from katana450.server.web.token_bucket import TokenBucket
 
@@ -39,6 +39,10 @@ MAX_BODY_BYTES = 1024
 
 BAD_LINKS_PER_SECOND, BAD_LINKS_BURST = 2.0, 20.0
 """Invalid links that are answered per second, and in a burst, for all clients together."""
+
+
+STOP_PORT = "X-Stop-Port"
+"""Header that names the port to which the page also sends STOP."""
 
 
 class _Entry(msgspec.Struct, forbid_unknown_fields=True):
@@ -63,7 +67,8 @@ def application(
     bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, hub.clock())
 
     async def page(request: Request) -> Response:
-        return index.answer(request, page_policy)
+        origin = _stop_origin(request.headers["host"], hub.stop_path.port, address)
+        return index.answer(request, security.page_policy(origin))
 
     async def file(request: Request) -> Response:
         found = static.get(request.path_params["name"])
@@ -87,9 +92,11 @@ def application(
             entry = msgspec.json.decode(await body_of(request, MAX_BODY_BYTES), type=_Entry)
         except msgspec.MsgspecError as error:
             raise HTTPException(400, "A token is required.") from error
-        if not entry.token and authenticator.identity(request.cookies) is not None:
-            return Response(status_code=204)
         response = Response(status_code=204)
+        if hub.stop_path.port is not None:
+            response.headers[STOP_PORT] = str(hub.stop_path.port)
+        if not entry.token and authenticator.identity(request.cookies) is not None:
+            return response
         if not authenticator.sign_in(entry.token, response):
             # A valid link is accepted even while others guess.
             if entry.token and not bad_links.take(hub.clock()):
@@ -130,6 +137,17 @@ def application(
     ]
     admission = Admission(Starlette(routes=routes), authenticator, acceptor)
     return security.SecurityMiddleware(admission, address)
+
+
+def _stop_origin(host: str, port: int | None, address: Address) -> str | None:
+    """Return the origin to which a page on ``host`` also sends STOP; None if there is none.
+
+    A content security policy cannot name an IPv6 address.
+    """
+    name = urlsplit(f"//{host}").hostname
+    if port is None or name is None or ":" in name:
+        return None
+    return f"{'https' if address.secure else 'http'}://{name}:{port}"
 
 
 def _signed_in(authenticator: Authenticator, request: Request) -> Identity:

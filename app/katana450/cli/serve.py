@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import logging
 import signal
+import socket
 import sys
 import threading
 import time
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
 from katana450.assembly.frontend_process import OPEN, READY, FrontendConfig, FrontendProcess
 from katana450.assembly.log_lines import start_log
+from katana450.assembly.stop_process import StopProcess
 from katana450.extension import serve_extensions
 from katana450.platform_support import stop_signals
 from katana450.resources import URDF_PATH
@@ -54,6 +57,8 @@ def serve_with(options: Namespace) -> int:
         public_url=options.public_url,
         lines=options.lines,
         bare=options.bare,
+        stop_port=options.stop_port,
+        clear_by=options.clear_by,
     )
     # The options are sent to another process, which does not need the command itself.
     values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})
@@ -77,20 +82,17 @@ def serve(
     start_log()
     # Read first: the front end gets this scene each time it is started.
     robot, scene = _with_scene(settings, urdf, tool, options)
-    stopping = threading.Event()
-
-    def stop(_signal: int, _frame: FrameType | None) -> None:
-        stopping.set()
-
-    for number in stop_signals():
-        signal.signal(number, stop)
+    stopping = _set_by_signals()
     # Held by this process, so that the port stays taken while the front end is started again.
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
+    stop_process = StopProcess(settings, listening)
+    settings = replace(settings, stop_port=stop_process.port)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
 
-    meshes = () if scene is None else scene.meshes
-    config = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
+    config = FrontendConfig(
+        settings, urdf, tool, listening, lines, options, () if scene is None else scene.meshes
+    )
     front, arm = FrontendProcess(config), None
     try:
         # Importing the libraries that read the robot takes most of a second. The front end starts
@@ -99,19 +101,18 @@ def serve(
 
         found = find_robot(settings, urdf, tool) if robot is None else robot
         arm = RunningArm(settings, found, scene)
-        for note in arm.notes:
-            print(f"katana450: {note}", file=sys.stderr)
+        sys.stderr.writelines(f"katana450: {note}\n" for note in arm.notes)
         front.wait_for(OPEN)
         print(f"Open {url} in a browser.", flush=True)
         arm.start()
         arm.attach(front.pipe)
+        arm.attach_stop(stop_process.pipe)
         front.wait_for(READY)
-        if lines is not None:
-            print(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.", flush=True)
-        print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
+        _announce(url, stop_process.port, lines)
         early_ends, started = 0, time.monotonic()
         # A signal that another thread receives does not wake this one from its wait.
         while arm.running and not stopping.wait(WAKE_INTERVAL):
+            stop_process.watch(arm.attach_stop)
             if front.running:
                 if time.monotonic() - started > STABLE_SECONDS and arm.silence > HANG_TIMEOUT:
                     log.error("The page's server has sent nothing for %g s.", HANG_TIMEOUT)
@@ -133,10 +134,30 @@ def serve(
         if arm is not None:
             arm.stop()
         front.stop()
+        stop_process.close()
         if arm is not None:
             arm.join()
         listening.close()
     return 0 if stopping.is_set() else 1
+
+
+def _set_by_signals() -> threading.Event:
+    """Return an event that is set by a signal that asks this process to end."""
+    stopping = threading.Event()
+
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        stopping.set()
+
+    for number in stop_signals():
+        signal.signal(number, stop)
+    return stopping
+
+
+def _announce(url: str, stop_port: int, lines: socket.socket | None) -> None:
+    """Print the addresses of the server, which is ready."""
+    if lines is not None:
+        print(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.", flush=True)
+    print(f"katana450 is ready: {url} (STOP also on port {stop_port}; Ctrl-C stops)", flush=True)
 
 
 def _with_scene(

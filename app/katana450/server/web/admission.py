@@ -11,7 +11,7 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from katana450.server.api.fields import ROOT
+from katana450.server.api.fields import STOP_PATHS
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
@@ -21,9 +21,6 @@ SOCKETS, SOCKETS_EACH = 256, 32
 
 REQUESTS, REQUESTS_EACH = 128, 16
 """Maximum of concurrent HTTP requests, in total and of one identity."""
-
-STOP_PATHS = ("/stop", f"{ROOT}/stop")
-"""Paths that are always answered. They read no body, so they end at once."""
 
 TOO_MANY = 429
 

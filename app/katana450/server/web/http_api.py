@@ -19,7 +19,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import LEASE_TIMEOUT
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests, schema
-from katana450.server.api.fields import ROOT, Id
+from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT, Id
 from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub, Window, actor_of
@@ -124,7 +124,8 @@ class Api:
         return read
 
     async def _stop(self, request: Request) -> Response:
-        self._hub.stop(actor_of(self._identity(request), CommandChannel.API))
+        press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
+        self._hub.stop(actor_of(self._identity(request), CommandChannel.API), press or None)
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:

@@ -127,6 +127,7 @@ class ProgramChannel(Channel):
                 number=window.number,
                 role=person.role.value,
                 heartbeat=HEARTBEAT_INTERVAL,
+                stop_port=self.hub.stop_path.port,
             )
         )
 
