@@ -105,6 +105,16 @@ def test_stop_by_the_arm_itself_keeps_its_reason(table: ClearingTable) -> None:
     assert table.hub.stopped.why == "The arm ran away."
 
 
+def test_first_stop_that_reached_the_arm_is_named(table: ClearingTable) -> None:
+    driver = table.join(PAGES[0])
+    # The server stops the arm too, before it knows of the press.
+    table.stoppable.stop_elsewhere(pressed("Vera", "v", "one", 5.0))
+    table.hub.gate.protect("Window 1 fell silent while the arm moved.")
+    table.wait(TICK, driver)
+    assert table.hub.stopped is not None
+    assert table.hub.stopped.why == "Vera pressed STOP."
+
+
 def test_clear_stop_is_offered_with_the_reason_to_wait(table: ClearingTable) -> None:
     driver, other = (table.join(page) for page in PAGES)
     table.touch(driver.person.key)

@@ -91,12 +91,12 @@ def test_front_end_ends_with_the_process_of_the_arm(server: AppServer) -> None:
     front = server.front
     os.kill(server.pid, signal.SIGKILL)
     end = time.monotonic() + 10.0
-    while Path(f"/proc/{front}").exists() and "Z" not in _state(front):
+    while Path(f"/proc/{front}").exists() and "Z" not in process_state(front):
         assert time.monotonic() < end
         time.sleep(0.05)
 
 
-def _state(number: int) -> str:
+def process_state(number: int) -> str:
     with suppress(OSError):
         return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
     return "Z"

@@ -23,7 +23,7 @@ from tests.browser.server import APP, AppServer
 from tests.gateway.client import HOUR, ask, controlling, enter, page_name
 from tests.gateway.postures import THERE
 from tests.gateway.test_frozen_arm import frozen
-from tests.gateway.test_isolation import under_way
+from tests.gateway.test_isolation import process_state, under_way
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
@@ -234,6 +234,13 @@ def test_ended_stop_process_is_reported_and_restarted_while_the_arm_moves() -> N
         assert stop_processes(server) not in ([], [hung])
         assert program.query(answers.State).stopped is None
         assert stop(server.stop_url, X_Name="Vera")[0] == 200
+
+
+def test_stop_process_ends_with_the_process_of_the_arm() -> None:
+    with AppServer(APP) as server:
+        number = server.stop_process
+        os.kill(server.pid, signal.SIGKILL)
+        until(lambda: process_state(number) == "Z")
 
 
 def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> None:

@@ -200,7 +200,9 @@ class CommandGate:
             if snapshot.state.presses:
                 self._presses.counts(cmd.Stop(others=snapshot.state.presses))
             if self.stopped is not None:
-                self.stopped = self.stopped.seen(snapshot)
+                before, self.stopped = self.stopped, self.stopped.seen(snapshot)
+                if stopped is not None and self.stopped.confirmed and not before.confirmed:
+                    self._credit(stopped.cause)
                 sent = self.stopped.ticket
                 if stopped is None and (sent is None or snapshot.ticket >= sent):
                     # The arm started after the stop, or an error undid the stop.
@@ -238,13 +240,23 @@ class CommandGate:
 
     def _adopt(self, cause: StopCause) -> None:
         """Record a stop that the arm has executed and this gate has not sent."""
-        name = self.name_of(cause)
-        if name is not None and name != cause.by:
-            cause = pressed(name, cause.key, cause.press, cause.at)
         self._revoke()
         self.on_stop()
-        self.stopped = StopRecord(cause, confirmed=True)
-        log.warning("Stopped: %s", cause.why)
+        self.stopped = StopRecord(self._named(cause), confirmed=True)
+        log.warning("Stopped: %s", self.stopped.why)
+
+    def _credit(self, cause: StopCause) -> None:
+        """Record the person whose STOP was the first that reached the arm, on another path."""
+        assert self.stopped is not None
+        if cause.by is not None and cause.press != self.stopped.cause.press:
+            self.stopped = replace(self.stopped, cause=self._named(cause))
+            log.warning("Stopped already: %s", self.stopped.why)
+
+    def _named(self, cause: StopCause) -> StopCause:
+        """Return ``cause`` with the display name of its presser."""
+        name = self.name_of(cause)
+        known = name is None or name == cause.by
+        return cause if known else pressed(str(name), cause.key, cause.press, cause.at)
 
     @staticmethod
     def _requested(
