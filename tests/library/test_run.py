@@ -59,7 +59,7 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
         client.clear_stop()
         running.join(60.0)
         assert len(refused) == 1
-        assert "stopped" in str(refused[0])
+        assert "STOP" in str(refused[0])
         at_rest = next(each for each in onlooker.states() if not each.moving)
         assert at_rest.stopped is None
         time.sleep(0.5)
