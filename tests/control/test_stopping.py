@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,16 @@ def test_stop_is_cleared_after_the_pause_that_each_stop_begins(
     assert (cleared.stopped, cleared.moving) == (None, False)
     # The presses are known after the end of the stop, so that late copies are recognised.
     assert cleared.presses == ("one", "two")
+
+
+def test_stop_that_the_giver_does_not_know_is_not_cleared(session: Session, state: State) -> None:
+    stopped = run(session, state, cmd.Stop(ANNA), ticks=150)
+    assert stopped.stopped is not None
+    for known in (-math.inf, stopped.stopped.newest - TICK):
+        after = run(session, stopped, cmd.ClearStop(known))
+        assert after.stopped is not None
+        assert after.outcomes[0].why.startswith("Anna pressed STOP.")
+    assert run(session, stopped, cmd.ClearStop(stopped.stopped.newest)).stopped is None
 
 
 def test_clear_stop_without_a_stop_is_accepted(session: Session, state: State) -> None:

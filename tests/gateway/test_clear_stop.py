@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -30,13 +31,16 @@ class StoppableArm(FakeArm):
         super().__init__(state)
         self.cause: StopCause | None = None
         self.presses: tuple[str, ...] = ()
+        self.sent: list[cmd.Stop] = []
+        self.newest = 0.0
+        self.known = math.nan
 
     @property
     def state(self) -> State:
         state = replace(super().state, presses=self.presses)
         if self.cause is None:
             return state
-        return replace(state, stopped=ActiveStop(0.0, 0.0, self.cause))
+        return replace(state, stopped=ActiveStop(0.0, 0.0, self.cause, self.newest))
 
     @property
     def snapshot(self) -> Snapshot:
@@ -48,7 +52,9 @@ class StoppableArm(FakeArm):
 
     def deliver(self, command: cmd.Command, actor: Actor) -> int:
         if isinstance(command, cmd.ClearStop):
-            self.cause = None
+            self.cause, self.known = None, command.known
+        if isinstance(command, cmd.Stop):
+            self.sent.append(command)
         return super().deliver(command, actor)
 
 
@@ -89,13 +95,24 @@ def test_stop_on_another_path_is_adopted_with_its_cause(table: ClearingTable) ->
     assert stopped.stage == "confirmed"
     assert table.hub.gate.revocations == revocations + 1
     assert not table.hub.gate.is_current(gesture)
-    # The arm was not stopped anew, and a copy by the main path changes nothing.
-    assert table.arm.stops == 0
+    # The Stop that ends plans has the same press, and a copy by the main path changes nothing.
+    assert table.stoppable.sent == [cmd.Stop(pressed("Somebody", key, "one", 5.0))]
     assert table.hub.stop(other.actor, "one") == 0
     table.hub.move(driver, cmd.ClearStop())
     table.wait(TICK, driver)
     assert table.hub.stop(other.actor, "one") == 0
-    assert (table.hub.stopped, table.arm.stops) == (None, 0)
+    assert (table.hub.stopped, table.arm.stops) == (None, 1)
+
+
+def test_clear_stop_names_the_newest_stop_that_the_gate_knows(table: ClearingTable) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.move(driver, cmd.ClearStop())
+    assert table.stoppable.known == -math.inf
+    table.stoppable.newest = 7.0
+    table.stoppable.stop_elsewhere(pressed("Vera", "v", "one", 5.0))
+    table.wait(TICK, driver)
+    table.hub.move(driver, cmd.ClearStop())
+    assert table.stoppable.known == 7.0
 
 
 def test_stop_by_the_arm_itself_keeps_its_reason(table: ClearingTable) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -31,9 +32,12 @@ class Stop(BaseCommand):
 class ClearStop(BaseCommand):
     """Accept motion again after a stop; nothing moves. See ``stopping`` for its refusal.
 
-    ``t``: time of the tick [s], which the session sets.
+    Attributes:
+        known: time of the newest STOP that the giver knows [s]; a newer one is not cleared.
+        t: time of the tick [s], which the session sets.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
 
+    known: float = math.inf
     t: float = 0.0

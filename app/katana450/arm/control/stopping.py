@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from katana450.arm.control.commands import Stop
@@ -14,13 +15,20 @@ REPORTED_PRESSES = 16
 """Number of presses of STOP in a state: more than people make while a copy is under way."""
 
 
-def clear_refusal(state: State, t: float) -> str:
+def clear_refusal(state: State, t: float, known: float = math.inf) -> str:
     """Return why the stop of ``state`` cannot be cleared at ``t`` [s]; an empty text if it can.
 
-    ``t`` is on the clock of ``state.t``. Without a stop there is nothing to refuse.
+    Without a stop there is nothing to refuse.
+
+    Args:
+        state: the state.
+        t: now [s], on the clock of ``state.t``.
+        known: time of the newest STOP that the person knows who clears it [s].
     """
     if state.stopped is None:
         return ""
+    if state.stopped.newest > known:
+        return f"{state.stopped.cause.why} You may not know yet. Clear the stop if it is safe."
     if not state.motion.at_rest:
         return "The arm still brakes. Clear the stop when it is at rest."
     remaining = HOLD_OFF - (t - state.stopped.newest)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -87,7 +88,7 @@ class CommandGate:
             if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
                 raise LeaseError("The server itself may not move the arm.")
             if isinstance(command, cmd.ClearStop):
-                return self._clear_stop(command, actor)
+                return self._clear_stop(actor)
             granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
             arm = self.present()
             ticket = arm.deliver(command, granted)
@@ -210,7 +211,7 @@ class CommandGate:
                     self.stopped = self._requested(self.stopped, again, arm, SERVER)
             elif stopped is not None and snapshot.ticket >= self._cleared:
                 # By the process of STOP, or by the arm's process itself.
-                self._adopt(stopped.cause)
+                self._adopt(stopped.cause, arm)
 
     def moves(self) -> bool:
         """Return whether the arm moves or is about to move."""
@@ -238,12 +239,14 @@ class CommandGate:
         self.stopped = self._requested(self.stopped, cmd.Stop(cause), self.arm, actor)
         return self.stopped.ticket or 0
 
-    def _adopt(self, cause: StopCause) -> None:
+    def _adopt(self, cause: StopCause, arm: ArmInterface) -> None:
         """Record a stop that the arm has executed and this gate has not sent."""
         self._revoke()
         self.on_stop()
-        self.stopped = StopRecord(self._named(cause), confirmed=True)
-        log.warning("Stopped: %s", self.stopped.why)
+        record = StopRecord(self._named(cause))
+        log.warning("Stopped: %s", record.why)
+        # Sent too, because it ends what this process plans. The arm knows the press already.
+        self.stopped = self._requested(record, cmd.Stop(cause), arm, SERVER)
 
     def _credit(self, cause: StopCause) -> None:
         """Record the person whose STOP was the first that reached the arm, on another path."""
@@ -265,7 +268,7 @@ class CommandGate:
         grounds = Grounds.SERVER if actor is SERVER else Grounds.SAFETY
         return stopped.requested(arm.deliver(stop, replace(actor, grounds=grounds)))
 
-    def _clear_stop(self, command: cmd.ClearStop, actor: Actor) -> int:
+    def _clear_stop(self, actor: Actor) -> int:
         """Clear the stop for ``actor``; return the ticket, which is 0 while there is no arm."""
         # The arm may have been stopped on another path just now.
         self.reconcile()
@@ -278,7 +281,12 @@ class CommandGate:
             granted = replace(actor, grounds=Grounds.PRESSER)
         else:
             raise LeaseError(f"Only {self.clears} may clear this stop.")
-        ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
+        ticket = 0
+        if self.arm is not None:
+            # A stop that has not come back from the arm yet is not cleared.
+            stopped = self.arm.state.stopped
+            known = -math.inf if stopped is None else stopped.newest
+            ticket = self.arm.deliver(cmd.ClearStop(known), granted)
         self.stopped, self._cleared = None, ticket
         return ticket
 

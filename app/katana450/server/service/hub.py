@@ -113,7 +113,8 @@ class Hub:
     @property
     def stopped(self) -> StopRecord | None:
         """The present stop; None while the arm is not stopped."""
-        return self.gate.stopped
+        stopped, arm = self.gate.stopped, self.gate.arm
+        return stopped if stopped is None or arm is None else stopped.seen(arm.snapshot)
 
     # Participants
 
