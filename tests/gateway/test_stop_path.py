@@ -96,6 +96,8 @@ def test_stop_of_a_page_is_confirmed_and_named_like_on_the_main_port(server: App
             assert shown["stopped"] == f"{shown['name']} pressed STOP."
             assert abs(shown["stopped_at"] - time.time()) < 10.0
             await control.clear_stop()
+            await control.say("release_lease")
+            await control.wait(holder=None)
 
     asyncio.run(act())
 
@@ -232,6 +234,28 @@ def test_ended_stop_process_is_reported_and_restarted_while_the_arm_moves() -> N
         assert stop_processes(server) not in ([], [hung])
         assert program.query(answers.State).stopped is None
         assert stop(server.stop_url, X_Name="Vera")[0] == 200
+
+
+class ProxiedServer(AppServer):
+    """A server that prints the address of its proxy, at which nothing answers here."""
+
+    def __init__(self, public: str) -> None:
+        super().__init__((*APP, "--public-url", public))
+        self.local, self.url = self.url, public
+
+
+def test_page_behind_a_proxy_sends_stop_to_its_own_address() -> None:
+    public = "https://arm.example.org"
+    with ProxiedServer(public) as server:
+        data, of_page = b'{"token":""}', {"Host": "arm.example.org", "Origin": public}
+        status, headers, _ = ask(f"{server.local}/enter", data=data, **of_page)
+        assert status == 204
+        assert "x-stop-port" not in headers
+        cookie = headers["set-cookie"].partition(";")[0]
+        # The proxy passes the path on to the port of STOP.
+        stop_url = f"http://127.0.0.1:{server.stop_url.rpartition(':')[2]}"
+        status, answer = stop(stop_url, path="/stop", Cookie=cookie, **of_page)
+        assert (status, answer["stop"]) == (200, "confirmed")
 
 
 def test_stop_process_ends_with_the_process_of_the_arm() -> None:

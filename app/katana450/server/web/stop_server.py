@@ -37,9 +37,13 @@ CONFIRM_TIMEOUT = 0.5
 NO_STATE = 0.3
 """[s] Silence of the arm's process after which its state counts as unknown."""
 
-RATE, BURST = 50.0, 100.0
-"""Requests per second, and in a burst, beyond which answers are delayed: refusals, and presses
-while the arm is stopped already. A press that finds the arm not stopped is never delayed."""
+RATE, BURST = 10.0, 20.0
+"""Requests of one client per second, and in a burst, beyond which answers are delayed: refusals,
+and presses while the arm is stopped already. A press that finds the arm not stopped is never
+delayed. A client is an access link; without one, an address."""
+
+MAX_CLIENTS = 256
+"""Number of clients whose requests are counted; a new one replaces the oldest."""
 
 DELAY = 0.2
 """[s] Delay of these answers. Meanwhile the connection may be closed in favour of another."""
@@ -103,7 +107,7 @@ class StopServer:
         self._address = address
         self._main_port = main_port
         self._acceptor = acceptor
-        self._often = TokenBucket(RATE, BURST, time.monotonic())
+        self._often: dict[str, TokenBucket] = {}
         self._kept = 0
 
     def protocol(self) -> asyncio.Protocol:
@@ -117,22 +121,31 @@ class StopServer:
         origin = headers.get("origin")
         refusal = self._refusal(request.method, path, headers.get("host", ""), origin)
         if refusal is not None:
-            return await self.delayed(refusal)
+            return await self.delayed(refusal, client)
         if path not in STOP_PATHS:
             return self._health()
         identity = self._identity(path, headers)
         if identity is None:
             refused = Reply(HTTPStatus.UNAUTHORIZED, b"Sign in at the start page, or send a token.")
-            return await self.delayed(_readable_by(origin, refused))
+            return await self.delayed(_readable_by(origin, refused), client)
         asked = {name: values[0] for name, values in parse_qs(query).items()}
         reply = await self._stop(path, identity, asked, client)
         return _readable_by(origin, reply)
 
-    async def delayed(self, reply: Reply) -> Reply:
-        """Return ``reply``, after ``DELAY`` if there are too many."""
-        if not self._often.take(time.monotonic()):
+    async def delayed(self, reply: Reply, client: tuple[str, int] | None) -> Reply:
+        """Return the refusal ``reply``, after ``DELAY`` if ``client`` gets too many."""
+        if not self._takes(_address_of(client)):
             await asyncio.sleep(DELAY)
         return reply
+
+    def _takes(self, who: str) -> bool:
+        """Count a request of ``who``; return False if there are too many."""
+        now = time.monotonic()
+        bucket = self._often.pop(who, None) or TokenBucket(RATE, BURST, now)
+        self._often[who] = bucket
+        while len(self._often) > MAX_CLIENTS:
+            del self._often[next(iter(self._often))]
+        return bucket.take(now)
 
     def _refusal(self, method: bytes, path: str, host: str, origin: str | None) -> Reply | None:
         if not self._address.is_ours(host):
@@ -196,7 +209,9 @@ class StopServer:
         stopped = None
         if link.status is not None and link.age < NO_STATE:
             stopped = link.status.stopped
-        if stopped is not None and not self._often.take(time.monotonic()):
+        known = self._authenticator.requires_link
+        who = identity.session if known else _address_of(client)
+        if stopped is not None and not self._takes(who):
             await asyncio.sleep(DELAY)
             return _stop_reply(stopped)
         # Sent even if the arm is stopped, so that late copies of this press are recognised.
@@ -231,6 +246,10 @@ def _stop_reply(stopped: StopCause | None) -> Reply:
     }
     status = HTTPStatus.ACCEPTED if stopped is None else HTTPStatus.OK
     return Reply(status, json.dumps(answer).encode() + b"\n", "application/json")
+
+
+def _address_of(client: tuple[str, int] | None) -> str:
+    return "" if client is None else client[0]
 
 
 def _readable_by(origin: str | None, reply: Reply) -> Reply:
@@ -269,14 +288,19 @@ class _StopConnection(asyncio.Protocol):
         if isinstance(event, h11.Request):
             self._task = asyncio.create_task(self._handle(event))
 
+    @property
+    def _client(self) -> tuple[str, int] | None:
+        """Address and port of the sender; None once the connection is closed."""
+        peer = self._transport.get_extra_info("peername")
+        return None if peer is None else (peer[0], peer[1])
+
     async def _refuse(self, reply: Reply) -> None:
-        self._send(await self._server.delayed(reply))
+        self._send(await self._server.delayed(reply, self._client))
         self._transport.close()
 
     async def _handle(self, request: h11.Request) -> None:
-        peer = self._transport.get_extra_info("peername")
         try:
-            reply = await self._server.reply(request, None if peer is None else (peer[0], peer[1]))
+            reply = await self._server.reply(request, self._client)
         except Exception:
             log.exception("A request on the port of STOP met an error.")
             reply = Reply(HTTPStatus.INTERNAL_SERVER_ERROR, b"See the log of the server.")
