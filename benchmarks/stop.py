@@ -67,7 +67,7 @@ class Links(NamedTuple):
     def give(cls, file: AccessFile) -> Links:
         """Return new links in ``file``."""
         expires = time.time() + HOUR
-        attackers = [file.give(f"Attacker {n}", Role.VIEWER, expires) for n in range(LINKS)]
+        attackers = [file.give(f"Attacker {n}", Role.OPERATOR, expires) for n in range(LINKS)]
         driver = file.give("Driver", Role.ADMIN, expires)
         return cls(driver, file.give("Presser", Role.VIEWER, expires), attackers)
 

@@ -52,8 +52,8 @@ def refusal(state: State, command: cmd.Command) -> str:
     if effect_of(command, state) is Effect.REFUSED:
         return _why_refused(state, command)
     match command:
-        case cmd.ClearStop(known=known, t=t):
-            return clear_refusal(state, max(t, state.t), known)
+        case cmd.ClearStop(known=newest, t=t):
+            return clear_refusal(state, max(t, state.t), newest)
         case cmd.PlaceObject(scene_object=scene_object):
             known = named(state.objects, scene_object.name)
             if known is None and len(state.objects) >= MAX_OBJECTS:
