@@ -108,6 +108,12 @@ def test_page_learns_the_port_when_it_signs_in(server: AppServer) -> None:
     assert headers["x-stop-port"] == port
     _, headers, _ = ask(server.url)
     assert f"connect-src 'self' {server.stop_url};" in headers["content-security-policy"]
+    # A page that came through a forwarded port cannot reach the other one.
+    forwarded = {"Host": "localhost:9000", "Origin": "http://localhost:9000"}
+    _, headers, _ = ask(f"{server.url}/enter", data=b'{"token":""}', **forwarded)
+    assert "x-stop-port" not in headers
+    _, headers, _ = ask(server.url, Host="localhost:9000")
+    assert "connect-src 'self';" in headers["content-security-policy"]
 
 
 def test_press_on_two_paths_counts_once_even_if_a_copy_is_late(

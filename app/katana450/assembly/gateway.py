@@ -29,6 +29,7 @@ from katana450.server.service.command_gate import ClearBy
 from katana450.server.service.heartbeats import Arrival, keep_alive
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.runner import Runner
+from katana450.server.service.stop_path import StopPath
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
@@ -103,9 +104,12 @@ class Gateway:
             self.hub = Hub(
                 time.monotonic, settings.silence, meshes, runner, ClearBy(settings.clear_by)
             )
-            if settings.public_url is None:
+            self.hub.stop_path = StopPath(
                 # Behind a proxy, the paths of STOP on the page's own address lead there.
-                self.hub.stop_path.port = settings.stop_port
+                settings.stop_port if settings.public_url is None else None,
+                self.port,
+                self.address.secure,
+            )
             authenticator = Authenticator(access, self.port, self.address)
             guard = Guard(self.viser)
             self.gestures = Gestures(self.viser, guard, self.hub)

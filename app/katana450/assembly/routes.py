@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from urllib.parse import urlsplit
 
 import msgspec
 from starlette.applications import Starlette
@@ -67,7 +66,7 @@ def application(
     bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, hub.clock())
 
     async def page(request: Request) -> Response:
-        origin = _stop_origin(request.headers["host"], hub.stop_path.port, address)
+        origin = hub.stop_path.origin_beside(request.headers["host"])
         return index.answer(request, security.page_policy(origin))
 
     async def file(request: Request) -> Response:
@@ -93,8 +92,9 @@ def application(
         except msgspec.MsgspecError as error:
             raise HTTPException(400, "A token is required.") from error
         response = Response(status_code=204)
-        if hub.stop_path.port is not None:
-            response.headers[STOP_PORT] = str(hub.stop_path.port)
+        stop_port = hub.stop_path.port_beside(request.headers["host"])
+        if stop_port is not None:
+            response.headers[STOP_PORT] = str(stop_port)
         if not entry.token and authenticator.identity(request.cookies) is not None:
             return response
         if not authenticator.sign_in(entry.token, response):
@@ -137,17 +137,6 @@ def application(
     ]
     admission = Admission(Starlette(routes=routes), authenticator, acceptor)
     return security.SecurityMiddleware(admission, address)
-
-
-def _stop_origin(host: str, port: int | None, address: Address) -> str | None:
-    """Return the origin to which a page on ``host`` also sends STOP; None if there is none.
-
-    A content security policy cannot name an IPv6 address.
-    """
-    name = urlsplit(f"//{host}").hostname
-    if port is None or name is None or ":" in name:
-        return None
-    return f"{'https' if address.secure else 'http'}://{name}:{port}"
 
 
 def _signed_in(authenticator: Authenticator, request: Request) -> Identity:
