@@ -1,6 +1,6 @@
 # docker build -t katana450 .
-# Here alone:       docker run --rm -p 127.0.0.1:8080:8080 katana450 serve --host 0.0.0.0 --insecure
-# Other machines:   docker run --rm -p 8080:8080 --user $(id -u) -v ./access.json:/access.json katana450
+# Here alone:       docker run --rm -p 127.0.0.1:8080:8080 -p 127.0.0.1:8081:8081 katana450 serve --host 0.0.0.0 --insecure
+# Other machines:   docker run --rm -p 8080:8080 -p 8081:8081 --user $(id -u) -v ./access.json:/access.json katana450
 # Any image with Python 3.11 or newer and its venv module will do.
 ARG BASE=docker.io/library/python:3.12.11-slim-bookworm
 FROM ${BASE} AS build
@@ -18,7 +18,7 @@ FROM ${BASE}
 COPY --from=build /opt/katana450 /opt/katana450
 RUN useradd --system --create-home --uid 10450 katana
 USER katana
-EXPOSE 8080
+EXPOSE 8080 8081
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=30s --timeout=3s --start-period=10s \
   CMD ["/opt/katana450/bin/python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8080/health', timeout=2)"]

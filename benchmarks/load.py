@@ -173,7 +173,7 @@ async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
     found: list[tuple[float, float]] = []
     states = arm.states(100.0)
     for _ in range(times):
-        await arm.ask(requests.ClearStop())
+        await arm.clear_stop()
         await asyncio.sleep(0.4)
         sent = time.perf_counter()
         await arm.tell(requests.Stop())
@@ -181,7 +181,7 @@ async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
             if state.status == "stopped":
                 found.append((state.t - sent, time.perf_counter() - sent))
                 break
-    await arm.ask(requests.ClearStop())
+    await arm.clear_stop()
     return found
 
 

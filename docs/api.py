@@ -40,7 +40,7 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **HTTP** `GET /api/v{version}/state`, `arm`, `event_log`, `branches`, `loop`, `objects`, `world`, `links` | The answers of `query`. |
 | **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | Upload of a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf file. `place` uses it by the key in the answer. |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | Download and upload of the scene as a .zip ([scenes](scenes.md)). An uploaded scene waits for a `load`. |
-| **HTTP** `POST /api/v{version}/stop` | `stop` |
+| **HTTP** `POST /api/v{version}/stop?press=NAME` | `stop`, on the main port and on the [port of STOP](access.md#the-port-of-stop), which answers with the stage. `press` makes copies on both count once. |
 | **HTTP** `GET /api/v{version}/openapi.json` | This API as OpenAPI. |
 
 Every request is a heartbeat. If the server requires an access link ([access](access.md)), send the
@@ -62,7 +62,8 @@ If a request is several commands (`set` with `more`) and some of them are refuse
 are answered at once, as `accepted`. So are `branch`, whose path is planned first, and a `steer` that
 gives the arm no command yet. A `stop` is answered at once, as `requested`.
 
-A stop can be cleared before a program sees it. A program that must not continue then, such as one that
+A stop is cleared at the earliest when the arm is at rest, and 1 s after the newest STOP; until then
+`clear_stop` is refused with the reason. `clearable` in a state says when. A stop can be cleared before a program sees it. A program that must not continue then, such as one that
 streams joint angles, adds to each command the `revocations` of the state in which it began. The server
 refuses the command if there was a stop or a change of driver since then. The answer to a command has
 this number too.
@@ -91,7 +92,8 @@ shape=requests.Shape.MESH, mesh=key))` places it in front of the arm. `arm.save_
 scene, and `arm.load_scene(data)` restores it.
 
 `connect` sends the heartbeats by itself. `aconnect` is the same for asyncio. A refused request
-raises `RefusedError`, whose text has the reason and what to do. No call waits for ever: if the server
+raises `RefusedError`, whose text has the reason and what to do. `arm.stop()` sends STOP on all paths at once
+and returns `confirmed` or `requested`. `arm.clear_stop()` waits until the stop can be cleared. No call waits for ever: if the server
 does not answer, the call raises `LostError`.
 
 With the token of an admin, `arm.people()` lists everybody who is connected, and `arm.kick(person)`,

@@ -3,8 +3,8 @@
 (() => {
   const STALE = 1.0; // s, age from which a picture is marked as old
   const SLOW = 150; // ms, round trip from which a connection counts as slow
-  const QUIET = 400; // ms without a message, of which ten come a second, from which a connection is bad
-  const ANSWER = 250; // ms without an answer after which a STOP is also sent over HTTP
+  const QUIET = 300; // ms without a message, of which ten come a second, from which the state of the arm counts as unknown
+  const ANSWER = 500; // ms without an answer after which a STOP is sent again over HTTP
   const TOAST = 4000; // ms
   const KEPT_OUT = 403; // status of a sign-in of somebody whom an admin has disconnected
   const SIGN_IN = 4401; // close code: the page has to sign in again
@@ -32,6 +32,8 @@
   let trip = null;
   let asking = null;
   let press = null;
+  let stopPort = null; // port of this host that serves STOP alone
+  let proven = null; // cause of the stop that the arm has confirmed on another path
 
   // A reloaded page keeps its name; a second tab gets another.
   function name() {
@@ -51,26 +53,45 @@
 
   // STOP
 
-  // A press is sent until it is answered. It counts once, because on a slow connection its last
-  // message may arrive after the stop was cleared.
+  // A press is sent on all paths at once, over HTTP until it is answered. It counts once, because on a
+  // slow connection its last message may arrive after the stop was cleared.
   function stop() {
     press = randomName();
     say({ do: "stop", press, id: press });
     Jog.quiet();
     stopButton.classList.add("asked");
+    insist();
+  }
+
+  function insist() {
+    const { protocol, hostname } = location;
+    const paths = [""];
+    if (stopPort) paths.push(`${protocol}//${hostname}:${stopPort}/`);
+    for (const path of paths) post(path, press);
     clearTimeout(asking);
     asking = setTimeout(insist, ANSWER);
   }
 
-  function insist() {
-    fetch(`stop?press=${press}&page=${page}`, { method: "POST", keepalive: true }).then(
-      async (answer) => {
-        if (answer.ok) stopped();
-        else if (answer.status === MUTED) notCounted(await answer.text());
-      },
-      () => {},
-    );
-    asking = setTimeout(insist, 2 * ANSWER);
+  // The server of STOP answers with its stage; the first answer that confirms it counts.
+  async function post(path, sent) {
+    try {
+      const query = `press=${sent}&page=${page}`;
+      const answer = await fetch(`${path}stop?${query}`, { method: "POST", keepalive: true, credentials: "include" });
+      if (sent !== press) return;
+      if (answer.status === MUTED) return notCounted(await answer.text());
+      if (!answer.ok) return;
+      const { stop: stage, why } = answer.status === 204 ? {} : await answer.json();
+      if (stage === "confirmed" && status?.stop !== "confirmed") proven = why;
+      stopped();
+    } catch {
+      // Another path, or the next attempt, may reach the server.
+    }
+  }
+
+  // A press of a muted person that does not count is not sent again.
+  function notCounted(why) {
+    stopped();
+    toast(why);
   }
 
   // A press of a muted person that does not count is not sent again.
@@ -83,6 +104,7 @@
     clearTimeout(asking);
     asking = null;
     draw();
+    drawLink();
   }
 
   // Stop at the press, not at the release. A click without a pointer is the Enter key.
@@ -168,13 +190,18 @@
   let [drawnActs, drawnOrders] = ["", ""];
   function draw() {
     if (!status) return;
-    body.dataset.mood = status.mood;
-    text("headline", status.headline);
-    text("why", [status.taken, status.why, status.stopped, status.until].filter(Boolean).join(" "));
+    body.dataset.mood = proven ? "stopped" : status.mood;
+    text("headline", proven ? "Stopped" : status.headline);
+    const at = status.stopped_at ? `${new Date(1000 * status.stopped_at).toLocaleTimeString()}:` : "";
+    const cause = status.stopped ? [at, status.stopped] : [proven];
+    text("why", [status.taken, status.why, ...cause, status.until].filter(Boolean).join(" "));
     // A press is complete when the arm's state shows the stop.
-    stopButton.classList.toggle("asked", asking !== null || status.stop === "requested");
+    stopButton.classList.toggle("asked", !proven && (asking !== null || status.stop === "requested"));
     byId("objects-button").hidden = status.role === "viewer";
-    byId("clear-stop").hidden = !status.stopped || !status.may_clear_stop;
+    const clear = byId("clear-stop");
+    clear.hidden = !status.stopped || !status.may_clear_stop;
+    clear.disabled = status.wait !== "";
+    clear.title = status.wait;
     const { mine, holder, windows, asking: requests } = status;
     const names = requests.map(({ name }) => name).join(", ");
     const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
@@ -205,9 +232,9 @@
   // Without a connection the state of the arm is unknown.
   function unknown() {
     if (!status) return;
-    body.dataset.mood = "starting";
-    text("headline", "No connection");
-    text("why", "");
+    body.dataset.mood = proven ? "stopped" : "starting";
+    text("headline", proven ? "Stopped" : "No connection");
+    text("why", proven ?? "");
   }
 
   function drawLink() {
@@ -220,17 +247,16 @@
     line.lastElementChild.textContent = lost ? "Offline" : trip === null ? "" : `${Math.round(trip)} ms${old}`;
     body.classList.toggle("stale", lost || bad);
     const banner = byId("banner");
-    banner.hidden = !(lost || bad) || (lost && !status);
+    const missing = status?.stop_path;
+    banner.hidden = !(lost || bad || missing) || (lost && !status);
     banner.className = lost ? "lost" : "";
-    const words = lost
-      ? asking !== null
-        ? "No connection to the arm. Your STOP is sent as soon as it is back."
-        : "No connection to the arm. The picture is old. Reconnecting."
-      : silent > QUIET
-        ? "The arm does not answer. The picture is old."
-        : trip > SLOW
-          ? "The connection is slow. The picture is old."
-          : "The picture is old, although the connection is fast: this device may draw too slowly.";
+    let words = "The picture is old, although the connection is fast: this device may draw too slowly.";
+    if (proven && (lost || bad)) words = "The arm has confirmed the stop on another path. The picture is old.";
+    else if (lost && asking !== null) words = "No connection to the arm. Your STOP is sent as soon as it is back.";
+    else if (lost) words = "No connection to the arm. The picture is old. Reconnecting.";
+    else if (!bad) words = missing;
+    else if (silent > QUIET) words = "The arm does not answer. The picture is old.";
+    else if (trip > SLOW) words = "The connection is slow. The picture is old.";
     if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
   }
 
@@ -263,6 +289,7 @@
       // The message has only the changes.
       status = { ...status, ...data.heard };
       byId("gate").hidden = true;
+      proven = null;
       draw();
     }
     drawLink();
@@ -335,6 +362,7 @@
     const token = location.hash.slice(1);
     if (token) history.replaceState(null, "", location.pathname + location.search);
     const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
+    stopPort = answer.headers.get("X-Stop-Port") ?? stopPort;
     byId("gate").hidden = answer.ok;
     const because = token || answer.status === KEPT_OUT;
     if (because && !answer.ok) byId("gate-why").textContent = await answer.text();

@@ -51,6 +51,13 @@ def reset_priority() -> None:
         os.setpriority(os.PRIO_PROCESS, 0, 0)
 
 
+def name_process(name: str) -> None:
+    """Name this process for ``ps`` and ``top``, on Linux: at most 15 characters."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            Path("/proc/self/comm").write_text(name, encoding="ascii")
+
+
 def raise_open_file_limit(wanted: int) -> int | None:
     """Let this process open ``wanted`` files, or as many as the system allows.
 
@@ -110,12 +117,6 @@ def without_interrupts() -> dict[str, Any]:
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     else:  # noqa: RET505 - so that mypy follows either system
         return {"start_new_session": True}
-
-
-def name_process(name: str) -> None:
-    """Give this process a name of up to 15 letters in lists of processes, as on Linux."""
-    with suppress(OSError):
-        Path("/proc/self/comm").write_text(name, encoding="ascii")
 
 
 def pipe_address(folder: Path, name: str) -> str:

@@ -30,6 +30,8 @@ class Settings:
         public_url: URL that people enter when the server is behind a reverse proxy.
         lines: TCP port of this machine for programs that send JSON lines; None for no such port.
         bare: whether the arm has no gripper.
+        stop_port: TCP port that serves STOP alone; None for the port after ``port``, or a free one.
+        clear_by: persons who may clear a stop; see ``server.service.command_gate.ClearBy``.
     """
 
     host: str = "127.0.0.1"
@@ -46,3 +48,5 @@ class Settings:
     public_url: str | None = None
     lines: int | None = None
     bare: bool = False
+    stop_port: int | None = None
+    clear_by: str = "driver"

@@ -29,8 +29,10 @@ APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
 # Below the ports of outgoing connections, so that none of those takes the port of a killed server.
-PORTS = range(8200, 8300)
+# Even, because the next port serves STOP.
+PORTS = range(8200, 8300, 2)
 READY = re.compile(r"is ready: (https?://\S+)")
+STOP_PORT = re.compile(r"STOP also on port (\d+)")
 KEPT_LINES = 400
 
 
@@ -118,6 +120,17 @@ class AppServer:
         """Id of the arm's process, as Linux lists it."""
         return self.child("katana450 arm")
 
+    @property
+    def stop_process(self) -> int:
+        """Id of the process of STOP, as Linux lists it."""
+        return self.child("katana450 stop")
+
+    @property
+    def stop_url(self) -> str:
+        """Address of the port of STOP, which the process has printed."""
+        found = next(filter(None, map(STOP_PORT.search, reversed(self._lines))))
+        return f"{self.url.rpartition(':')[0]}:{found[1]}"
+
     def child(self, name: str) -> int:
         """Return the id of the child process ``name``. Raises ServerError if there is none."""
         found = [
@@ -131,16 +144,16 @@ class AppServer:
         return found[0]
 
     @contextmanager
-    def frozen_arm(self) -> Iterator[None]:
-        """Suspend the arm's process, and the supervisor that would end it, inside the block."""
-        processes = (self.pid, self.arm)
-        for process in processes:
-            os.kill(process, signal.SIGSTOP)
+    def frozen(self, process: int) -> Iterator[None]:
+        """Suspend ``process``, and the supervisor that would end it, inside the block."""
+        processes = (self.pid, process)
+        for each in processes:
+            os.kill(each, signal.SIGSTOP)
         try:
             yield
         finally:
-            for process in reversed(processes):
-                os.kill(process, signal.SIGCONT)
+            for each in reversed(processes):
+                os.kill(each, signal.SIGCONT)
 
     def start(self) -> None:
         """Start the process and return when it is ready.

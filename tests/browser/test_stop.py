@@ -11,7 +11,7 @@ import pytest
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import bar, mood, take
+from tests.browser.session import Truth, bar, clear_stop, mood, take
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="freezes a process")
 
@@ -30,13 +30,55 @@ def wait_headline(page: ViserPage, words: str) -> None:
     page.wait_until(lambda: bar(page, "headline") == words, words)
 
 
+def test_stop_is_confirmed_on_its_own_port_while_the_web_server_is_frozen(
+    server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    driver, truth = open_page(server.url, nodes=("/arm",)), Truth(server)
+    take(driver)
+    with server.frozen(server.front):
+        driver.page.keyboard.press("Space")
+        wait_headline(driver, "Stopped")
+        driver.wait_until(lambda: "confirmed the stop" in bar(driver, "banner"), "the banner")
+        assert "pressed STOP" in bar(driver, "why")
+        assert driver.page.locator("#stop.asked").count() == 0
+        driver.keep(artefacts / "stop-on-its-own-port.png")
+    truth.wait(stop="confirmed")
+    me = bar(driver, "name").partition(",")[0]
+    assert truth.status()["stopped"] == f"{me} pressed STOP."
+    driver.wait_until(lambda: f": {me} pressed STOP." in bar(driver, "why"), "time and presser")
+    clear_stop(driver, truth)
+    driver.press_in_bar("Release")
+    assert driver.errors == []
+
+
+def test_clear_stop_is_disabled_with_the_reason_until_it_is_possible(
+    server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    driver, truth = open_page(server.url, nodes=("/arm",)), Truth(server)
+    take(driver)
+    button = driver.page.locator("#clear-stop")
+    # Each press begins the time again.
+    for _ in range(3):
+        driver.page.keyboard.press("Space")
+        driver.page.wait_for_timeout(200)
+    driver.wait_until(button.is_visible, "the button")
+    assert button.is_disabled()
+    assert "Clear the stop" in (button.get_attribute("title") or "")
+    driver.keep(artefacts / "clear-stop-later.png")
+    driver.wait_until(button.is_enabled, "the end of the time")
+    assert button.get_attribute("title") == ""
+    clear_stop(driver, truth)
+    driver.press_in_bar("Release")
+    assert driver.errors == []
+
+
 def test_page_tells_a_requested_stop_from_a_confirmed_one(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
     driver, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
     take(driver)
     me = bar(driver, "name").partition(",")[0]
-    with server.frozen_arm():
+    with server.frozen(server.arm):
         wait_headline(other, "No answer from the arm")
         assert mood(other.page) == "lost"
         other.page.keyboard.press("Space")

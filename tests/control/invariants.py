@@ -27,6 +27,7 @@ from katana450.arm.control.modes import (
 )
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
+from katana450.arm.control.stopping import clear_refusal
 from katana450.arm.control.transitions import TABLE, Effect, effect_of
 from katana450.assembly.robot_session import describe_robot
 from katana450.maths.geometry.arrays import FloatArray
@@ -146,7 +147,14 @@ class JointRules(RuleBasedStateMachine):
     @precondition(lambda self: self.state.stopped is not None)
     @rule(ticks=ticks)
     def clear_stop(self, ticks: int) -> None:
+        may = self.may_clear
         self.run([cmd.ClearStop()], ticks)
+        assert (self.state.stopped is None) == may
+
+    @precondition(lambda self: self.state.stopped is not None)
+    @rule(ticks=ticks)
+    def wait_and_clear_stop(self, ticks: int) -> None:
+        self.wait_and_clear(ticks)
         assert self.state.stopped is None
 
     @rule(ticks=ticks)
@@ -168,6 +176,17 @@ class JointRules(RuleBasedStateMachine):
         self.run([cmd.Batch((cmd.SpeedScale(speed), last))], 1)
 
     # The tick, and the invariants after it.
+
+    @property
+    def may_clear(self) -> bool:
+        """True if the next tick accepts ClearStop."""
+        return not clear_refusal(self.state, self.state.t + DT)
+
+    def wait_and_clear(self, ticks: int, *then: cmd.Command) -> None:
+        """Clear the stop, if any, as soon as possible; execute ``then`` in the same tick."""
+        while not self.may_clear:
+            self.tick(())
+        self.run([cmd.ClearStop(), *then], ticks)
 
     def run(self, commands: Iterable[cmd.Command], ticks: int) -> None:
         """Execute ``commands`` in the first of ``ticks`` ticks."""
@@ -199,10 +218,9 @@ class JointRules(RuleBasedStateMachine):
                 self.note(each.commands)
             elif isinstance(each, cmd.Stop):
                 self.may_move = self.fingers_may_move = False
-            elif isinstance(each, cmd.ClearStop) and not self.state.motion.at_rest:
-                # If the stop is cleared during the brake, the arm brakes differently from here.
-                self.stop_ends = None
-            elif self.state.stopped is None or any(isinstance(c, cmd.ClearStop) for c in commands):
+            elif self.state.stopped is None or (
+                self.may_clear and any(isinstance(c, cmd.ClearStop) for c in commands)
+            ):
                 self.may_move |= isinstance(each, MOTIONS) and not isinstance(each, RESTS)
                 self.fingers_may_move |= isinstance(each, cmd.SetGripper)
 
@@ -271,7 +289,8 @@ class JointRules(RuleBasedStateMachine):
         (command,) = commands
         again = isinstance(command, cmd.Stop) and before.stopped is not None
         elsewhere = isinstance(command, cmd.Follow) and not isinstance(after.mode, Following)
-        if again or elsewhere or effect_of(command, before) is not Effect.SUPERSEDES:
+        early = isinstance(command, cmd.ClearStop) and clear_refusal(before, t)
+        if again or elsewhere or early or effect_of(command, before) is not Effect.SUPERSEDES:
             return
         plain = replace(before, mode=Positioning(before.target))
         other = self.session.step(plain, commands, t)
@@ -282,7 +301,7 @@ class JointRules(RuleBasedStateMachine):
         """Check that every motion ends, and that a replay gives the same state."""
         if not self.tick_completed:
             return
-        self.run([cmd.ClearStop(), cmd.Resume(), cmd.SpeedScale(1.0)], 30)
+        self.wait_and_clear(30, cmd.Resume(), cmd.SpeedScale(1.0))
         for _ in range(round(MAX_MOTION_SECONDS / DT)):
             if not self.state.moving:
                 break

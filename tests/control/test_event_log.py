@@ -46,7 +46,7 @@ def test_finding_is_logged_once(session: Session, state: State, reason: Reason) 
 
 
 def test_end_of_a_finding_is_logged(session: Session, state: State) -> None:
-    stopped, _ = run(session, state, [cmd.Stop()], 3)
+    stopped, _ = run(session, state, [cmd.Stop()], 120)
     released, entries = run(session, stopped, [cmd.ClearStop()], 3)
     assert [(e.finding.reason, e.began) for e in entries] == [(Reason.STOPPED, False)]
     assert released.findings == ()

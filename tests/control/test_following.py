@@ -29,6 +29,7 @@ from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.plan import Plan
 from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
+from tests.control.clearing import cleared
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m
@@ -280,7 +281,7 @@ def test_stop_on_a_plan_is_as_fast_as_the_joints_allow(session: Session, poured:
     for command in (cmd.GoAlong(1.0), cmd.Follow(poured), cmd.Resume()):
         after = trace(session, stopped[-1], {0: [command]}, 20)[-1]
         assert (after.setpoint == stopped[-1].setpoint).all()
-    free = trace(session, stopped[-1], {0: [cmd.ClearStop()]}, 50)[-1]
+    free = trace(session, cleared(session, stopped[-1]), {}, 50)[-1]
     assert (free.setpoint == stopped[-1].setpoint).all()
 
 

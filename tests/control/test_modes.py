@@ -15,6 +15,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
+from tests.control.clearing import cleared
 
 TICK = 0.01
 
@@ -114,11 +115,13 @@ def test_modes_in_random_order_all_end(session: Session, state: State) -> None:
     ]
     for _ in range(1500):
         command = kinds[rng.integers(len(kinds))](state)
+        if isinstance(command, cmd.ClearStop):
+            state = cleared(session, state)
         state = run(session, state, command, int(rng.integers(1, 4)))
         if state.stopped is not None:
             assert isinstance(state.mode, Idle)
     # Without further commands every mode but a pause ends.
-    state = run(session, run(session, state, cmd.ClearStop()), cmd.Resume())
+    state = run(session, cleared(session, state), cmd.Resume())
     assert not math.isnan(state.setpoint.sum())
     over = run(session, state, None, 600)
     assert isinstance(over.mode, Idle | Positioning)

@@ -75,7 +75,7 @@ class ArmRules(JointRules):
     )
     def switch(self, kinds: list[str], data: st.DataObject) -> None:
         """Replace one mode by another, or interrupt it, while the arm is free."""
-        self.run([cmd.ClearStop(), cmd.Resume()], 1)
+        self.wait_and_clear(1, cmd.Resume())
         for kind in kinds:
             ticks = data.draw(st.integers(2, 12))
             if kind == "jog":
@@ -96,7 +96,7 @@ class ArmRules(JointRules):
                 self.tick([cmd.SetGripper(0.3 if wide else -0.3)])
                 self.run([cmd.Stop()], ticks)
                 self.run([cmd.Home(), cmd.SetGripper(0.0)], 2)
-                self.run([cmd.ClearStop()], 5)
+                self.wait_and_clear(5)
 
     @rule(pitch=fractions(1), roll=fractions(1), ticks=ticks)
     def turn(self, pitch: FloatArray, roll: FloatArray, ticks: int) -> None:

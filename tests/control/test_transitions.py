@@ -191,6 +191,8 @@ def test_stop_refuses_all_commands_but_the_listed(
     stopped = run(shipped, begun[Jogging], [cmd.Stop()])
     assert stopped.stopped is not None
     command = example(shipped, begun[Jogging], kind)
+    if kind is cmd.ClearStop:
+        stopped = run(shipped, stopped, [], 120)
     after = run(shipped, stopped, [command, cmd.Batch((cmd.SpeedScale(0.9),))])
     assert isinstance(after.mode, Idle)
     # Only ClearStop ends a stop.

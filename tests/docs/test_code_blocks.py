@@ -80,7 +80,7 @@ def running() -> Iterator[AppServer]:
 def server(running: AppServer) -> AppServer:
     """A server whose arm may move: a program that hangs up while the arm moves stops it."""
     with connect(running.url) as client:
-        client.ask(requests.ClearStop())
+        client.clear_stop()
         client.ask(requests.ReleaseLease())
     return running
 

@@ -84,7 +84,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
 def arm(server: AppServer) -> Iterator[Client]:
     with connect(server.url, "Driver") as arm:
         yield arm
-        arm.ask(requests.ClearStop())
+        arm.clear_stop()
 
 
 def wait(arm: Client, until: Callable[[answers.State], bool]) -> answers.State:
@@ -115,7 +115,7 @@ def test_stop_stops_until_it_is_cleared(server: AppServer, arm: Client) -> None:
     assert abs(state.q[0] - FAR[0]) > 0.1
     with pytest.raises(RefusedError, match="clear the stop"):
         arm.ask(requests.Joints(q=THERE))
-    arm.ask(requests.ClearStop())
+    arm.clear_stop()
     assert arm.joints(THERE).why == ""
 
 
@@ -128,7 +128,7 @@ def test_arm_stops_when_its_driver_leaves(server: AppServer) -> None:
         state = wait(watcher, lambda state: state.stopped is not None and not state.moving)
         assert state.stopped == "Leaver left while the arm moved."
         assert state.holder is None
-        watcher.ask(requests.ClearStop())
+        watcher.clear_stop()
 
 
 @pytest.mark.parametrize("request_", [Program(text="steps: []"), Steer(order=ProgramOrder.RUN)])

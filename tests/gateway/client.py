@@ -117,6 +117,12 @@ class Control:
                     return self.status
                 await asyncio.sleep(0.01)
 
+    async def clear_stop(self) -> None:
+        """Clear the stop once that is possible, and wait until it is cleared."""
+        await self.wait(wait="")
+        await self.say("clear_stop")
+        await self.wait(stopped=None)
+
     async def notice(self, kind: str, seconds: float = 5.0) -> dict[str, Any]:
         """Wait for the first notice of ``kind``, remove it, and return it."""
         async with asyncio.timeout(seconds):

@@ -22,9 +22,9 @@ def server() -> Iterator[AppServer]:
 def program(server: AppServer) -> Iterator[Client]:
     """Connect a program that holds the lease; its targets are dropped afterwards."""
     with connect(server.url, "Test") as program:
-        program.ask(requests.ClearStop())
+        program.clear_stop()
         program.ask(requests.Speed(value=1.0))
         yield program
-        program.ask(requests.ClearStop())
+        program.clear_stop()
         program.go(requests.Home())
         program.ask(requests.ReleaseLease())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -48,6 +49,12 @@ class Lines:
         while (heard := self.hear()).get("id") != "x":
             pass
         return heard
+
+    def clear_stop(self) -> dict[str, Any]:
+        """Clear the stop once that is possible, and return the answer."""
+        while not self.answer(do="query")["clearable"]:
+            time.sleep(0.02)
+        return self.answer(do="clear_stop")
 
     def ends(self) -> bool:
         with suppress(ConnectionError):

@@ -101,7 +101,7 @@ def test_roles_grant_exactly_their_rights(guarded: tuple[AppServer, Path]) -> No
             assert (status, last["finding"]["reason"], last["who"]) == (200, "stopped", "Viewer")
             await watcher.say("clear_stop")
             await watcher.notice("refused")
-            await driver.say("clear_stop")
+            await driver.clear_stop()
             await watcher.wait(stopped=None)
 
     asyncio.run(act())
@@ -196,6 +196,12 @@ def test_server_uses_https(tmp_path: Path) -> None:
         with urllib.request.urlopen(request, context=trusting, timeout=10) as answer:
             assert "Secure" in answer.headers["set-cookie"]
             assert "Strict-Transport-Security" in answer.headers
+        # So does the port of STOP.
+        stop = urllib.request.Request(f"{server.stop_url}/api/v1/stop", data=b"")
+        with urllib.request.urlopen(stop, context=trusting, timeout=10) as answer:
+            assert answer.read().startswith(b'{"stop": "confirmed"')
+        with urllib.request.urlopen(f"{server.url}/health", context=trusting) as answer:
+            assert answer.read() == b"ok\n"
 
 
 @pytest.mark.parametrize(

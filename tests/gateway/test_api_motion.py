@@ -101,7 +101,7 @@ def test_other_branch_is_reached_on_a_clear_path(program: Client) -> None:
     # A stop while the path is being planned ends the planning too.
     program.ask(requests.Branch(shoulder="front", elbow="down"))
     program.ask(requests.Stop())
-    program.ask(requests.ClearStop())
+    program.clear_stop()
     time.sleep(2.0)
     rest = program.query(answers.State)
     assert not rest.moving

@@ -27,7 +27,7 @@ def test_any_window_can_stop_a_program(server: AppServer, program: Client) -> No
         program.joints(READY)
     while (rest := program.query(answers.State)).moving:
         time.sleep(0.02)
-    program.ask(requests.ClearStop())
+    program.clear_stop()
     time.sleep(0.3)
     assert program.query(answers.State).q == rest.q
     event_log = program.query(answers.EventLog)
@@ -48,7 +48,7 @@ def test_silent_program_causes_a_stop(server: AppServer) -> None:
             state = await watcher.query(answers.State)
             assert state.stopped == "Frozen fell silent while the arm moved."
             await _freed(watcher)
-            await watcher.ask(requests.ClearStop())
+            await watcher.clear_stop()
             await watcher.go(requests.Home())
 
     asyncio.run(act())

@@ -20,7 +20,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason
 from katana450.errors import LeaseError
 from katana450.server.service import serialize
-from katana450.server.service.hub import TICK, Window
+from katana450.server.service.hub import TICK
+from katana450.server.service.participants import Window
 from katana450.server.view.controls import listener
 from katana450.server.viser_bridge.frames import FrameSlot
 from katana450.server.viser_bridge.gestures import Gestures, _Browser

@@ -160,8 +160,7 @@ def test_drag_from_before_a_stop_moves_nothing_after_clear_stop(server: AppServe
             await control.say("stop")
             await control.wait(stop="confirmed")
             await move(peer, 0.45, 0.05, 0.4)
-            await control.say("clear_stop")
-            await control.wait(stopped=None)
+            await control.clear_stop()
             before = await at_rest(watcher)
             await move(peer, 0.45, 0.1, 0.4)
             assert await unmoved(watcher, before)
@@ -206,8 +205,7 @@ def test_first_control_used_acquires_the_free_lease_and_is_logged(
             line = next(each for each in log.lines[::-1] if each.finding.reason == "stopped")
             assert (line.who, line.command) == (name, "Stop")
             assert line.grounds == "anybody may stop the arm"
-            await control.say("clear_stop")
-            await control.wait(stopped=None)
+            await control.clear_stop()
             await control.say("release_lease")
 
     asyncio.run(drag())

@@ -53,7 +53,7 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
             with connect(server.url, "Driver") as arm:
                 before = await asyncio.to_thread(under_way, arm)
                 assert ask(f"{server.url}/health")[0] == 200
-                with server.frozen_arm():
+                with server.frozen(server.arm):
                     began = time.monotonic()
                     await control.wait(headline="No answer from the arm")
                     assert time.monotonic() - began < 2 * REPORTED
@@ -93,7 +93,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         driver.say(do="joints", q=FAR.tolist())
         while driver.answer(do="query")["q"][0] < 0.2:
             time.sleep(0.02)
-        with server.frozen_arm():
+        with server.frozen(server.arm):
             end = time.monotonic() + 10.0
             while state_of(server)["stopped"] is None:
                 driver.say(do="heartbeat")
@@ -106,7 +106,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         while (state := state_of(server))["stop"] != "confirmed" or state["moving"]:
             assert time.monotonic() < end
             time.sleep(0.05)
-        assert driver.answer(do="clear_stop")["is"] == "done"
+        assert driver.clear_stop()["is"] == "done"
         time.sleep(0.5)
         np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 

@@ -48,8 +48,7 @@ async def run_program(server: AppServer, owner: Control) -> None:
 async def clean_up(driver: Control) -> None:
     await driver.say("stop")
     await driver.wait(stop="confirmed")
-    await driver.say("clear_stop")
-    await driver.wait(stopped=None)
+    await driver.clear_stop()
     await driver.say("release_lease")
     await driver.wait(holder=None)
 

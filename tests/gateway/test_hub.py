@@ -19,7 +19,7 @@ from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.control.state import Finding, Reason, State, StoppingDistance
+from katana450.arm.control.state import ActiveStop, Finding, Reason, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -28,9 +28,10 @@ from katana450.errors import LeaseError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.service.heartbeats import LastHeartbeat
-from katana450.server.service.hub import TICK, Hub, Window, actor_of, key_of
+from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.nodes import Nodes
+from katana450.server.service.participants import Window, actor_of, key_of
 from katana450.server.service.runner import Runner
 from katana450.settings import Settings
 
@@ -63,6 +64,7 @@ class FakeArm:
         self.beats = 0
         self.stopped = False
         self.age = 0.0
+        self.clear_refusal = ""
         self.taken: int | None = None
         self.jogs: list[tuple[tuple[float, ...], JogFrame]] = []
         self.fraction = 1.0
@@ -72,7 +74,7 @@ class FakeArm:
 
     @property
     def state(self) -> State:
-        stopped = StoppingDistance(0.0, 0.0) if self.stopped else None
+        stopped = ActiveStop(0.0, 0.0) if self.stopped else None
         findings = () if self.cause is None else (Finding(Reason.WAITING), self.cause)
         state = replace(self.rest, stopped=stopped, findings=findings)
         return replace(state, goal=state.setpoint + 0.1) if self.moves else state

@@ -64,7 +64,7 @@ def test_killed_front_end_is_restarted_with_an_arm_at_rest(server: AppServer) ->
     assert before.q[0] < state.q[0] < FAR[0] - 0.2
     assert "ended with status -9" in server.output
     with connect(server.url, "Driver") as arm:
-        arm.ask(requests.ClearStop())
+        arm.clear_stop()
         time.sleep(0.5)
         assert arm.query(answers.State).q == state.q
         there = arm.joints(np.deg2rad((10.0, -68.0, 85.0, 8.0, 0.0)))
@@ -92,12 +92,12 @@ def test_front_end_ends_with_the_supervisor(server: AppServer) -> None:
     front = server.front
     os.kill(server.pid, signal.SIGKILL)
     end = time.monotonic() + 10.0
-    while Path(f"/proc/{front}").exists() and "Z" not in _state(front):
+    while Path(f"/proc/{front}").exists() and "Z" not in process_state(front):
         assert time.monotonic() < end
         time.sleep(0.05)
 
 
-def _state(number: int) -> str:
+def process_state(number: int) -> str:
     with suppress(OSError):
         return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
     return "Z"

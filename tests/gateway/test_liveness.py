@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from katana450.arm.control.session import Session
+from katana450.arm.control.stop_cause import StopCause
 from katana450.server.service import status
 from katana450.server.service.heartbeats import Arrival, LastHeartbeat
 from katana450.server.service.hub import TICK
@@ -128,9 +129,10 @@ def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> 
     assert shown["stopped"] is None
     table.arm.age = 0.6
     table.wait(TICK, driver)
-    assert table.hub.stopped == StopRecord(
-        None, "The arm's process did not answer for 0.6 s.", ticket=1, confirmed=False
-    )
+    stopped = table.hub.stopped
+    assert stopped is not None
+    cause = StopCause("The arm's process did not answer for 0.6 s.", at=stopped.cause.at)
+    assert stopped == StopRecord(cause, ticket=1, confirmed=False)
     assert stage(table) == ("stopped", "requested")
 
 

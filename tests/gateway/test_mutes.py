@@ -12,9 +12,10 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.service.hub import Hub, Window, actor_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import STOP_INTERVAL, MutedError
+from katana450.server.service.participants import Window, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from tests.gateway.test_hub import FakeArm
 

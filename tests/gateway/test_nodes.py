@@ -303,7 +303,7 @@ def test_arm_is_driven_by_name_over_tcp(server: AppServer) -> None:
         lines.answer(do="stop")
         stopped = lines.answer(do="set", node="axis_1", field="rotation", value=[0, 0, 1, 0])
         assert "clear the stop first" in stopped["why"]
-        assert lines.answer(do="clear_stop")["is"] == "done"
+        assert lines.clear_stop()["is"] == "done"
         arrived(lines, lines.answer(do="home")["ticket"])
         lines.answer(do="release_lease")
 

@@ -131,6 +131,8 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
     assert set(samples) | no_commands == {*schema.kinds(requests.AnyRequest), Program, Steer}
     for kind, several in samples.items():
         for request in several:
+            if kind is requests.ClearStop:
+                wait_until_clearable(program)
             before = program.query(answers.State).ticket
             answer = done(program.ask(request))
             if kind is Program:
@@ -143,6 +145,13 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
             else:
                 expected = ("requested",) if kind is requests.Stop else ("accepted", "limited")
                 assert answer.outcome in expected, request
+
+
+def wait_until_clearable(program: Client) -> None:
+    deadline = time.monotonic() + 20.0
+    while not program.query(answers.State).clearable:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 def wait_until_planned(program: Client) -> None:
@@ -203,7 +212,7 @@ def test_server_names_the_refused_parts_of_a_request(server: AppServer) -> None:
 def test_request_without_a_command_has_no_outcome(program: Client) -> None:
     answer = done(program.ask(requests.ReleaseLease()))
     assert (answer.outcome, answer.ticket) == (None, None)
-    program.ask(requests.ClearStop())
+    program.clear_stop()
 
 
 def test_every_channel_reports_the_outcome(server: AppServer) -> None:

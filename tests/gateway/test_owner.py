@@ -37,7 +37,7 @@ def arm(server: AppServer) -> Iterator[Client]:
         wait(arm, lambda state: not state.moving)
         with connect(server.url, "Cleaner") as cleaner:
             cleaner.ask(requests.Take())
-            cleaner.ask(requests.ClearStop())
+            cleaner.clear_stop()
             cleaner.ask(requests.Resume())
             cleaner.ask(requests.Speed(value=1.0))
             cleaner.go(requests.Home())
@@ -124,7 +124,7 @@ def test_hold_stop_and_motions_during_planning_keep_it_from_running(
     planning(arm)
     arm.ask(request_)
     if isinstance(request_, requests.Stop):
-        arm.ask(requests.ClearStop())
+        arm.clear_stop()
     wait(arm, lambda state: status(state) != "planning")
     stays(arm)
     state = arm.query(answers.State)

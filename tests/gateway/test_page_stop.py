@@ -25,8 +25,7 @@ def test_stop_press_over_two_channels_counts_once() -> None:
                 await control.wait(mood="ok")
                 await control.say("stop", press="one")
                 await control.wait(mood="stopped")
-                await control.say("clear_stop")
-                await control.wait(stopped=None)
+                await control.clear_stop()
                 post("?press=one")
                 await asyncio.sleep(0.3)
                 assert control.status["stopped"] is None
@@ -34,8 +33,7 @@ def test_stop_press_over_two_channels_counts_once() -> None:
                 for query in ("?press=two", "?press=" + 100 * "x", "?press=", ""):
                     post(query)
                     await control.wait(mood="stopped")
-                    await control.say("clear_stop")
-                    await control.wait(stopped=None)
+                    await control.clear_stop()
 
     asyncio.run(act())
 
@@ -53,8 +51,7 @@ def test_hanging_page_of_the_driver_causes_a_stop_in_time() -> None:
                 await control.wait(mood="stopped")
                 took.append(time.perf_counter() - control.last_beat)
                 control.alive = True
-                await control.say("clear_stop")
-                await control.wait(stopped=None)
+                await control.clear_stop()
                 assert await peer.listen()
         return took
 

@@ -23,7 +23,7 @@ from katana450.extensions.programs.server import program_planning
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.server.service import status
-from katana450.server.service.hub import Window
+from katana450.server.service.participants import Window
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import SCRIPT, Staged
 

@@ -19,7 +19,8 @@ from katana450.extensions.programs.extension import OWNER_SILENCE
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.panel_access import PanelAccess
 from katana450.extensions.programs.server.program_runner import ProgramRunner
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Window
 from tests.gateway.test_hub import PAGES, Table
 
 NOBODY = Person("nobody", "Nobody", Role.ADMIN)

@@ -45,7 +45,7 @@ def arm(server: AppServer) -> Iterator[Client]:
         state = arm.query(answers.State)
         if state.program is not None and state.program.status in ("running", "paused"):
             arm.ask(Steer(order=ProgramOrder.END))
-        arm.ask(requests.ClearStop())
+        arm.clear_stop()
         arm.go(requests.Resume())
         arm.go(requests.Home())
         arm.ask(requests.ReleaseLease())

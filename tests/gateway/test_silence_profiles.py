@@ -20,8 +20,9 @@ from katana450.errors import LeaseError
 from katana450.server.api import answers
 from katana450.server.service import status
 from katana450.server.service.command_gate import SETTLE_TIME
-from katana450.server.service.hub import TICK, Window
+from katana450.server.service.hub import TICK
 from katana450.server.service.identity import Identity
+from katana450.server.service.participants import Window
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, SIMULATION_APP, AppServer
 from tests.gateway.test_hub import PAGES, Table, moves

@@ -19,8 +19,9 @@ from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
-from katana450.server.service.hub import Hub, Window, actor_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.participants import Window, actor_of
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import Staged
 

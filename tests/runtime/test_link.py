@@ -20,6 +20,7 @@ from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Finding, Reason, Verdict
+from katana450.arm.control.stopping import clear_refusal
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.front_end import FrontEnd
@@ -74,6 +75,18 @@ def until(true: Callable[[], bool], seconds: float = 5.0) -> None:
     while not true():
         assert time.monotonic() < end
         time.sleep(0.005)
+
+
+def clear_stop(front: FrontEnd) -> int:
+    """Clear the stop once that is possible; return the ticket."""
+
+    def may_clear() -> bool:
+        front.heartbeat()
+        state = front.state_publisher.snapshot.state
+        return not clear_refusal(state, MonotonicClock().now())
+
+    until(may_clear)
+    return front.deliver(cmd.ClearStop())
 
 
 def test_started_front_end_has_the_newest_state(ends: Ends) -> None:
@@ -207,7 +220,7 @@ def test_broken_pipe_stops_the_arm_and_a_new_front_end_moves_nothing(ends: Ends)
     ends.arm_end, again = ends.connect()
     assert again.state_publisher.snapshot.state.stopped is not None
     until(lambda: not again.state_publisher.snapshot.state.moving)
-    again.deliver(cmd.ClearStop())
+    clear_stop(again)
     until(lambda: again.state_publisher.snapshot.state.stopped is None)
     q = again.state_publisher.snapshot.state.q
     time.sleep(0.2)
@@ -261,7 +274,10 @@ def test_outcomes_return_with_the_tickets_of_the_front_end(ends: Ends) -> None:
     assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
     both = front.deliver(cmd.Batch((cmd.SetJoint(0, 0.2), cmd.SpeedScale(0.5))))
     assert outcomes.of(both).result(wait).verdict is Verdict.LIMITED
-    assert outcomes.of(front.deliver(cmd.ClearStop())).result(wait).verdict is Verdict.ACCEPTED
+    early = outcomes.of(front.deliver(cmd.ClearStop())).result(wait)
+    assert early.verdict is Verdict.REFUSED
+    assert "Clear the stop" in early.why
+    assert outcomes.of(clear_stop(front)).result(wait).verdict is Verdict.ACCEPTED
 
 
 def test_numbers_of_displaced_outcomes_are_dropped(ends: Ends) -> None:

@@ -9,6 +9,8 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
+from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.mailbox import CAPACITY, Drained, Mailbox, Submission
 from katana450.errors import InputError
 
@@ -51,6 +53,48 @@ def test_stop_reports_the_dropped_tickets(mailbox: Mailbox) -> None:
     assert mailbox.drain() == Drained(
         [Submission(cmd.Stop(), None), Submission(cmd.Home(), None)], [[4], [5]], [1, 2, 3], 5
     )
+
+
+def press(name: str) -> cmd.Stop:
+    return cmd.Stop(pressed("Anna", "a", name, 0.0))
+
+
+def test_copy_of_a_press_has_no_effect_and_drops_no_command(mailbox: Mailbox) -> None:
+    mailbox.put(press("one"))
+    assert mailbox.drain().commands == [press("one")]
+    mailbox.put(cmd.Home())
+    assert mailbox.put(press("one")) == 3
+    assert mailbox.drain() == Drained([Submission(cmd.Home(), None)], [[2]], [], 3, (3,))
+
+
+def test_new_press_is_not_lost_in_a_copy_of_another(mailbox: Mailbox) -> None:
+    mailbox.put(press("one"))
+    mailbox.drain()
+    mailbox.put(press("two"))
+    mailbox.put(press("one"))
+    mailbox.put(press("three"))
+    drained = mailbox.drain()
+    (stop,) = drained.commands
+    assert isinstance(stop, cmd.Stop)
+    assert stop.presses == ("two", "three")
+    assert (drained.tickets, drained.repeated) == ([[2, 4]], (3,))
+    # Copies of joined presses are known as well.
+    for name in ("two", "three"):
+        mailbox.put(press(name))
+    assert mailbox.drain().commands == []
+
+
+def test_joined_stop_with_one_new_press_counts(mailbox: Mailbox) -> None:
+    mailbox.put(press("one"))
+    mailbox.drain()
+    mailbox.put(joined(press("one"), press("two")))
+    assert len(mailbox.drain().commands) == 1
+
+
+def test_stop_without_a_name_always_counts(mailbox: Mailbox) -> None:
+    for _ in range(2):
+        mailbox.put(cmd.Stop())
+        assert mailbox.drain().commands == [cmd.Stop()]
 
 
 def test_button_pressed_twice_gives_two_commands(mailbox: Mailbox) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from katana450.arm.runtime.arm_listener import FRONT, ArmAddress, ArmListener
+from katana450.arm.runtime.arm_listener import FRONT, STOP, ArmAddress, ArmListener
 from katana450.assembly.output import say
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorLink
 from katana450.extension import serve_extensions
@@ -67,7 +67,7 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
     found = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
     again = kept is not None
     arm = RunningArm(config.settings, found, scene, again=again, kept=state)
-    listener = ArmListener(config.address, {FRONT: arm.attach})
+    listener = ArmListener(config.address, {FRONT: arm.attach, STOP: arm.attach_stop})
     if not again:
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr, flush=True)

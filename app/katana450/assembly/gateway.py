@@ -6,13 +6,11 @@ import asyncio
 import logging
 import secrets
 import socket
-import ssl
 import threading
 import time
 from asyncio import BaseTransport, Transport
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from http import HTTPStatus
 from typing import Any, cast
 
@@ -22,6 +20,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.http11 import Request
 
 from katana450.arm.robot.object_meshes import Meshes
+from katana450.assembly.authentication import access_file, address_of, tls_context
 from katana450.assembly.memory_limit import check_memory_limit
 from katana450.assembly.routes import application
 from katana450.errors import ConfigurationError, LeaseError
@@ -30,18 +29,19 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival, keep_alive
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.runner import Runner
+from katana450.server.service.stop_path import StopPath
+from katana450.server.service.stop_state import ClearBy
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
-from katana450.server.web.access_links import AccessFile
-from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator, public_origin
+from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.channel import ARRIVAL
 from katana450.server.web.http_api import RouteProvider
-from katana450.server.web.listen import reaches_beyond
 from katana450.server.web.program_socket import LineServer
+from katana450.server.web.stop_monitor import watch_stop_path
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -87,22 +87,31 @@ class Gateway:
         Raises:
             ConfigurationError: ``settings`` do not allow serving on this socket.
         """
-        _check_tls(settings)
+        tls_context(settings)
         raise_descriptor_limit()
         check_memory_limit()
+        self._settings = settings
         self._listening = listening
         self._lines_socket = lines
         self._loop: asyncio.AbstractEventLoop | None = None
         try:
-            access = _access(settings, self._listening)
+            access = access_file(settings, self._listening)
             key = secrets.token_urlsafe(32)
             self.viser: viser.ViserServer = open_server(key)
             self.port: int = self._listening.getsockname()[1]
             for each in (listening, lines):
                 if each is not None:
                     keep_alive(each)
-            self.address = _address(settings, self._listening)
-            self.hub = Hub(time.monotonic, settings.silence, meshes, runner)
+            self.address = address_of(settings, self._listening)
+            self.hub = Hub(
+                time.monotonic, settings.silence, meshes, runner, ClearBy(settings.clear_by)
+            )
+            self.hub.stop_path = StopPath(
+                # Behind a proxy, the paths of STOP on the page's own address lead there.
+                settings.stop_port if settings.public_url is None else None,
+                self.port,
+                self.address.secure,
+            )
             people = self.hub.people
             people.links = access
             for number, grant in {} if access is None else access.grants.items():
@@ -193,15 +202,23 @@ class Gateway:
 
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
-        watch = asyncio.create_task(self._watch())
+        tasks = [asyncio.create_task(each) for each in self._watches()]
         try:
             async with self._lines.open(self._lines_socket):
                 await self._server.serve()
         finally:
-            watch.cancel()
-            with suppress(asyncio.CancelledError):
-                await watch
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
             self._started.set()
+
+    def _watches(self) -> Iterator[Coroutine[Any, Any, None]]:
+        """Yield the watchdogs of this process."""
+        yield self._watch()
+        port, host = self._settings.stop_port, self._listening.getsockname()[0]
+        if port is not None:
+            secure = self._settings.tls_cert is not None
+            yield watch_stop_path(self.hub.stop_path, host, port, secure=secure)
 
     async def _watch(self) -> None:
         while True:
@@ -264,41 +281,3 @@ class _BrowserSocket(WebSocketsSansIOProtocol):
             # The socket knows when its newest message arrived.
             sock = self.transport.get_extra_info("socket")
             cast(dict[str, Any], self.scope)[ARRIVAL] = Arrival(sock)
-
-
-def _check_tls(settings: Settings) -> None:
-    if (settings.tls_cert is None) != (settings.tls_key is None):
-        raise ConfigurationError("https needs both --tls-cert and --tls-key.")
-    if settings.tls_cert is None or settings.tls_key is None:
-        return
-    try:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(settings.tls_cert, settings.tls_key)
-    except OSError as error:
-        raise ConfigurationError(
-            f"{settings.tls_cert} and {settings.tls_key} are not a certificate and its key: "
-            f"{error}."
-        ) from error
-
-
-def _access(settings: Settings, listening: socket.socket) -> AccessFile | None:
-    if settings.access is not None:
-        return AccessFile.open(settings.access)
-    if reaches_beyond(listening) and not settings.insecure:
-        raise ConfigurationError(
-            f"On {settings.host} other machines can reach the arm. Make a link for each person "
-            "with `katana450 access give --file access.json --name NAME --role operator` and "
-            "start with --access access.json. Or add --insecure; then everybody can drive the arm."
-        )
-    return None
-
-
-def _address(settings: Settings, listening: socket.socket) -> Address:
-    beyond = reaches_beyond(listening)
-    names = LOOPBACK_NAMES | ({settings.host, socket.gethostname().lower()} if beyond else set())
-    return Address(
-        frozenset(names),
-        any_address=beyond,
-        secure=settings.tls_cert is not None,
-        public=None if settings.public_url is None else public_origin(settings.public_url),
-    )

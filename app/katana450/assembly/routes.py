@@ -20,9 +20,10 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.server.api.fields import MAX_PRESS_LENGTH
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
-from katana450.server.service.hub import Hub, actor_of
-from katana450.server.service.identity import Identity
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.mutes import MutedError
+from katana450.server.service.participants import actor_of
 from katana450.server.service.recorder import ACCEPTED, REFUSED, stranger
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
@@ -31,7 +32,6 @@ from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission, address_of
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.bodies import TOO_MANY, body_of
-from katana450.server.web.control_socket import PAGE
 from katana450.server.web.http_api import Api, RouteProvider
 from katana450.server.web.token_bucket import TokenBucket
 
@@ -42,6 +42,10 @@ MAX_BODY_BYTES = 1024
 
 BAD_LINKS_PER_SECOND, BAD_LINKS_BURST = 2.0, 20.0
 """Invalid links that are answered per second, and in a burst, for all clients together."""
+
+
+STOP_PORT = "X-Stop-Port"
+"""Header that names the port to which the page also sends STOP."""
 
 
 class _Entry(msgspec.Struct, forbid_unknown_fields=True):
@@ -66,7 +70,8 @@ def application(
     bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, hub.clock())
 
     async def page(request: Request) -> Response:
-        return index.answer(request, page_policy)
+        origin = hub.stop_path.origin_beside(request.headers["host"])
+        return index.answer(request, security.page_policy(origin))
 
     async def file(request: Request) -> Response:
         found = static.get(request.path_params["name"])
@@ -90,10 +95,13 @@ def application(
             entry = msgspec.json.decode(await body_of(request, MAX_BODY_BYTES), type=_Entry)
         except msgspec.MsgspecError as error:
             raise HTTPException(400, "A token is required.") from error
-        if not entry.token and authenticator.identity(request.cookies) is not None:
-            return Response(status_code=204)
-        _check_admitted(authenticator, request, entry.token)
         response = Response(status_code=204)
+        stop_port = hub.stop_path.port_beside(request.headers["host"])
+        if stop_port is not None:
+            response.headers[STOP_PORT] = str(stop_port)
+        if not entry.token and authenticator.identity(request.cookies) is not None:
+            return response
+        _check_admitted(authenticator, request, entry.token)
         found = authenticator.sign_in(entry.token, response)
         _note_sign_in(hub, request, found)
         if found is None:
@@ -114,15 +122,6 @@ def application(
         hub.stop(actor, press or None)
         return Response(status_code=204)
 
-    async def health(_request: Request) -> Response:
-        problem = status.health(hub)
-        return PlainTextResponse(
-            "ok\n" if problem is None else f"{problem}\n", 503 if problem else 200
-        )
-
-    async def control(socket: WebSocket) -> None:
-        await control_socket.serve(hub, authenticator, budgets, socket)
-
     routes = [
         Route("/", page),
         Route("/static/{name:path}", file),
@@ -130,9 +129,9 @@ def application(
         Route("/enter", enter, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),
         _leave_route(hub, authenticator),
-        Route("/health", health),
+        _health_route(hub),
         WebSocketRoute("/viser", proxy.serve),
-        WebSocketRoute("/control", control),
+        _control_route(hub, authenticator, budgets),
         *Api(hub, authenticator, budgets, provided).routes(),
     ]
     app = Starlette(routes=routes, exception_handlers={MutedError: _muted})
@@ -145,6 +144,23 @@ async def _muted(_request: Request, error: Exception) -> Response:
     assert isinstance(error, MutedError)
     retry = {"Retry-After": str(math.ceil(error.retry))}
     return PlainTextResponse(str(error), TOO_MANY, retry)
+
+
+def _control_route(hub: Hub, authenticator: Authenticator, budgets: Budgets) -> WebSocketRoute:
+    async def control(socket: WebSocket) -> None:
+        await control_socket.serve(hub, authenticator, budgets, socket)
+
+    return WebSocketRoute("/control", control)
+
+
+def _health_route(hub: Hub) -> Route:
+    async def health(_request: Request) -> Response:
+        problem = status.health(hub)
+        return PlainTextResponse(
+            "ok\n" if problem is None else f"{problem}\n", 503 if problem else 200
+        )
+
+    return Route("/health", health)
 
 
 def _leave_route(hub: Hub, authenticator: Authenticator) -> Route:

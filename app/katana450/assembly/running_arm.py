@@ -20,6 +20,7 @@ from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.state_publisher import StatePublisher
+from katana450.arm.runtime.stop_end import StopEnd
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.platform_support import raise_priority
 from katana450.settings import Settings
@@ -73,6 +74,7 @@ class RunningArm:
         )
         self._silence_timeout = settings.silence
         self._link: ArmEnd | None = None
+        self._stop_end: StopEnd | None = None
         self._attaching = threading.Lock()
         self._proven = -1
 
@@ -90,6 +92,14 @@ class RunningArm:
                 pipe, self._loop, self._mailbox, self._silence_timeout, greeting.number
             )
             self._link.start()
+
+    def attach_stop(self, pipe: Connection, _greeting: Greeting) -> None:
+        """Execute each STOP from the other end of ``pipe``, in place of any previous pipe."""
+        with self._attaching:
+            if self._stop_end is not None:
+                self._stop_end.close()
+            self._stop_end = StopEnd(pipe, self._loop, self._mailbox)
+            self._stop_end.start()
 
     @property
     def state_publisher(self) -> StatePublisher:
@@ -118,6 +128,8 @@ class RunningArm:
         if self._link is not None:
             self._link.close()
             self._link.join()
+        if self._stop_end is not None:
+            self._stop_end.close()
         # Let Python collect reference cycles when it ends.
         gc.unfreeze()
 

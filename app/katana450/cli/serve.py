@@ -9,6 +9,7 @@ import signal
 import tempfile
 import threading
 from argparse import Namespace
+from dataclasses import replace
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,16 +21,17 @@ from katana450.assembly.arm_process import ArmConfig, run_arm
 from katana450.assembly.frontend_process import OPEN, FrontendConfig, run_frontend
 from katana450.assembly.log_lines import start_log
 from katana450.assembly.output import say
+from katana450.assembly.stop_process import StopConfig, run_stop
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.extension import serve_extensions
 from katana450.platform_support import pipe_address, stop_signals
 from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
-from katana450.server.web.listen import LOOPBACK, listen
+from katana450.server.web.listen import LOOPBACK, listen, listen_beside
 from katana450.settings import Settings
 
-ARM, FRONT_END = "katana450 arm", "katana450 front"
+ARM, FRONT_END, STOP = "katana450 arm", "katana450 front", "katana450 stop"
 """Names of the processes."""
 
 ARM_DEADLINE = 1.0
@@ -38,6 +40,9 @@ ARM_DEADLINE = 1.0
 FRONT_END_DEADLINE = 1.5
 """[s] Silence after which a front end is ended. A thread of its own sends the heartbeats, so load
 does not cause silence."""
+
+STOP_DEADLINE = 2.0
+"""[s] Time without a turn of its event loop after which the process of STOP is ended."""
 
 
 def serve_with(options: Namespace) -> int:
@@ -54,6 +59,8 @@ def serve_with(options: Namespace) -> int:
         public_url=options.public_url,
         lines=options.lines,
         bare=options.bare,
+        stop_port=options.stop_port,
+        clear_by=options.clear_by,
     )
     # The options are sent to another process, which does not need the command itself.
     values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})
@@ -80,6 +87,9 @@ def serve(
     # Held by this process, so that the port stays taken while the front end is started again.
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
+    stopping_socket = listen_beside(listening, settings.host, settings.stop_port)
+    stop_port = stopping_socket.getsockname()[1]
+    settings = replace(settings, stop_port=stop_port)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
     event_log = _server_log(options, listening.getsockname()[1])
     # Only this user can open it.
@@ -87,7 +97,9 @@ def serve(
     address = ArmAddress(pipe_address(folder, "arm"), secrets.token_bytes(32))
     front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
     arm = ArmConfig(settings, urdf, tool, options, address, folder)
+    stop = StopConfig(settings, stopping_socket, listening.getsockname()[1], address)
     specs = (
+        child_spec(STOP, "The process of STOP", run_stop, stop, STOP_DEADLINE),
         ChildSpec(
             FRONT_END, "The page's server", _FrontendWork(front, event_log), FRONT_END_DEADLINE
         ),
@@ -106,11 +118,12 @@ def serve(
                 say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
             for line in event_log.description:
                 say(line)
-            say(f"katana450 is ready: {url} (Ctrl-C stops)")
+            say(f"katana450 is ready: {url} (STOP also on port {stop_port}; Ctrl-C stops)")
         supervisor.run()
     finally:
         supervisor.stop()
         listening.close()
+        stopping_socket.close()
         event_log.close(requested=stopping.is_set())
         shutil.rmtree(folder, ignore_errors=True)
     return 0

@@ -67,6 +67,20 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help="a TCP port of this machine for programs that send JSON lines",
     )
+    parser.add_argument(
+        "--stop-port",
+        type=_port,
+        metavar="PORT",
+        help="TCP port that serves STOP alone, from a process of its own (default: the port after "
+        "--port, or a free one)",
+    )
+    parser.add_argument(
+        "--clear-by",
+        choices=("driver", "presser"),
+        default=Settings.clear_by,
+        help="who may clear a stop: the driver (or any operator while nobody drives), or only the "
+        "person who pressed STOP and admins (default: %(default)s)",
+    )
     for part in serve_extensions():
         if part.add_options is not None:
             part.add_options(parser)

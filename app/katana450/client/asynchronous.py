@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import secrets
+import time
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -16,7 +18,8 @@ from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from katana450.client.files import LostError, RefusedError, Site
+from katana450.client.files import STOP_TIMEOUT, LostError, RefusedError, Site
+from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT, Id
 
@@ -45,6 +48,7 @@ class AsyncClient:
         self._waiting: dict[Id, asyncio.Future[answers.Answer]] = {}
         self._states: list[asyncio.Queue[answers.State | None]] = []
         self._lost: str | None = None
+        self._stops: set[asyncio.Task[str]] = set()
         self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._heartbeat())]
 
     async def close(self) -> None:
@@ -75,6 +79,72 @@ class AsyncClient:
     async def tell(self, request: requests.Request) -> None:
         """Send ``request`` without waiting for an answer: for streams, Servo and Jog."""
         await self._send(request)
+
+    async def stop(self) -> str:
+        """Stop the arm: send STOP on all paths at once, and return its stage.
+
+        It is ``confirmed`` as soon as one path reports a state of the arm that is stopped, and
+        ``requested`` if none does although the server has received it. Raises LostError or
+        RefusedError if every path fails.
+        """
+        press, port = secrets.token_urlsafe(16), self.welcome.stop_port
+        ports = (None,) if port is None else (None, port)
+        paths = [
+            self._stop_here(press),
+            *(asyncio.to_thread(self._site.stop, press, each) for each in ports),
+        ]
+        tasks = [asyncio.create_task(each) for each in paths]
+        # They end by themselves, also those that are not waited for.
+        self._stops.update(tasks)
+        for task in tasks:
+            task.add_done_callback(self._end_stop)
+        stage, errors = "", []
+        for path in asyncio.as_completed(tasks):
+            try:
+                stage = await path
+            except KatanaError as error:
+                errors.append(error)
+            if stage == "confirmed":
+                return stage
+        if not stage:
+            raise errors[0]
+        return stage
+
+    def _end_stop(self, task: asyncio.Task[str]) -> None:
+        self._stops.discard(task)
+        if not task.cancelled():
+            # Read here, because nothing waits for the slower paths.
+            task.exception()
+
+    async def _stop_here(self, press: str) -> str:
+        """Send STOP on this connection; return ``confirmed`` once a state shows the stop."""
+        await self.ask(requests.Stop(press=press))
+        end = time.monotonic() + STOP_TIMEOUT
+        while time.monotonic() < end:
+            if (await self.query(answers.State)).stop == "confirmed":
+                return "confirmed"
+            await asyncio.sleep(0.02)
+        return "requested"
+
+    async def clear_stop(self, seconds: float = ANSWER_TIMEOUT) -> None:
+        """Clear a stop once that is possible: at rest, and 1 s after the newest STOP.
+
+        Without a stop this only acquires the free lease. Raises RefusedError if another client has
+        to clear it, or if it cannot be cleared within ``seconds``.
+        """
+        end = time.monotonic() + seconds
+        while True:
+            state = await self.query(answers.State)
+            if state.stopped is None or state.clearable or time.monotonic() > end:
+                try:
+                    await self.ask(requests.ClearStop())
+                    return
+                except RefusedError:
+                    # A stop on another path may be newer than the state.
+                    newest = await self.query(answers.State)
+                    if newest.stopped is None or newest.clearable or time.monotonic() > end:
+                        raise
+            await asyncio.sleep(0.02)
 
     async def query(self, kind: type[A]) -> A:
         """Return a current value of the server.
@@ -303,7 +373,7 @@ async def aconnect(
     if not isinstance(welcome, answers.Welcome):
         await close_quietly(socket)
         raise LostError(f"The server at {url} sent an unknown greeting: {welcome}.")
-    client = AsyncClient(socket, welcome, Site(url, token))
+    client = AsyncClient(socket, welcome, Site(url, token, name))
     try:
         yield client
     finally:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy.typing as npt
 
-from katana450.client.asynchronous import FOLLOW_RATE, AsyncClient, aconnect
+from katana450.client.asynchronous import ANSWER_TIMEOUT, FOLLOW_RATE, AsyncClient, aconnect
 from katana450.server.api import answers, requests
 
 T = TypeVar("T")
@@ -37,6 +37,14 @@ class Client:
     def tell(self, request: requests.Request) -> None:
         """See ``AsyncClient.tell``."""
         self._wait(self._client.tell(request))
+
+    def stop(self) -> str:
+        """See ``AsyncClient.stop``."""
+        return self._wait(self._client.stop())
+
+    def clear_stop(self, seconds: float = ANSWER_TIMEOUT) -> None:
+        """See ``AsyncClient.clear_stop``."""
+        self._wait(self._client.clear_stop(seconds))
 
     def query(self, kind: type[A]) -> A:
         """See ``AsyncClient.query``."""

@@ -31,6 +31,7 @@ from katana450.arm.control.object_commands import (
     SetAppearance,
 )
 from katana450.arm.control.state import Finding
+from katana450.arm.control.stop_commands import ClearStop, Stop
 from katana450.arm.control.traits import (
     BaseCommand,
     CommandTraits,
@@ -233,27 +234,6 @@ class Hold(BaseCommand):
     traits: ClassVar[CommandTraits] = CommandTraits(protective=True, joints_only=True)
 
     finding: Finding | None = None
-
-
-@dataclass(frozen=True)
-class Stop(BaseCommand):
-    """Come to rest as fast as the arm can, and accept no motion until ClearStop.
-
-    ``finding``: the cause, where the server stops the arm by itself.
-    """
-
-    traits: ClassVar[CommandTraits] = CommandTraits(
-        while_stopped=True, protective=True, joints_only=True, safety=True
-    )
-
-    finding: Finding | None = None
-
-
-@dataclass(frozen=True)
-class ClearStop(BaseCommand):
-    """Accept motion again after a stop; nothing moves."""
-
-    traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.commands import Command, Servo
+from katana450.arm.control.commands import ClearStop, Command, Servo
 from katana450.arm.control.modes import (
     Following,
     Intent,
@@ -114,8 +114,11 @@ def with_stream_sample(
 def with_time(command: Command, t: float) -> Command:
     """Return ``command`` for the tick at ``t`` [s].
 
-    A sample of a stream without a valid time of its own gets the time of the tick.
+    A sample of a stream without a valid time of its own gets the time of the tick. So does the end
+    of a stop, which is refused too early.
     """
+    if isinstance(command, ClearStop):
+        return replace(command, t=t)
     if not isinstance(command, Servo) or (
         command.t is not None and 0.0 <= t - command.t < MAX_SAMPLE_AGE
     ):

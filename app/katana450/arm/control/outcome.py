@@ -16,6 +16,7 @@ from katana450.arm.control.state import (
     State,
     Verdict,
 )
+from katana450.arm.control.stopping import clear_refusal
 from katana450.arm.control.transitions import Effect, effect_of
 
 INTENDED_REASONS = (Reason.STOPPED, Reason.PAUSED, Reason.WAITING, *CAUSES)
@@ -59,6 +60,8 @@ def refusal(state: State, command: cmd.Command) -> str:
     if effect_of(command, state) is Effect.REFUSED:
         return _why_refused(state, command)
     match command:
+        case cmd.ClearStop(known=newest, t=t):
+            return clear_refusal(state, max(t, state.t), newest)
         case cmd.PlaceObject(scene_object=scene_object):
             known = named(state.objects, scene_object.name)
             if known is None and len(state.objects) >= MAX_OBJECTS:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.modes import IDLE
-from katana450.arm.control.state import Finding, Reason, State, StoppingDistance
+from katana450.arm.control.state import ActiveStop, Finding, Reason, State
+from katana450.arm.control.stop_cause import StopCause
 from katana450.maths.motion.limiter import JointMotion
 
 RESTARTED = (Finding(Reason.STOPPED), Finding(Reason.RESTARTED))
 """Findings of an arm that waits for Clear stop after its process was started again."""
+
+RESTART_CAUSE = StopCause(f"{finding_text(RESTARTED[1])}.")
+"""Cause of that stop."""
 
 
 def at_rest(state: State) -> State:
@@ -25,7 +30,7 @@ def at_rest(state: State) -> State:
         gripper_goal=state.gripper,
         findings=RESTARTED,
         blocked=False,
-        stopped=StoppingDistance(0.0, 0.0),
+        stopped=ActiveStop(0.0, 0.0, RESTART_CAUSE),
         paused=False,
         mode=IDLE,
         outcomes=(),

@@ -46,12 +46,13 @@ from katana450.arm.control.scene_changes import with_scene_change
 from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
 from katana450.arm.control.state import (
     ACCEPTED,
+    ActiveStop,
     Finding,
     Outcome,
     Reason,
     State,
-    StoppingDistance,
 )
+from katana450.arm.control.stopping import stopped_again, with_presses
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld
@@ -289,8 +290,8 @@ class Session:
     def _superseded(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` in the mode that ``command`` begins."""
         match command:
-            case cmd.Stop(finding=cause):
-                return self._stop_motion(state, cause)
+            case cmd.Stop():
+                return with_presses(self._stop_motion(state, command), command)
             case cmd.ClearStop():
                 goal = self._stepper(state).stopping_point(state)[0]
                 free = with_mode(replace(state, stopped=None, goal=goal), IDLE)
@@ -360,24 +361,24 @@ class Session:
         """Return ``state`` that brakes and holds, without a target."""
         return with_mode(self._aim(state, self._stepper(state).stopping_point(state)[0]), IDLE)
 
-    def _stop_motion(self, state: State, cause: Finding | None) -> State:
-        """Return ``state`` that brakes and drops every target, for the reason ``cause``.
+    def _stop_motion(self, state: State, stop: cmd.Stop) -> State:
+        """Return ``state`` that brakes and drops every target, for the cause of ``stop``.
 
         The grip stays, so that a held object does not fall.
         """
         if state.stopped is not None:
-            return state
+            return stopped_again(state)
         free = state.following is None or self._stepper(state).may_leave(state)
         state = replace(state, mode=IDLE) if free else with_mode(state, IDLE)
         goal, travel, time = self._stepper(state).stopping_point(state)
         stopped = replace(
             state,
-            stopped=StoppingDistance(travel, time),
+            stopped=ActiveStop(travel, time, stop.cause, state.t),
             paused=False,
             goal=goal,
             gripper_goal=state.gripper_setpoint,
         )
-        why = () if cause is None else (cause,)
+        why = () if stop.finding is None else (stop.finding,)
         return replace(stopped, findings=(Finding(Reason.STOPPED, travel, time=time), *why))
 
     def _grip(self, state: State, angle: float) -> State:

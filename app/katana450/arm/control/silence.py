@@ -5,7 +5,9 @@ from __future__ import annotations
 from enum import Enum
 
 from katana450.arm.control.commands import Hold, Stop
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import Finding
+from katana450.arm.control.stop_cause import StopCause
 
 PAUSE_TIMEOUT = 5.0
 """[s] Silence after which a pause becomes a latched stop."""
@@ -26,5 +28,5 @@ class SilenceProfile(Enum):
     def braking(self, cause: Finding, silence: float) -> Stop | Hold:
         """Return the command for a moving arm after ``silence`` [s], for the reason ``cause``."""
         if self is SilenceProfile.REAL_ARM or silence >= PAUSE_TIMEOUT:
-            return Stop(finding=cause)
+            return Stop(StopCause(f"{finding_text(cause)}."), cause)
         return Hold(finding=cause)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -25,6 +26,7 @@ from katana450.arm.control.modes import (
 )
 from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.stop_cause import WATCHDOG, StopCause
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.priority import Priority
@@ -33,6 +35,7 @@ from katana450.maths.motion.stream import Stream
 
 __all__ = [
     "ACCEPTED",
+    "ActiveStop",
     "Finding",
     "JointTarget",
     "Outcome",
@@ -41,7 +44,6 @@ __all__ = [
     "Reason",
     "State",
     "Status",
-    "StoppingDistance",
     "Target",
     "ToolTarget",
     "Verdict",
@@ -174,14 +176,20 @@ ACCEPTED = Outcome()
 
 
 @dataclass(frozen=True)
-class StoppingDistance:
-    """Distance [m] and time [s] of a stop until rest.
+class ActiveStop:
+    """The stop that holds the arm until it is cleared.
 
-    The distance is that of the tool, or else of any link.
+    Attributes:
+        way, time: distance [m] and time [s] until rest. The distance is that of the tool, or else
+            of any link.
+        cause: cause of the first STOP.
+        newest: time of the newest STOP [s], on the clock of ``State.t``.
     """
 
     way: float
     time: float
+    cause: StopCause = WATCHDOG
+    newest: float = -math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +208,7 @@ class State:
         findings: why the goal is not the target, or is not approached; else empty.
         blocked: whether the arm waits on its path because it would touch something.
         stopped: the stop that holds the arm until it is cleared; None if there is none.
+        presses: names of the newest presses of STOP, also of stops that were cleared since.
         paused: whether the arm waits on its path during a pause.
         speed: the fraction of every maximum speed that is allowed, above 0 and up to 1.
         mode: the cause that decides where the goal is. A drag ends when the goal has reached its
@@ -224,7 +233,8 @@ class State:
     priority: Priority = Priority.POSE
     findings: tuple[Finding, ...] = ()
     blocked: bool = False
-    stopped: StoppingDistance | None = None
+    stopped: ActiveStop | None = None
+    presses: tuple[str, ...] = ()
     paused: bool = False
     speed: float = 1.0
     mode: Mode = IDLE

@@ -23,6 +23,9 @@ log = logging.getLogger(__name__)
 FRONT = "front"
 """Role of the front end. There is one at a time: a new one replaces the one before."""
 
+STOP = "stop"
+"""Role of the process of STOP, of which there is one at a time too."""
+
 BACKLOG = 16
 """Connections that may wait while the arm's process accepts one."""
 

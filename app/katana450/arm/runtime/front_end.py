@@ -14,6 +14,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.scene_objects import same
+from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import (
     PIPE_ERRORS,
@@ -104,10 +105,13 @@ class FrontEnd:
             # An early stamp keeps delays in this process from looking like motion.
             command = replace(command, t=MonotonicClock().now())
         with self._sending:
-            if command.traits.safety:
-                # Unsent commands are dropped; an earlier stop is fulfilled by this one.
-                unsent = (each for each in self._unsent if not each.command.traits.safety)
+            if isinstance(command, cmd.Stop):
+                # Unsent commands are dropped; an earlier stop is fulfilled together with this one.
+                unsent = (each for each in self._unsent if not isinstance(each.command, cmd.Stop))
                 self.state_publisher.outcomes.note((each.number, DROPPED) for each in unsent)
+                for each in self._unsent:
+                    if isinstance(each.command, cmd.Stop):
+                        command, actor = joined(each.command, command), each.actor
                 self._unsent.clear()
             elif age > COMMAND_TIMEOUT or not self._connected:
                 raise InputError(

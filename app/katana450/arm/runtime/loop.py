@@ -14,7 +14,7 @@ from katana450.arm.control.event_log import LogEntry, entries_between
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import DROPPED, FAILED
 from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.state import ACCEPTED, Finding, Reason, State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
@@ -120,7 +120,7 @@ class ControlLoop:
             state = replace(self._session.fail(before), outcomes=(FAILED,) * len(drained.commands))
         self._state = state
         # A state that differs only in its time is not published.
-        if drained.commands or _differs(before, state):
+        if drained.last != self.state_publisher.snapshot.ticket or _differs(before, state):
             self.state_publisher.note(_outcomes(drained, state))
             self.state_publisher.publish(
                 Snapshot(state, drained.last), self._entries(before, state)
@@ -182,6 +182,8 @@ def _outcomes(drained: Drained, state: State) -> Iterator[TicketOutcome]:
     """Yield the outcome of each ticket of ``drained`` in the tick that ended in ``state``."""
     for ticket in drained.dropped:
         yield ticket, DROPPED
+    for ticket in drained.repeated:
+        yield ticket, ACCEPTED
     for tickets, outcome in zip(drained.tickets, state.outcomes, strict=False):
         for ticket in tickets:
             yield ticket, outcome

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command
+from katana450.arm.control.commands import Command, Stop
+from katana450.arm.control.stopping import joined
+from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError
 
 CAPACITY = 256
@@ -51,12 +53,14 @@ class Drained:
         tickets: for each submission, its ticket and those of the commands that it replaced.
         dropped: tickets of the commands that waited when a stop came.
         last: the last ticket that was given.
+        repeated: tickets of presses of STOP that had been counted before; they have no effect.
     """
 
     submissions: list[Submission]
     tickets: list[list[int]]
     dropped: list[int]
     last: int
+    repeated: tuple[int, ...] = ()
 
     @property
     def commands(self) -> list[Command]:
@@ -78,6 +82,8 @@ class Mailbox:
         self._waiting: list[Submission] = []
         self._of_waiting: list[list[int]] = []
         self._dropped: list[int] = []
+        self._repeated: list[int] = []
+        self._presses = Presses()
         self._tickets = 0
 
     def put(self, command: Command, actor: Actor | None = None) -> int:
@@ -88,11 +94,19 @@ class Mailbox:
         self._check(command)
         with self._lock:
             replaced: list[int] = []
-            if command.traits.safety:
+            if isinstance(command, Stop):
+                if not self._presses.counts(command):
+                    # Its copies come by several paths, some of them late.
+                    self._tickets += 1
+                    self._repeated.append(self._tickets)
+                    return self._tickets
                 # Never refused. Waiting commands are dropped; an earlier stop is fulfilled.
                 for each, tickets in zip(self._waiting, self._of_waiting, strict=True):
-                    earlier = each.command.traits.safety
-                    (replaced if earlier else self._dropped).extend(tickets)
+                    if isinstance(each.command, Stop):
+                        command, actor = joined(each.command, command), each.actor
+                        replaced.extend(tickets)
+                    else:
+                        self._dropped.extend(tickets)
                 self._waiting, self._of_waiting = [], []
             elif self._waiting and command.replaces(self._waiting[-1].command):
                 self._waiting.pop()
@@ -107,8 +121,14 @@ class Mailbox:
     def drain(self) -> Drained:
         """Remove and return all waiting commands."""
         with self._lock:
-            drained = Drained(self._waiting, self._of_waiting, self._dropped, self._tickets)
-            self._waiting, self._of_waiting, self._dropped = [], [], []
+            drained = Drained(
+                self._waiting,
+                self._of_waiting,
+                self._dropped,
+                self._tickets,
+                tuple(self._repeated),
+            )
+            self._waiting, self._of_waiting, self._dropped, self._repeated = [], [], [], []
             return drained
 
     @property

@@ -21,8 +21,9 @@ from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYT
 from katana450.maths.planning.checkpoint import checked_by
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
-from katana450.server.service.hub import Hub, actor_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.participants import actor_of
 from katana450.server.web.admission import client_of, reserved
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import (

@@ -73,6 +73,8 @@ class Welcome(Answer, frozen=True, kw_only=True):
         role: viewer, operator or admin.
         heartbeat: Interval of the heartbeats that the holder of the lease sends [s].
         api: Version of the API.
+        stop_port: Port of the same host that serves STOP alone; null if there is none, or if the
+            server is behind a proxy.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Welcome(Answer, frozen=True, kw_only=True):
     role: str
     heartbeat: float
     api: int = VERSION
+    stop_port: int | None = None
 
 
 class Echo(Answer, frozen=True, kw_only=True):
@@ -168,6 +171,9 @@ class State(Answer, frozen=True, kw_only=True):
         stopped: Reason for which the arm is stopped; null otherwise.
         stop: requested, then confirmed once a state newer than the request is stopped; null
             without a stop.
+        stopped_at: Time of the stop [s since the epoch]; null without one, or if it is not known.
+        clearable: Whether the stop can be cleared now: it is confirmed, the arm is at rest, and 1 s
+            has passed since the newest STOP. The rights of the client are not included.
         revocations: Number of stops and of losses of the lease so far.
         silence_profile: Reaction of the moving arm to a silent driver or a busy machine: "real arm"
             stops until the stop is cleared; "simulation" pauses until the next command, and stops
@@ -207,6 +213,8 @@ class State(Answer, frozen=True, kw_only=True):
     holder: str | None
     stopped: str | None
     stop: str | None
+    stopped_at: float | None
+    clearable: bool
     revocations: int
     silence_profile: str
     age: float

@@ -15,6 +15,9 @@ VERSION = 1
 ROOT = f"/api/v{VERSION}"
 """Path under which the API is served by HTTP."""
 
+STOP_PATHS = ("/stop", f"{ROOT}/stop")
+"""Paths of STOP, for pages and for programs. They are always answered."""
+
 MAX_REQUEST_BYTES = 1024
 """Maximum size of a request [bytes]."""
 

@@ -15,9 +15,11 @@ from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Outcome, State
+from katana450.arm.control.stopping import clear_refusal
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
+from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import CommandSink
@@ -154,6 +156,11 @@ class ArmHandle:
     def caught_up(self) -> bool:
         """True if the newest state includes every command."""
         return self.snapshot.ticket == self._link.last_ticket
+
+    @property
+    def clear_refusal(self) -> str:
+        """Reason for which a stop cannot be cleared yet; empty if it can be cleared."""
+        return clear_refusal(self.state, MonotonicClock().now())
 
     @property
     def busy(self) -> bool:

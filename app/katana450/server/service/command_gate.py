@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -11,13 +13,15 @@ from typing import NamedTuple
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
-from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.messages import finding_text
-from katana450.arm.control.state import CAUSES, Finding, State
+from katana450.arm.control.state import CAUSES, Finding
+from katana450.arm.control.stop_cause import StopCause, pressed
+from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.stop_state import StopRecord
+from katana450.server.service.stop_state import ClearBy, StopRecord
 
 log = logging.getLogger(__name__)
 
@@ -42,8 +46,8 @@ class CommandGate:
     refuses an older number.
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        """Create a gate without an arm. ``clock`` is in seconds."""
+    def __init__(self, clock: Callable[[], float], clear_by: ClearBy = ClearBy.DRIVER) -> None:
+        """Create a gate without an arm. ``clock`` is in seconds. ``clear_by``: see ``ClearBy``."""
         self._clock = clock
         self._lock = threading.RLock()
         self.lease = Lease()
@@ -58,6 +62,11 @@ class CommandGate:
         """Callback at each stop, before the arm gets it."""
         self.recorder = Recorder()
         """Notes commands, stops and changes of the lease for the event log."""
+        self.name_of: Callable[[StopCause], str | None] = lambda cause: cause.by
+        """Function that returns the display name of the participant that pressed STOP."""
+        self._clear_by = clear_by
+        self._presses = Presses()
+        self._cleared = 0
         self._jogged = -cmd.JOG_TIME
         self._waits = False
         self._settled = -SETTLE_TIME
@@ -71,16 +80,17 @@ class CommandGate:
         """
         with self._lock:
             if isinstance(command, cmd.Stop):
-                return self._stop(StopRecord(actor.name, f"{actor.name} pressed STOP."), actor)
+                return self._press(command, actor)
             try:
-                granted = self._checked(command, actor)
-                ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
+                if isinstance(command, cmd.ClearStop):
+                    granted, ticket = self._clear_stop(actor)
+                else:
+                    granted = self._checked(command, actor)
+                    ticket = self.present().deliver(command, granted)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise
-            if isinstance(command, cmd.ClearStop):
-                self.stopped = None
-            elif isinstance(command, cmd.Jog):
+            if isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
             self.recorder.command(command, granted, ticket)
             return ticket
@@ -92,11 +102,7 @@ class CommandGate:
             self._check_settled(actor)
         if actor.channel is CommandChannel.SERVER and not command.traits.protective:
             raise LeaseError("The server itself may not move the arm.")
-        granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
-        if not isinstance(command, cmd.ClearStop):
-            # Without an arm only a stop can be cleared.
-            self.present()
-        return granted
+        return self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
 
     def claim(self, actor: Actor, *, pacing: bool = False) -> Actor:
         """Return ``actor`` with the grounds on which it may command now; send no command.
@@ -176,7 +182,33 @@ class CommandGate:
     def protect(self, why: str) -> None:
         """Stop the arm in the name of the server, for the reason ``why``."""
         with self._lock:
-            self._stop(StopRecord(None, why), SERVER)
+            self._stop(StopCause(why, at=time.time()), SERVER)
+
+    def may_clear_stop(self, person: Person) -> bool:
+        """Return whether ``person`` may clear the present stop, once that is possible."""
+        if self._by_presser:
+            assert self.stopped is not None
+            own = _session(person.key) == _session(self.stopped.cause.key)
+            return own or person.role is Role.ADMIN
+        return person.role.may_drive and self.lease.driver in (None, person)
+
+    @property
+    def clears(self) -> str:
+        """Name of the persons who may clear the present stop, other than by ``may_clear_stop``."""
+        if self._by_presser:
+            assert self.stopped is not None
+            return f"{self.stopped.cause.by} or an admin"
+        return "an operator" if self.lease.driver is None else self.lease.driver.name
+
+    @property
+    def clear_refusal(self) -> str:
+        """Reason for which nobody can clear the present stop yet; empty if it can be cleared."""
+        stopped, arm = self.stopped, self.arm
+        if arm is None:
+            return ""
+        if stopped is not None and not stopped.seen(arm.snapshot).confirmed:
+            return "The arm has not answered the stop yet: it is not confirmed."
+        return arm.clear_refusal
 
     def pause(self, cause: Finding) -> None:
         """Pause the arm in the name of the server: the next command moves it."""
@@ -223,17 +255,23 @@ class CommandGate:
                 return
             self._note_pause()
             snapshot = arm.snapshot
-            stopped = snapshot.state.stopped is not None
+            stopped = snapshot.state.stopped
+            if snapshot.state.presses:
+                self._presses.counts(cmd.Stop(others=snapshot.state.presses))
             if self.stopped is not None:
-                self.stopped = self.stopped.seen(snapshot)
+                before, self.stopped = self.stopped, self.stopped.seen(snapshot)
+                if stopped is not None and self.stopped.confirmed and not before.confirmed:
+                    self._credit(stopped.cause)
                 sent = self.stopped.ticket
-                if not stopped and (sent is None or snapshot.ticket >= sent):
+                if stopped is None and (sent is None or snapshot.ticket >= sent):
                     # The arm started after the stop, or an error undid the stop.
+                    again = cmd.Stop(replace(self.stopped.cause, press=""))
                     self.stopped = self._requested(
-                        self.stopped, arm, replace(SERVER, grounds=Grounds.SERVER)
+                        self.stopped, again, arm, replace(SERVER, grounds=Grounds.SERVER)
                     )
-            elif stopped and arm.caught_up:
-                self.protect(_why_stopped(snapshot.state))
+            elif stopped is not None and snapshot.ticket >= self._cleared:
+                # By the process of STOP, or by the arm's process itself.
+                self._adopt(stopped.cause, arm)
 
     def moves(self) -> bool:
         """Return whether the arm moves or is about to move."""
@@ -241,22 +279,94 @@ class CommandGate:
             jogged = self._clock() - self._jogged < cmd.JOG_TIME
             return self.arm is not None and (self.arm.state.moving or jogged)
 
-    def _stop(self, stopped: StopRecord, actor: Actor) -> int:
+    def is_known(self, press: str | None) -> bool:
+        """Return whether ``press`` of STOP was counted, on any path."""
+        known = () if self.arm is None else self.arm.state.presses
+        return self._presses.is_known(press) or press in known
+
+    def _press(self, stop: cmd.Stop, actor: Actor) -> int:
+        """Stop the arm; return the ticket, which is 0 for a repeated press."""
+        cause = pressed(actor.name, actor.key, stop.cause.press, time.time())
+        # A press that came by another path is in the state, even if its stop was cleared since.
+        known = () if self.arm is None else self.arm.state.presses
+        if not self._presses.counts(stop) or cause.press in known:
+            return 0
+        return self._stop(cause, actor)
+
+    def _stop(self, cause: StopCause, actor: Actor) -> int:
         self._revoke()
         self.on_stop()
         actor = replace(actor, grounds=Grounds.SERVER if actor is SERVER else Grounds.SAFETY)
-        self.recorder.stop(stopped.why, actor, first=self.stopped is None)
+        self.recorder.stop(cause.why, actor, first=self.stopped is None)
         if self.stopped is None:
-            self.stopped = stopped
-            log.warning("Stopped: %s", stopped.why)
+            self.stopped = StopRecord(cause)
+            log.warning("Stopped: %s", cause.why)
         if self.arm is None:
             return 0
-        self.stopped = self._requested(self.stopped, self.arm, actor)
+        self.stopped = self._requested(self.stopped, cmd.Stop(cause), self.arm, actor)
         return self.stopped.ticket or 0
 
+    def _adopt(self, cause: StopCause, arm: ArmInterface) -> None:
+        """Record a stop that the arm has executed and this gate has not sent."""
+        self._revoke()
+        self.on_stop()
+        record = StopRecord(self._named(cause))
+        log.warning("Stopped: %s", record.why)
+        actor = replace(SERVER, grounds=Grounds.SERVER)
+        self.recorder.stop(record.why, actor, first=True)
+        # Sent too, because it ends what this process plans. The arm knows the press already.
+        self.stopped = self._requested(record, cmd.Stop(cause), arm, actor)
+
+    def _credit(self, cause: StopCause) -> None:
+        """Record the person whose STOP was the first that reached the arm, on another path."""
+        assert self.stopped is not None
+        if cause.by is not None and cause.press != self.stopped.cause.press:
+            self.stopped = replace(self.stopped, cause=self._named(cause))
+            log.warning("Stopped already: %s", self.stopped.why)
+
+    def _named(self, cause: StopCause) -> StopCause:
+        """Return ``cause`` with the display name of its presser."""
+        name = self.name_of(cause)
+        known = name is None or name == cause.by
+        return cause if known else pressed(str(name), cause.key, cause.press, cause.at)
+
     @staticmethod
-    def _requested(stopped: StopRecord, arm: ArmInterface, actor: Actor) -> StopRecord:
-        return stopped.requested(arm.deliver(cmd.Stop(), actor))
+    def _requested(
+        stopped: StopRecord, stop: cmd.Stop, arm: ArmInterface, actor: Actor
+    ) -> StopRecord:
+        return stopped.requested(arm.deliver(stop, actor))
+
+    def _clear_stop(self, actor: Actor) -> tuple[Actor, int]:
+        """Clear the stop for ``actor``; return it with its grounds, and the ticket.
+
+        The ticket is 0 while there is no arm.
+        """
+        # The arm may have been stopped on another path just now.
+        self.reconcile()
+        may = self.may_clear_stop(actor.person)
+        if may and self.clear_refusal:
+            raise LeaseError(self.clear_refusal)
+        if not self._by_presser:
+            granted = self._granted(actor, pacing=False)
+        elif may:
+            granted = replace(actor, grounds=Grounds.PRESSER)
+        else:
+            raise LeaseError(f"Only {self.clears} may clear this stop.")
+        ticket = 0
+        if self.arm is not None:
+            # A stop that has not come back from the arm yet is not cleared.
+            stopped = self.arm.state.stopped
+            known = -math.inf if stopped is None else stopped.newest
+            ticket = self.arm.deliver(cmd.ClearStop(known), granted)
+        self.stopped, self._cleared = None, ticket
+        return granted, ticket
+
+    @property
+    def _by_presser(self) -> bool:
+        """True if only the presser of the present stop, or an admin, may clear it."""
+        stopped = self.stopped
+        pressed_by_person = stopped is not None and stopped.cause.by is not None
+        return self._clear_by is ClearBy.PRESSER and pressed_by_person
 
     def _revoke(self) -> None:
         """Void every gesture received so far."""
@@ -278,9 +388,8 @@ class CommandGate:
         return replace(actor, grounds=Grounds.FREE_LEASE)
 
 
-def _why_stopped(state: State) -> str:
-    """Return why the process of the arm itself has stopped the arm."""
-    causes = [each for each in state.findings if each.reason in CAUSES]
-    if not causes:
-        return "The arm lost the connection to the server and stopped."
-    return f"{finding_text(causes[0])}."
+def _session(key: str) -> str:
+    """Return the part of ``key`` that the windows of one person, or of one browser, share."""
+    session = key.partition("/")[0]
+    # Programs without access links share that part.
+    return key if session == "programs" else session

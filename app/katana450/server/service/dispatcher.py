@@ -19,9 +19,10 @@ from katana450.server.api import answers, requests
 from katana450.server.service import serialize
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.derived import once
-from katana450.server.service.hub import Hub, Window, session_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.object_requests import ObjectRequests
+from katana450.server.service.participants import Window, session_of
 from katana450.server.service.people_requests import PeopleRequests
 
 COMMANDS: dict[type[requests.Request], cmd.Command] = {

@@ -8,14 +8,15 @@ from __future__ import annotations
 import math
 from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Lease, Person
 from katana450.arm.control.messages import sentence
 from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
@@ -25,11 +26,13 @@ from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
+from katana450.server.service.participants import Takeover, Window, key_of, session_of
 from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
-from katana450.server.service.stop_state import Presses, StopRecord
+from katana450.server.service.stop_path import StopPath
+from katana450.server.service.stop_state import ClearBy, StopRecord
 from katana450.settings import Settings
 
 TICK = 0.02
@@ -37,37 +40,6 @@ TICK = 0.02
 
 REMEMBERED = 256
 """Number of pages that are recognised when they return."""
-
-
-@dataclass(frozen=True, eq=False)
-class Window:
-    """The record of one connected page or program.
-
-    Attributes:
-        person: Person and role.
-        number: Number, counted up from 1.
-        notify: Function that queues a notice to the client.
-        heartbeat: Newest heartbeat.
-        channel: Channel of its commands.
-    """
-
-    person: Person
-    number: int
-    notify: Callable[[dict[str, Any]], None]
-    heartbeat: LastHeartbeat
-    channel: CommandChannel
-
-    @property
-    def actor(self) -> Actor:
-        """The participant as the actor of a command that is handled on receipt."""
-        return Actor(self.person, self.channel)
-
-
-class Takeover(NamedTuple):
-    """The newest take-over of the lease. ``drivers``: keys of the windows that drove before."""
-
-    taker: Person
-    drivers: frozenset[str]
 
 
 class Hub:
@@ -79,16 +51,19 @@ class Hub:
         hold_after: float = Settings.silence,
         meshes: Meshes | None = None,
         runner: Callable[[Hub], Runner] | None = None,
+        clear_by: ClearBy = ClearBy.DRIVER,
     ) -> None:
         """Create a hub without participants.
 
         ``hold_after``: heartbeat timeout of the driver [s] after which a moving arm is stopped.
         ``meshes``: initial meshes. ``runner``: factory of the ``Runner``; None for one that never
-        drives.
+        drives. ``clear_by``: persons who may clear a stop.
         """
         self.clock = clock
         self._hold_after = hold_after
-        self.gate = CommandGate(clock)
+        self.gate = CommandGate(clock, clear_by)
+        self.gate.name_of = self._name_of
+        self.stop_path = StopPath()
         self.event_log = EventLog()
         self.people = People(clock)
         self.runner = Runner(self, Namespace()) if runner is None else runner(self)
@@ -100,7 +75,6 @@ class Hub:
         self._pictures: dict[MeasuresAge, str] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
-        self._presses = Presses()
         self._takeover: Takeover | None = None
         self._ticked = clock()
         self._driver_watch = DriverWatch(self.gate, self._ticked)
@@ -130,7 +104,8 @@ class Hub:
     @property
     def stopped(self) -> StopRecord | None:
         """The present stop; None while the arm is not stopped."""
-        return self.gate.stopped
+        stopped, arm = self.gate.stopped, self.gate.arm
+        return stopped if stopped is None or arm is None else stopped.seen(arm.snapshot)
 
     @property
     def halted(self) -> str | None:
@@ -254,7 +229,7 @@ class Hub:
         A repeated ``press`` counts once: it changes nothing, and the ticket is 0. Raises MutedError
         for a muted identity whose STOP does not count. The driver's always counts.
         """
-        if self._presses.is_known(press):
+        if self.gate.is_known(press):
             return 0
         session = session_of(actor.key)
         if not self.drives(session) and self.people.is_muted(session):
@@ -262,8 +237,7 @@ class Hub:
                 # It changes nothing, and must not use up the next one.
                 return 0
             self.people.count_stop(session)
-        self._presses.count(press)
-        return self.gate.submit(cmd.Stop(), actor)
+        return self.gate.submit(cmd.Stop(pressed(actor.name, actor.key, press, 0.0)), actor)
 
     def drives(self, session: str) -> bool:
         """Return whether a window of ``session`` drives, or owns the program that drives."""
@@ -272,11 +246,6 @@ class Hub:
             return False
         owner = program.owner if program is not None and program.person == holder else ""
         return session in (session_of(holder.key), session_of(owner))
-
-    def may_clear_stop(self, window: Window) -> bool:
-        """Return whether ``window`` may clear a stop."""
-        driver = self.lease.driver
-        return window.person.role.may_drive and driver in (None, window.person)
 
     def acquire(self, window: Window) -> None:
         """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
@@ -405,6 +374,11 @@ class Hub:
         """Return the person at ``page``, whether or not its control socket is open now."""
         return self._known(key_of(identity, page), identity)[0]
 
+    def _name_of(self, cause: StopCause) -> str | None:
+        """Return the display name of the page that pressed STOP on the port of STOP."""
+        known = self._remembered.get(cause.key)
+        return cause.by if known is None else known[0].name
+
     def _known(self, key: str, identity: Identity) -> tuple[Person, int]:
         """Return person and number of the page of ``key``; a new page gets new ones."""
         known = self._remembered.pop(key, None) or self._new_person(key, identity)
@@ -423,18 +397,3 @@ class Hub:
         if any(person.name == name for person in known):
             name = f"{name} ({number})"
         return identity.person(key, name), number
-
-
-def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
-    """Return ``identity`` as the actor of a command, without a window."""
-    return Actor(identity.person(identity.session, identity.name or "Somebody"), channel)
-
-
-def key_of(identity: Identity, page: str) -> str:
-    """Return the key that the sockets of one page have in common."""
-    return f"{identity.session}/{page}"
-
-
-def session_of(key: str) -> str:
-    """Return the session in the ``key`` of a window, or of an actor without a window."""
-    return key.rpartition("/")[0] or key

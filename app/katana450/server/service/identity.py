@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from katana450.arm.control.lease import Person, Role
+
+PAGE = re.compile(r"[A-Za-z0-9_-]{16,64}")
+"""Form of the secret key that a page chooses for itself."""
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,10 @@ class ArmInterface(Protocol):
         """True if the newest state includes every command."""
 
     @property
+    def clear_refusal(self) -> str:
+        """Reason for which a stop cannot be cleared yet; empty if it can be cleared."""
+
+    @property
     def busy(self) -> bool:
         """True while a path is being planned that the arm will then follow."""
 

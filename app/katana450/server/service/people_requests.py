@@ -9,8 +9,9 @@ from datetime import UTC, datetime
 from katana450.arm.control.lease import Role
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
-from katana450.server.service.hub import Hub, Window, session_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.participants import Window, session_of
 from katana450.server.service.people import Connection, ConnectionKind
 
 log = logging.getLogger(__name__)

@@ -13,7 +13,8 @@ from katana450.server.api import answers
 from katana450.server.api.fields import Request
 
 if TYPE_CHECKING:
-    from katana450.server.service.hub import Hub, Window
+    from katana450.server.service.hub import Hub
+    from katana450.server.service.participants import Window
 
 log = logging.getLogger(__name__)
 

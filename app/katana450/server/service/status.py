@@ -6,7 +6,8 @@ from typing import Any
 
 from katana450.arm.control.messages import headline, mood, sentence
 from katana450.arm.control.state import Status
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Window
 from katana450.server.service.runner import StatusLine
 
 NO_STATE = 0.3
@@ -32,7 +33,7 @@ def health(hub: Hub) -> str | None:
     age = silence(hub)
     if age is not None:
         return f"No answer from the arm's process for {age:.1f} s."
-    return hub.supervisor_problem()
+    return hub.supervisor_problem() or hub.stop_path.problem or None
 
 
 def common(hub: Hub) -> dict[str, Any]:
@@ -55,6 +56,9 @@ def common(hub: Hub) -> dict[str, Any]:
         **now._asdict(),
         "stop": None if stopped is None else stopped.stage,
         "stopped": None if stopped is None else stopped.why,
+        "stopped_at": None if stopped is None else stopped.cause.at or None,
+        "wait": hub.gate.clear_refusal,
+        "stop_path": hub.stop_path.problem,
         "holder": None if holder is None else holder.name,
         "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
         "speed": 1.0 if state is None else state.speed,
@@ -71,9 +75,8 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     program = hub.runner.progress()
     taker = hub.taken_by(window)
     age = hub.age(window)
-    clears = hub.may_clear_stop(window)
-    other = lease.holder.name if lease.holder is not None else "an operator"
-    until = "Clear stop is pressed" if clears else f"{other} clears the stop"
+    clears = hub.gate.may_clear_stop(person)
+    until = "Clear stop is pressed" if clears else f"{hub.gate.clears} clears the stop"
     return {
         "may_clear_stop": clears,
         "until": "" if hub.stopped is None else f"Nothing moves until {until}.",

@@ -1,32 +1,42 @@
-"""Reason of a stop, and whether the arm has confirmed it."""
+"""Cause of a stop, whether the arm has confirmed it, and who may clear it."""
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Self
 
+from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.runtime.state_publisher import Snapshot
 
-REMEMBERED = 256
-"""Number of presses of STOP whose repetitions are recognised."""
+
+class ClearBy(Enum):
+    """Rule on the persons who may clear a stop."""
+
+    DRIVER = "driver"
+    """The driver, or any operator while nobody drives."""
+    PRESSER = "presser"
+    """The person who pressed STOP, or an admin. A stop by a watchdog: as ``DRIVER``."""
 
 
 @dataclass(frozen=True)
 class StopRecord:
-    """A stop and its reason.
+    """A stop and its cause.
 
     Attributes:
-        by: Name of the participant that pressed STOP; None when the gateway itself stopped the arm.
-        why: Reason in words.
+        cause: Cause of the stop, with the participant that pressed STOP.
         ticket: Ticket of the newest stop sent to the arm; None before one was sent.
         confirmed: Whether a state of the arm that is newer than the request is stopped.
     """
 
-    by: str | None
-    why: str
+    cause: StopCause
     ticket: int | None = None
     confirmed: bool = False
+
+    @property
+    def why(self) -> str:
+        """Reason in words."""
+        return self.cause.why
 
     @property
     def stage(self) -> str:
@@ -42,19 +52,3 @@ class StopRecord:
         if self.confirmed or self.ticket is None or snapshot.ticket < self.ticket:
             return self
         return self if snapshot.state.stopped is None else replace(self, confirmed=True)
-
-
-class Presses:
-    """Recent presses of STOP, each of which counts once."""
-
-    def __init__(self) -> None:
-        self._counted: deque[str] = deque(maxlen=REMEMBERED)
-
-    def is_known(self, press: str | None) -> bool:
-        """Return whether ``press`` was counted. A press without a name is always new."""
-        return press is not None and press in self._counted
-
-    def count(self, press: str | None) -> None:
-        """Count ``press``."""
-        if press is not None:
-            self._counted.append(press)

@@ -12,8 +12,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from katana450.server.service.hub import Hub, key_of
-from katana450.server.service.identity import Identity
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import PAGE, Identity
+from katana450.server.service.participants import key_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.viser_bridge.flow import FlowControl
 from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot
@@ -23,7 +24,6 @@ from katana450.server.viser_bridge.viser_server import KEY_HEADER
 from katana450.server.web.admission import address_of, reserved
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
-from katana450.server.web.control_socket import PAGE
 
 log = logging.getLogger(__name__)
 

@@ -12,7 +12,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from katana450.arm.control.lease import Role
-from katana450.server.api.fields import ROOT
+from katana450.server.api.fields import STOP_PATHS
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.web.acceptor import Acceptor
@@ -26,9 +26,6 @@ for each admin. A page has two, a program one."""
 REQUESTS, REQUESTS_EACH, RESERVED_REQUESTS = 128, 16, 8
 """Maximum of concurrent HTTP requests, in total and of one identity, and number reserved for the
 driver and for each admin."""
-
-STOP_PATHS = ("/stop", f"{ROOT}/stop")
-"""Paths that are always answered. They read no body, so they end at once."""
 
 TOO_MANY = 429
 

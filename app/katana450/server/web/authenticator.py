@@ -10,16 +10,18 @@ from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from ipaddress import ip_address
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
-
-from starlette.responses import Response
 
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
 from katana450.server.service.people import Connection, People
 from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile, Grant
+
+if TYPE_CHECKING:
+    # Loading it takes long, and the process of STOP needs none.
+    from starlette.responses import Response
 
 SESSION_SIZE = 22
 """Length of a session's name in characters: 16 random bytes."""

@@ -21,8 +21,9 @@ from katana450.server.api.fields import Id
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import Arrival
-from katana450.server.service.hub import Hub, Window, session_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.mutes import MutedError
+from katana450.server.service.participants import Window, session_of
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.token_bucket import TokenBucket
 

@@ -5,7 +5,6 @@ States are sent only on request, a few at a time, so a slow connection has no ba
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -14,15 +13,14 @@ from starlette.websockets import WebSocket
 from katana450.server.api import requests
 from katana450.server.service import status
 from katana450.server.service.budget import Budget, Budgets
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import PAGE
+from katana450.server.service.participants import Window
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
 from katana450.server.web.token_bucket import TokenBucket
-
-PAGE = re.compile(r"[A-Za-z0-9_-]{16,64}")
-"""Form of the secret key that a page chooses for itself."""
 
 RATE, BURST = 160.0, 320.0
 """Maximum rate [1/s] and burst of requests: per second ten heartbeats, 25 jogs, 30 queries, and the

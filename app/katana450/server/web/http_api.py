@@ -20,12 +20,13 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import LEASE_TIMEOUT
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests, schema
-from katana450.server.api.fields import ROOT, Id
+from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT, Id
 from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
-from katana450.server.service.hub import Hub, Window, actor_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import MutedError
+from katana450.server.service.participants import Window, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
@@ -140,7 +141,8 @@ class Api:
 
     async def _stop(self, request: Request) -> Response:
         found = self._identity(request, stopping=True)
-        self._hub.stop(actor_of(found, CommandChannel.HTTP))
+        press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
+        self._hub.stop(actor_of(found, CommandChannel.HTTP), press or None)
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:

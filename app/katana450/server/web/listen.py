@@ -11,12 +11,16 @@ from katana450.platform_support import claim_port
 
 BACKLOG = 128
 
+MAX_PORT = 65535
+
 LOOPBACK = "127.0.0.1"
 """Address that only programs of this machine can reach."""
 
 
-def listen(host: str, port: int) -> socket.socket:
+def listen(host: str, port: int, option: str = "--port") -> socket.socket:
     """Return a socket that listens on ``host``:``port``; port 0 takes a free one.
+
+    ``option``: the option of the port, for the error.
 
     Raises ConfigurationError, with what to do, if the address or the port cannot be used.
     """
@@ -35,8 +39,23 @@ def listen(host: str, port: int) -> socket.socket:
         listening.listen(BACKLOG)
     except OSError as error:
         listening.close()
-        raise ConfigurationError(_refused(host, port, error)) from error
+        raise ConfigurationError(_refused(host, port, error, option)) from error
     return listening
+
+
+def listen_beside(main: socket.socket, host: str, port: int | None) -> socket.socket:
+    """Return a socket for STOP that listens on ``host``:``port``.
+
+    Without ``port`` it is the port after that of ``main``, or a free one if that is in use. Raises
+    ConfigurationError, as ``listen`` does.
+    """
+    if port is not None:
+        return listen(host, port, "--stop-port")
+    beside: int = main.getsockname()[1] + 1
+    try:
+        return listen(host, beside if beside <= MAX_PORT else 0)
+    except ConfigurationError:
+        return listen(host, 0)
 
 
 def reaches_beyond(listening: socket.socket) -> bool:
@@ -44,12 +63,12 @@ def reaches_beyond(listening: socket.socket) -> bool:
     return not ip_address(listening.getsockname()[0].partition("%")[0]).is_loopback
 
 
-def _refused(host: str, port: int, error: OSError) -> str:
+def _refused(host: str, port: int, error: OSError, option: str) -> str:
     if error.errno == errno.EADDRINUSE:
         return (
             f"Port {port} on {host} is in use by another program. "
-            f"Stop it, or choose another port: --port {port + 1}"
+            f"Stop it, or choose another port: {option} {port + 1}"
         )
     if error.errno == errno.EACCES:
-        return f"Port {port} may not be opened by this user. Choose one above 1023 with --port."
+        return f"Port {port} may not be opened by this user. Choose one above 1023 with {option}."
     return f"Cannot listen on {host}: {error.strerror}. Choose another with --host."

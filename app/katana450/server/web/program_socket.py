@@ -23,9 +23,10 @@ from katana450.server.service import serialize
 from katana450.server.service.budget import Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.heartbeats import Arrival
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.participants import Window
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
@@ -145,6 +146,7 @@ class ProgramChannel(Channel):
                 number=window.number,
                 role=person.role.value,
                 heartbeat=HEARTBEAT_INTERVAL,
+                stop_port=self.hub.stop_path.port,
             )
         )
 

@@ -29,14 +29,17 @@ FOR_PROGRAMS = "/api/"
 TLS_ONLY = "max-age=31536000"
 
 
-def page_policy() -> str:
-    """Return the content security policy of our own page, which allows only its own files."""
+def page_policy(stop_origin: str | None = None) -> str:
+    """Return the content security policy of our own page, which allows only its own files.
+
+    ``stop_origin``: origin to which the page also sends STOP; None if there is none.
+    """
     return content_policy(
         default=("'none'",),
         script=("'self'",),
         style=("'self'",),
         img=("'self'", "data:"),
-        connect=("'self'",),
+        connect=("'self'",) if stop_origin is None else ("'self'", stop_origin),
         frame=("'self'",),
         worker=("'self'",),
         ends=("base-uri 'none'", "form-action 'none'", "frame-ancestors 'none'"),

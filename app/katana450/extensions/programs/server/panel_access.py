@@ -10,7 +10,8 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.api import answers
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Window
 
 
 class PanelAccess:

@@ -8,8 +8,9 @@ from datetime import UTC, datetime
 from katana450.arm.control.lease import Person, Role
 from katana450.errors import LeaseError
 from katana450.server.service.heartbeats import LastHeartbeat
-from katana450.server.service.hub import Hub, Window, session_of
+from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.participants import Window, session_of
 
 log = logging.getLogger(__name__)
 
@@ -19,6 +20,12 @@ def program_identity(name: str, owner: Person) -> Identity:
     return Identity(
         f"program of {owner.key}", name, Role.OPERATOR, link=owner.link, address=owner.address
     )
+
+
+def check_may_drive(person: Person) -> None:
+    """Raise LeaseError if the role of ``person`` allows only to watch."""
+    if not person.role.may_drive:
+        raise LeaseError("You may watch, not drive.")
 
 
 class AlwaysAlive(LastHeartbeat):

@@ -11,7 +11,6 @@ from contextlib import suppress
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
-from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State, Verdict
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import requests, runner
@@ -23,6 +22,7 @@ from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_owner import (
     AlwaysAlive,
     ProgramOwner,
+    check_may_drive,
     program_identity,
 )
 from katana450.extensions.programs.server.program_planning import Planning
@@ -30,7 +30,8 @@ from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Window
 from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
@@ -80,7 +81,7 @@ class ProgramRunner(Runner):
 
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError if ``actor`` may not drive, or does not own the running program."""
-        self._check_may_drive(actor.person)
+        check_may_drive(actor.person)
         if self.running:
             self._owner.check_may_steer(actor.person)
 
@@ -120,7 +121,7 @@ class ProgramRunner(Runner):
         arm = self.hub.present()
         if arm.state.moving:
             raise LeaseError("The arm is moving. Plan the program when it is at rest.")
-        self._check_may_drive(window.person)
+        check_may_drive(window.person)
         self._supersede(window)
         before = self._planning
         if before is not None and before.fits(text, speed, arm.state):
@@ -152,7 +153,7 @@ class ProgramRunner(Runner):
 
         Returns the ticket of the command that the arm was given now; None for none.
         """
-        self._check_may_drive(window.person)
+        check_may_drive(window.person)
         begins = order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running
         if unattended and not begins:
             raise LeaseError("Only `run` and `step` begin an unattended program.")
@@ -397,7 +398,3 @@ class ProgramRunner(Runner):
         planning = self._planning
         if planning is not None and planning.busy:
             planning.cancel(self._owner.superseded_by(window))
-
-    def _check_may_drive(self, person: Person) -> None:
-        if not person.role.may_drive:
-            raise LeaseError("You may watch, not drive.")

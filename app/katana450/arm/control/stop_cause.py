@@ -1,0 +1,33 @@
+"""Cause of a stop: the person or the watchdog, the reason, and the press of STOP."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StopCause:
+    """Cause of a stop.
+
+    Attributes:
+        why: reason in words.
+        by: name of the participant that pressed STOP; None if a watchdog stopped the arm.
+        key: identity of that participant, as ``Person.key``; not shown to people.
+        press: name of the press, which counts once on all paths; a stop without one always counts.
+        at: time of the stop [s since the epoch]; 0 if it is not known.
+    """
+
+    why: str = "The arm lost the connection to the server and stopped."
+    by: str | None = None
+    key: str = ""
+    press: str = ""
+    at: float = 0.0
+
+
+WATCHDOG = StopCause()
+"""Cause of a stop by the arm's process itself, which no longer hears the server."""
+
+
+def pressed(name: str, key: str, press: str | None, at: float) -> StopCause:
+    """Return the cause of a stop by the participant ``name`` at ``at`` [s since the epoch]."""
+    return StopCause(f"{name} pressed STOP.", name, key, press or "", at)

@@ -1,0 +1,58 @@
+"""Participants of a server: connected pages and programs, and the keys by which they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.lease import Person
+from katana450.server.service.heartbeats import LastHeartbeat
+from katana450.server.service.identity import Identity
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """The record of one connected page or program.
+
+    Attributes:
+        person: Person and role.
+        number: Number, counted up from 1.
+        notify: Function that queues a notice to the client.
+        heartbeat: Newest heartbeat.
+        channel: Channel of its commands.
+    """
+
+    person: Person
+    number: int
+    notify: Callable[[dict[str, Any]], None]
+    heartbeat: LastHeartbeat
+    channel: CommandChannel
+
+    @property
+    def actor(self) -> Actor:
+        """The participant as the actor of a command that is handled on receipt."""
+        return Actor(self.person, self.channel)
+
+
+class Takeover(NamedTuple):
+    """The newest take-over of the lease. ``drivers``: keys of the windows that drove before."""
+
+    taker: Person
+    drivers: frozenset[str]
+
+
+def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
+    """Return ``identity`` as the actor of a command, without a window."""
+    return Actor(identity.person(identity.session, identity.name or "Somebody"), channel)
+
+
+def key_of(identity: Identity, page: str) -> str:
+    """Return the key that the sockets of one page have in common."""
+    return f"{identity.session}/{page}"
+
+
+def session_of(key: str) -> str:
+    """Return the session in the ``key`` of a window, or of an actor without a window."""
+    return key.rpartition("/")[0] or key

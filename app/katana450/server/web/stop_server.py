@@ -1,0 +1,329 @@
+"""Server of STOP alone, in a process that shares nothing with the web server.
+
+It accepts ``POST /stop`` of pages, ``POST /api/v1/stop`` of programs, and ``GET /health``. Each
+connection carries one request. STOP is decided from memory and passed to the arm's process at once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import secrets
+import time
+from collections.abc import Mapping
+from contextlib import nullcontext
+from http import HTTPStatus
+from typing import NamedTuple, Protocol, cast
+from urllib.parse import parse_qs, urlsplit
+
+import h11
+
+from katana450.arm.control.actor import Actor, CommandChannel, Grounds
+from katana450.arm.control.lease import Person
+from katana450.arm.control.stop_cause import StopCause, pressed
+from katana450.arm.runtime.stop_messages import StopPress, StopStatus
+from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
+from katana450.server.service.identity import PAGE, Identity
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.authenticator import Address, Authenticator
+from katana450.server.web.token_bucket import TokenBucket
+
+log = logging.getLogger(__name__)
+
+CONFIRM_TIMEOUT = 0.5
+"""[s] Timeout for a state of the arm that confirms the stop."""
+
+NO_STATE = 0.3
+"""[s] Silence of the arm's process after which its state counts as unknown."""
+
+RATE, BURST = 10.0, 20.0
+"""Requests of one client per second, and in a burst, beyond which answers are delayed: refusals,
+and presses while the arm is stopped already. A press that finds the arm not stopped is never
+delayed. A client is an access link; without one, an address."""
+
+MAX_CLIENTS = 256
+"""Number of clients whose requests are counted; a new one replaces the oldest."""
+
+DELAY = 0.2
+"""[s] Delay of these answers. Meanwhile the connection may be closed in favour of another."""
+
+MAX_KEPT = 32
+"""Maximum number of connections that wait for a confirmation and are not closed for others."""
+
+MAX_HEAD_BYTES = 8192
+"""Maximum size of a request without its body [bytes]."""
+
+LINGER = 0.5
+"""[s] Time in which the body of an answered request is received, and dropped."""
+
+HEADERS = (
+    ("cache-control", "no-store"),
+    ("connection", "close"),
+    ("referrer-policy", "no-referrer"),
+    ("x-content-type-options", "nosniff"),
+)
+
+
+class Link(Protocol):
+    """The arm as this server sees it; ``StopLink`` implements it."""
+
+    status: StopStatus | None
+
+    @property
+    def age(self) -> float:
+        """Time since the newest message of the arm's process [s]."""
+
+    def press(self, press: StopPress) -> None:
+        """Send ``press`` to the arm's process."""
+
+    async def executed(self, press: str, timeout: float) -> StopCause | None:
+        """Return the cause of the stop once a state includes ``press``; None after ``timeout``."""
+
+
+class Reply(NamedTuple):
+    """Response to a request."""
+
+    status: int
+    body: bytes
+    media_type: str = "text/plain; charset=utf-8"
+    headers: tuple[tuple[str, str], ...] = ()
+
+
+class StopServer:
+    """Decides each request of the port of STOP."""
+
+    def __init__(
+        self,
+        link: Link,
+        authenticator: Authenticator,
+        address: Address,
+        main_port: int,
+        acceptor: Acceptor,
+    ) -> None:
+        """Serve ``link``. ``main_port``: port of the pages that may send STOP to this one."""
+        self._link = link
+        self._authenticator = authenticator
+        self._address = address
+        self._main_port = main_port
+        self._acceptor = acceptor
+        self._often: dict[str, TokenBucket] = {}
+        self._kept = 0
+
+    def protocol(self) -> asyncio.Protocol:
+        """Return the protocol of a new connection."""
+        return _StopConnection(self)
+
+    async def reply(self, request: h11.Request, client: tuple[str, int] | None) -> Reply:
+        """Execute ``request`` of ``client`` and return its response."""
+        headers = {name.decode("latin-1"): text.decode("latin-1") for name, text in request.headers}
+        path, _, query = request.target.decode("latin-1").partition("?")
+        origin = headers.get("origin")
+        refusal = self._refusal(request.method, path, headers.get("host", ""), origin)
+        if refusal is not None:
+            return await self.delayed(refusal, client)
+        if path not in STOP_PATHS:
+            return self._health()
+        identity = self._identity(path, headers)
+        if identity is None:
+            refused = Reply(HTTPStatus.UNAUTHORIZED, b"Sign in at the start page, or send a token.")
+            return await self.delayed(_readable_by(origin, refused), client)
+        asked = {name: values[0] for name, values in parse_qs(query).items()}
+        reply = await self._stop(path, identity, asked, client)
+        return _readable_by(origin, reply)
+
+    async def delayed(self, reply: Reply, client: tuple[str, int] | None) -> Reply:
+        """Return the refusal ``reply``, after ``DELAY`` if ``client`` gets too many."""
+        if not self._takes(_address_of(client)):
+            await asyncio.sleep(DELAY)
+        return reply
+
+    def _takes(self, who: str) -> bool:
+        """Count a request of ``who``; return False if there are too many."""
+        now = time.monotonic()
+        bucket = self._often.pop(who, None) or TokenBucket(RATE, BURST, now)
+        self._often[who] = bucket
+        while len(self._often) > MAX_CLIENTS:
+            del self._often[next(iter(self._often))]
+        return bucket.take(now)
+
+    def _refusal(self, method: bytes, path: str, host: str, origin: str | None) -> Reply | None:
+        if not self._address.is_ours(host):
+            return Reply(HTTPStatus.FORBIDDEN, b"This server does not serve that host name.")
+        if path not in (*STOP_PATHS, "/health"):
+            return Reply(HTTPStatus.NOT_FOUND, b"This port serves STOP alone.")
+        allowed = "POST" if path in STOP_PATHS else "GET"
+        if method.decode("latin-1") != allowed:
+            status, words = HTTPStatus.METHOD_NOT_ALLOWED, f"Send {allowed}.".encode()
+            return Reply(status, words, headers=(("allow", allowed),))
+        if path not in STOP_PATHS:
+            return None
+        if origin is None:
+            # Programs have no Origin header, but browsers send one.
+            missing = Reply(HTTPStatus.FORBIDDEN, b"The header Origin is missing.")
+            return missing if path == STOP_PATHS[0] else None
+        if not self._is_our_page(origin, host):
+            return Reply(HTTPStatus.FORBIDDEN, b"Pages of other sites may not send this request.")
+        return None
+
+    def _is_our_page(self, origin: str, host: str) -> bool:
+        """Return whether ``origin`` is that of our page, on the main port of the same host."""
+        if origin == self._address.public:
+            return True
+        scheme = "https" if self._address.secure else "http"
+        try:
+            page, name = urlsplit(origin), urlsplit(f"//{host}").hostname
+            port = page.port or (443 if self._address.secure else 80)
+        except ValueError:
+            return False
+        return (page.scheme, page.hostname, port) == (scheme, name, self._main_port)
+
+    def _identity(self, path: str, headers: Mapping[str, str]) -> Identity | None:
+        cookies = dict(
+            part.strip().partition("=")[::2] for part in headers.get("cookie", "").split(";")
+        )
+        if path == STOP_PATHS[0]:
+            return self._authenticator.identity(cookies)
+        return self._authenticator.program(
+            headers.get("x-name", ""), headers.get("authorization", ""), cookies
+        )
+
+    async def _stop(
+        self,
+        path: str,
+        identity: Identity,
+        asked: Mapping[str, str],
+        client: tuple[str, int] | None,
+    ) -> Reply:
+        """Send STOP to the arm, and return whether a state has confirmed it."""
+        link = self._link
+        key, page = identity.session, asked.get("page", "")
+        from_page = path == STOP_PATHS[0]
+        if from_page and PAGE.fullmatch(page):
+            key = f"{key}/{page}"
+        name = identity.name or "Somebody"
+        press = asked.get("press", "")[:MAX_PRESS_LENGTH] or secrets.token_urlsafe(16)
+        channel = CommandChannel.PAGE if from_page else CommandChannel.HTTP
+        actor = Actor(Person(key, name, identity.role), channel, None, Grounds.SAFETY)
+        cause = pressed(name, key, press, time.time())
+        stopped = None
+        if link.status is not None and link.age < NO_STATE:
+            stopped = link.status.stopped
+        known = self._authenticator.requires_link
+        who = identity.session if known else _address_of(client)
+        if stopped is not None and not self._takes(who):
+            await asyncio.sleep(DELAY)
+            return _stop_reply(stopped)
+        # Sent even if the arm is stopped, so that late copies of this press are recognised.
+        link.press(StopPress(cause, actor))
+        if stopped is None:
+            log.info("%s pressed STOP (port of STOP).", name)
+            kept = self._kept < MAX_KEPT
+            self._kept += kept
+            try:
+                with self._acceptor.kept(client) if kept else nullcontext():
+                    stopped = await link.executed(press, CONFIRM_TIMEOUT)
+            finally:
+                self._kept -= kept
+        return _stop_reply(stopped)
+
+    def _health(self) -> Reply:
+        link = self._link
+        if link.status is None:
+            problem = "The arm is not ready yet."
+        elif link.age >= NO_STATE:
+            problem = f"No answer from the arm's process for {link.age:.1f} s."
+        else:
+            return Reply(HTTPStatus.OK, b"ok\n")
+        return Reply(HTTPStatus.SERVICE_UNAVAILABLE, f"{problem}\n".encode())
+
+
+def _stop_reply(stopped: StopCause | None) -> Reply:
+    """Return the answer to a STOP: confirmed by a stop of the arm, or only requested."""
+    answer = {
+        "stop": "requested" if stopped is None else "confirmed",
+        "why": "" if stopped is None else stopped.why,
+    }
+    status = HTTPStatus.ACCEPTED if stopped is None else HTTPStatus.OK
+    return Reply(status, json.dumps(answer).encode() + b"\n", "application/json")
+
+
+def _address_of(client: tuple[str, int] | None) -> str:
+    return "" if client is None else client[0]
+
+
+def _readable_by(origin: str | None, reply: Reply) -> Reply:
+    """Return ``reply``, which the page of ``origin`` on the main port may read."""
+    if origin is None:
+        return reply
+    more = (
+        ("access-control-allow-origin", origin),
+        ("access-control-allow-credentials", "true"),
+        ("vary", "Origin"),
+    )
+    return reply._replace(headers=(*reply.headers, *more))
+
+
+class _StopConnection(asyncio.Protocol):
+    """One connection, which is closed after the answer to its first request."""
+
+    def __init__(self, server: StopServer) -> None:
+        self._server = server
+        self._http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEAD_BYTES)
+        self._task: asyncio.Task[None] | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+
+    def data_received(self, data: bytes) -> None:
+        if self._task is not None:
+            return
+        try:
+            self._http.receive_data(data)
+            event = self._http.next_event()
+        except h11.RemoteProtocolError:
+            refused = Reply(HTTPStatus.BAD_REQUEST, b"This is no valid HTTP request.")
+            self._task = asyncio.create_task(self._refuse(refused))
+            return
+        if isinstance(event, h11.Request):
+            self._task = asyncio.create_task(self._handle(event))
+
+    @property
+    def _client(self) -> tuple[str, int] | None:
+        """Address and port of the sender; None once the connection is closed."""
+        peer = self._transport.get_extra_info("peername")
+        return None if peer is None else (peer[0], peer[1])
+
+    async def _refuse(self, reply: Reply) -> None:
+        self._send(await self._server.delayed(reply, self._client))
+        self._transport.close()
+
+    async def _handle(self, request: h11.Request) -> None:
+        try:
+            reply = await self._server.reply(request, self._client)
+        except Exception:
+            log.exception("A request on the port of STOP met an error.")
+            reply = Reply(HTTPStatus.INTERNAL_SERVER_ERROR, b"See the log of the server.")
+        self._send(reply)
+        lengths = {text for name, text in request.headers if name == b"content-length"}
+        if lengths <= {b"0"} and not any(
+            name == b"transfer-encoding" for name, _ in request.headers
+        ):
+            self._transport.close()
+        else:
+            # Closed at once, the unread body would reset the connection before the answer is read.
+            asyncio.get_running_loop().call_later(LINGER, self._transport.close)
+
+    def _send(self, reply: Reply) -> None:
+        # A STOP counts even if its sender is gone before the answer.
+        if self._transport.is_closing():
+            return
+        length = ("content-length", str(len(reply.body)))
+        headers = (*HEADERS, ("content-type", reply.media_type), length, *reply.headers)
+        response = h11.Response(
+            status_code=reply.status,
+            reason=HTTPStatus(reply.status).phrase,
+            headers=[(name, value) for name, value in headers],
+        )
+        for event in (response, h11.Data(data=reply.body), h11.EndOfMessage()):
+            self._transport.write(self._http.send(event) or b"")

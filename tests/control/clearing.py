@@ -1,0 +1,20 @@
+"""Clear a stop as soon as the session allows it."""
+
+from __future__ import annotations
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.stopping import clear_refusal
+
+TICK = 0.01
+
+
+def cleared(session: Session, state: State) -> State:
+    """Return the state after ticks without commands until the stop may be cleared, and its end."""
+    while clear_refusal(state, state.t):
+        state = session.step(state, [], state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+    state = session.step(state, [cmd.ClearStop()], state.t + TICK)
+    assert state.stopped is None
+    return state

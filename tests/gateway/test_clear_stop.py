@@ -1,0 +1,201 @@
+"""Test who may clear a stop and when, and how the gate adopts a stop of another path."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor, Grounds
+from katana450.arm.control.lease import Role
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import ActiveStop, State
+from katana450.arm.control.stop_cause import StopCause, pressed
+from katana450.arm.runtime.state_publisher import Snapshot
+from katana450.errors import LeaseError
+from katana450.server.service import status
+from katana450.server.service.hub import TICK, Hub
+from katana450.server.service.identity import Identity
+from katana450.server.service.participants import Window, key_of
+from katana450.server.service.stop_state import ClearBy
+from tests.gateway.test_hub import PAGES, FakeArm, Table
+
+EARLY = "The arm was stopped just now. Clear the stop in 0.6 s."
+
+
+class StoppableArm(FakeArm):
+    """An arm that another path can stop."""
+
+    def __init__(self, state: State) -> None:
+        super().__init__(state)
+        self.stop_cause: StopCause | None = None
+        self.presses: tuple[str, ...] = ()
+        self.sent: list[cmd.Stop] = []
+        self.newest = 0.0
+        self.known = math.nan
+
+    @property
+    def state(self) -> State:
+        state = replace(super().state, presses=self.presses)
+        if self.stop_cause is None:
+            return state
+        return replace(state, stopped=ActiveStop(0.0, 0.0, self.stop_cause, self.newest))
+
+    @property
+    def snapshot(self) -> Snapshot:
+        return Snapshot(self.state, self.stops)
+
+    def stop_elsewhere(self, cause: StopCause) -> None:
+        """Stop as after a press on the port of STOP."""
+        self.stop_cause, self.presses = cause, (*self.presses, cause.press)
+
+    def deliver(self, command: cmd.Command, actor: Actor) -> int:
+        if isinstance(command, cmd.ClearStop):
+            self.stop_cause, self.known = None, command.known
+        if isinstance(command, cmd.Stop):
+            self.sent.append(command)
+        return super().deliver(command, actor)
+
+
+class ClearingTable(Table):
+    """A table with such an arm, and people with links."""
+
+    def __init__(self, state: State, clear_by: ClearBy) -> None:
+        super().__init__(state)
+        self.hub = Hub(lambda: self.t, clear_by=clear_by)
+        self.stoppable = StoppableArm(state)
+        self.arm = self.hub.gate.arm = self.stoppable
+
+    def person(self, name: str, role: Role) -> Window:
+        return self.hub.join(Identity(name, name, role), PAGES[0], lambda _notice: None)
+
+
+@pytest.fixture
+def table(session: Session) -> ClearingTable:
+    return ClearingTable(session.begin(session.ready, 0.0, 0.0), ClearBy.DRIVER)
+
+
+@pytest.fixture
+def by_presser(session: Session) -> ClearingTable:
+    return ClearingTable(session.begin(session.ready, 0.0, 0.0), ClearBy.PRESSER)
+
+
+def test_stop_on_another_path_is_adopted_with_its_cause(table: ClearingTable) -> None:
+    driver, other = (table.join(page) for page in PAGES)
+    gesture = table.touch(driver.person.key)
+    key = key_of(Identity("session", None, Role.ADMIN), PAGES[1])
+    table.stoppable.stop_elsewhere(pressed("Somebody", key, "one", 5.0))
+    revocations = table.hub.gate.revocations
+    table.wait(TICK, driver)
+    stopped = table.hub.stopped
+    assert stopped is not None
+    # The page is named as on the main port.
+    assert stopped.why == f"{other.person.name} pressed STOP."
+    assert stopped.stage == "confirmed"
+    assert table.hub.gate.revocations == revocations + 1
+    assert not table.hub.gate.is_current(gesture)
+    # The Stop that ends plans has the same press, and a copy by the main path changes nothing.
+    assert table.stoppable.sent == [cmd.Stop(pressed("Somebody", key, "one", 5.0))]
+    assert table.hub.stop(other.actor, "one") == 0
+    table.hub.move(driver, cmd.ClearStop())
+    table.wait(TICK, driver)
+    assert table.hub.stop(other.actor, "one") == 0
+    assert (table.hub.stopped, table.arm.stops) == (None, 1)
+
+
+def test_clear_stop_names_the_newest_stop_that_the_gate_knows(table: ClearingTable) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.move(driver, cmd.ClearStop())
+    assert table.stoppable.known == -math.inf
+    table.stoppable.newest = 7.0
+    table.stoppable.stop_elsewhere(pressed("Vera", "v", "one", 5.0))
+    table.wait(TICK, driver)
+    table.hub.move(driver, cmd.ClearStop())
+    assert table.stoppable.known == 7.0
+
+
+def test_stop_by_the_arm_itself_keeps_its_reason(table: ClearingTable) -> None:
+    table.stoppable.stop_elsewhere(StopCause("The arm ran away."))
+    table.wait(TICK)
+    assert table.hub.stopped is not None
+    assert table.hub.stopped.why == "The arm ran away."
+
+
+def test_first_stop_that_reached_the_arm_is_named(table: ClearingTable) -> None:
+    driver = table.join(PAGES[0])
+    # The server stops the arm too, before it knows of the press.
+    table.stoppable.stop_elsewhere(pressed("Vera", "v", "one", 5.0))
+    table.hub.gate.protect("Window 1 fell silent while the arm moved.")
+    table.wait(TICK, driver)
+    assert table.hub.stopped is not None
+    assert table.hub.stopped.why == "Vera pressed STOP."
+
+
+def test_clear_stop_is_offered_with_the_reason_to_wait(table: ClearingTable) -> None:
+    driver, other = (table.join(page) for page in PAGES)
+    table.touch(driver.person.key)
+    table.hub.stop(other.actor)
+    table.arm.clear_refusal = EARLY
+    shown = status.common(table.hub) | status.of(table.hub, driver)
+    assert (shown["may_clear_stop"], shown["wait"]) == (True, EARLY)
+    assert not status.of(table.hub, other)["may_clear_stop"]
+    with pytest.raises(LeaseError, match=r"Clear the stop in 0\.6 s"):
+        table.hub.move(driver, cmd.ClearStop())
+    assert table.hub.stopped is not None
+    # A person who may not clear it learns that, and gets no lease.
+    with pytest.raises(LeaseError, match="holds the arm"):
+        table.hub.move(other, cmd.ClearStop())
+    table.arm.clear_refusal = ""
+    assert status.common(table.hub)["wait"] == ""
+    table.hub.move(driver, cmd.ClearStop())
+    assert table.hub.stopped is None
+
+
+def test_refused_clear_stop_acquires_no_lease(table: ClearingTable) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.stop(driver.actor)
+    table.arm.clear_refusal = EARLY
+    with pytest.raises(LeaseError, match="just now"):
+        table.hub.move(driver, cmd.ClearStop())
+    assert table.hub.lease.holder is None
+
+
+def test_presser_or_admin_clears_where_the_option_demands_it(by_presser: ClearingTable) -> None:
+    table = by_presser
+    driver = table.person("Dora", Role.OPERATOR)
+    presser = table.person("Vera", Role.VIEWER)
+    admin = table.person("Anna", Role.ADMIN)
+    for clearer in (presser, admin):
+        table.hub.acquire(driver)
+        table.hub.stop(presser.actor)
+        shown = status.of(table.hub, driver)
+        assert (shown["may_clear_stop"], shown["until"]) == (
+            False,
+            "Nothing moves until Vera or an admin clears the stop.",
+        )
+        with pytest.raises(LeaseError, match="Only Vera or an admin may clear"):
+            table.hub.move(driver, cmd.ClearStop())
+        assert status.of(table.hub, clearer)["may_clear_stop"]
+        table.hub.move(clearer, cmd.ClearStop())
+        assert table.hub.stopped is None
+        assert table.arm.actors[-1].grounds is Grounds.PRESSER
+        # Clearing takes no lease.
+        assert table.hub.lease.holder == driver.person
+        table.hub.release_lease(driver)
+
+
+def test_watchdog_stop_is_cleared_by_the_driver_in_any_case(by_presser: ClearingTable) -> None:
+    driver = by_presser.person("Dora", Role.OPERATOR)
+    by_presser.hub.acquire(driver)
+    by_presser.hub.gate.protect("Dora fell silent while the arm moved.")
+    by_presser.hub.move(driver, cmd.ClearStop())
+    assert by_presser.hub.stopped is None
+
+
+def test_missing_path_of_stop_is_reported(table: ClearingTable) -> None:
+    assert status.health(table.hub) is None
+    table.hub.stop_path.problem = "STOP is not served on port 8081 now."
+    assert status.health(table.hub) == "STOP is not served on port 8081 now."
+    assert status.common(table.hub)["stop_path"] == "STOP is not served on port 8081 now."

@@ -1,0 +1,319 @@
+"""Test STOP on a port and in a process of its own, with real servers and real attacks."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from katana450.arm.control.lease import Role
+from katana450.client import Client, connect
+from katana450.server.api import answers, requests
+from katana450.server.web.access_links import AccessFile
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import HOUR, ask, controlling, enter, page_name
+from tests.gateway.postures import THERE
+from tests.gateway.test_isolation import process_state, under_way
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="finds the server's processes as Linux lists them"
+)
+
+SILENT = 1100
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def program(server: AppServer) -> Iterator[Client]:
+    with connect(server.url, "Driver") as program:
+        program.clear_stop()
+        program.go(requests.Home())
+        yield program
+        program.clear_stop()
+        program.ask(requests.ReleaseLease())
+
+
+def stop(url: str, *, path: str = "/api/v1/stop", **headers: str) -> tuple[int, dict[str, str]]:
+    """Return status and answer of a STOP."""
+    status, _, body = ask(f"{url}{path}", data=b"", **headers)
+    return status, json.loads(body) if body.startswith(b"{") else {"words": body.decode()}
+
+
+def until(true: Callable[[], bool], seconds: float = 10.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def stop_processes(server: AppServer) -> list[int]:
+    with suppress(ValueError, OSError):
+        return [server.stop_process]
+    return []
+
+
+@contextmanager
+def silent_connections(url: str, number: int = SILENT) -> Iterator[None]:
+    """Hold ``number`` connections open that send nothing."""
+    port = int(url.rpartition(":")[2])
+    with ExitStack() as stack:
+        for _ in range(number):
+            each = stack.enter_context(socket.socket())
+            each.setblocking(False)
+            each.connect_ex(("127.0.0.1", port))
+        yield
+
+
+def test_stop_of_a_page_is_confirmed_and_named_like_on_the_main_port(server: AppServer) -> None:
+    async def act() -> None:
+        cookie, page = enter(server.url), page_name()
+        async with controlling(server.url, cookie, page) as control:
+            await control.wait(mood="ok")
+            path = f"/stop?press=one&page={page}"
+            status, headers, body = await asyncio.to_thread(
+                ask, f"{server.stop_url}{path}", data=b"", Cookie=cookie, Origin=server.url
+            )
+            assert (status, json.loads(body)["stop"]) == (200, "confirmed")
+            # The page may read the answer.
+            assert headers["access-control-allow-origin"] == server.url
+            assert headers["access-control-allow-credentials"] == "true"
+            shown = await control.wait(stop="confirmed")
+            assert shown["stopped"] == f"{shown['name']} pressed STOP."
+            assert abs(shown["stopped_at"] - time.time()) < 10.0
+            await control.clear_stop()
+            await control.say("release_lease")
+            await control.wait(holder=None)
+
+    asyncio.run(act())
+
+
+def test_page_learns_the_port_when_it_signs_in(server: AppServer) -> None:
+    port = server.stop_url.rpartition(":")[2]
+    _, headers, _ = ask(f"{server.url}/enter", data=b'{"token":""}', Origin=server.url)
+    assert headers["x-stop-port"] == port
+    _, headers, _ = ask(server.url)
+    assert f"connect-src 'self' {server.stop_url};" in headers["content-security-policy"]
+    # A page that came through a forwarded port cannot reach the other one.
+    forwarded = {"Host": "localhost:9000", "Origin": "http://localhost:9000"}
+    _, headers, _ = ask(f"{server.url}/enter", data=b'{"token":""}', **forwarded)
+    assert "x-stop-port" not in headers
+    _, headers, _ = ask(server.url, Host="localhost:9000")
+    assert "connect-src 'self';" in headers["content-security-policy"]
+
+
+def test_press_on_two_paths_counts_once_even_if_a_copy_is_late(
+    server: AppServer, program: Client
+) -> None:
+    copies = (server.url, server.stop_url)
+    for first, second in (copies, copies[::-1]):
+        query = f"?press={page_name()}"
+        before = program.query(answers.State).revocations
+        assert ask(f"{first}/api/v1/stop{query}", data=b"", X_Name="Vera")[0] in (200, 204)
+        until(lambda: program.query(answers.State).stop == "confirmed")
+        assert ask(f"{second}/api/v1/stop{query}", data=b"", X_Name="Vera")[0] in (200, 204)
+        state = program.query(answers.State)
+        assert (state.stopped, state.revocations) == ("Vera pressed STOP.", before + 1)
+        program.clear_stop()
+        # A late copy neither stops the arm again nor takes the motion away.
+        program.ask(requests.Speed(value=1.0))
+        program.ask(requests.Joints(q=THERE.tolist()))
+        for url in copies:
+            ask(f"{url}/api/v1/stop{query}", data=b"", X_Name="Vera")
+        time.sleep(0.2)
+        state = program.query(answers.State)
+        assert (state.stopped, state.moving) == (None, True)
+        program.go(requests.Home())
+
+
+def test_stop_voids_commands_of_before_and_names_the_presser(
+    server: AppServer, program: Client
+) -> None:
+    before = under_way(program)
+    assert stop(server.stop_url, X_Name="Vera")[0] == 200
+    state = program.query(answers.State)
+    until(lambda: program.query(answers.State).stopped is not None)
+    state = program.query(answers.State)
+    assert (state.stopped, state.revocations) == ("Vera pressed STOP.", before.revocations + 1)
+    assert state.stopped_at is not None
+    log = program.query(answers.EventLog)
+    line = next(each for each in log.lines[::-1] if each.finding.reason == "stopped")
+    assert (line.who, line.grounds) == ("Vera", "anybody may stop the arm")
+
+
+def test_unknown_senders_and_other_paths_are_refused(server: AppServer) -> None:
+    cookie, url = enter(server.url), server.stop_url
+    foreign = "http://127.0.0.1:1"
+    assert stop(url, path="/stop", Origin=server.url)[0] == 401
+    assert stop(url, path="/stop", Cookie=cookie)[0] == 403
+    assert stop(url, path="/stop", Cookie=cookie, Origin=foreign)[0] == 403
+    assert stop(url, Origin=foreign)[0] == 403
+    assert stop(url, Host="evil.example")[0] == 403
+    assert ask(f"{url}/api/v1/stop")[0] == 405
+    assert ask(f"{url}/api/v1/state")[0] == 404
+    assert ask(f"{url}/health")[::2] == (200, b"ok\n")
+    with socket.create_connection(("127.0.0.1", int(url.rpartition(":")[2])), 5.0) as raw:
+        raw.sendall(b"nonsense\r\n\r\n")
+        assert raw.recv(100).startswith(b"HTTP/1.1 400 ")
+    until(lambda: json.loads(ask(f"{server.url}/api/v1/state")[2])["stopped"] is None)
+
+
+def test_stop_with_a_body_or_without_reading_the_answer_counts(
+    server: AppServer, program: Client
+) -> None:
+    under_way(program)
+    with socket.create_connection(("127.0.0.1", int(server.stop_url.rpartition(":")[2]))) as raw:
+        # The sender is gone before the answer; its body never comes.
+        raw.sendall(b"POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\n")
+    until(lambda: program.query(answers.State).stop == "confirmed")
+
+
+@pytest.mark.parametrize("port", ["main", "stop"])
+def test_stop_is_confirmed_among_silent_connections(
+    server: AppServer, program: Client, port: str
+) -> None:
+    attacked = server.url if port == "main" else server.stop_url
+    with silent_connections(attacked):
+        for _ in range(3):
+            under_way(program)
+            assert stop(server.stop_url, X_Name="Vera") == (
+                200,
+                {"stop": "confirmed", "why": "Vera pressed STOP."},
+            )
+            program.clear_stop()
+            program.go(requests.Home())
+
+
+def test_stop_is_confirmed_while_the_front_end_is_frozen() -> None:
+    with AppServer(APP) as server, connect(server.url, "Driver") as program:
+        # The timeout of the front end is long, so that only STOP can stop the arm.
+        before = under_way(program)
+        with server.frozen(server.front):
+            assert stop(server.stop_url, X_Name="Vera")[0] == 200
+        until(lambda: program.query(answers.State).stop == "confirmed")
+        state = program.query(answers.State)
+        # The reason is the press, not the silence, because the press came first.
+        assert state.stopped == "Vera pressed STOP."
+        assert state.q[0] - before.q[0] < 1.5
+
+
+def test_stop_of_a_frozen_arm_is_requested_and_then_executed() -> None:
+    with AppServer(APP) as server, connect(server.url, "Driver") as program:
+        under_way(program)
+        with server.frozen(server.arm):
+            time.sleep(0.5)
+            assert stop(server.stop_url, X_Name="Vera") == (202, {"stop": "requested", "why": ""})
+            assert ask(f"{server.stop_url}/health")[0] == 503
+        until(lambda: program.query(answers.State).stop == "confirmed")
+
+
+def test_ended_stop_process_is_reported_and_restarted_while_the_arm_moves() -> None:
+    with AppServer(APP) as server, connect(server.url, "Driver") as program:
+        program.ask(requests.Speed(value=0.1))
+        program.ask(requests.Joints(q=THERE.tolist()))
+        killed = server.stop_process
+        os.kill(killed, signal.SIGKILL)
+        until(lambda: "is started again" in server.output)
+        until(lambda: stop_processes(server) not in ([], [killed]))
+        until(lambda: stop(server.stop_url, path="/health")[0] == 405)
+        assert program.query(answers.State).stopped is None
+        # A process that hangs is noticed, reported, ended and replaced.
+        hung = server.stop_process
+        os.kill(hung, signal.SIGSTOP)
+        until(lambda: ask(f"{server.url}/health")[0] == 503)
+        assert b"STOP is not served on port" in ask(f"{server.url}/health")[2]
+        until(lambda: ask(f"{server.url}/health")[0] == 200)
+        assert stop_processes(server) not in ([], [hung])
+        assert program.query(answers.State).stopped is None
+        assert stop(server.stop_url, X_Name="Vera")[0] == 200
+
+
+class ProxiedServer(AppServer):
+    """A server that prints the address of its proxy, at which nothing answers here."""
+
+    def __init__(self, public: str) -> None:
+        super().__init__((*APP, "--public-url", public))
+        self.local, self.url = self.url, public
+
+
+def test_page_behind_a_proxy_sends_stop_to_its_own_address() -> None:
+    public = "https://arm.example.org"
+    with ProxiedServer(public) as server:
+        data, of_page = b'{"token":""}', {"Host": "arm.example.org", "Origin": public}
+        status, headers, _ = ask(f"{server.local}/enter", data=data, **of_page)
+        assert status == 204
+        assert "x-stop-port" not in headers
+        cookie = headers["set-cookie"].partition(";")[0]
+        # The proxy passes the path on to the port of STOP.
+        stop_url = f"http://127.0.0.1:{server.stop_url.rpartition(':')[2]}"
+        status, answer = stop(stop_url, path="/stop", Cookie=cookie, **of_page)
+        assert (status, answer["stop"]) == (200, "confirmed")
+
+
+def test_stop_process_ends_with_the_process_of_the_arm() -> None:
+    with AppServer(APP) as server:
+        number = server.stop_process
+        os.kill(server.pid, signal.SIGKILL)
+        until(lambda: process_state(number) == "Z")
+
+
+def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> None:
+    path = tmp_path / "access.json"
+    links = AccessFile.create(path)
+    expires = time.time() + HOUR
+    viewer, other = (links.give(name, Role.VIEWER, expires) for name in ("Vera", "Otto"))
+    with AppServer((*APP, "--access", str(path))) as server:
+        assert stop(server.stop_url)[0] == 401
+        assert stop(server.stop_url, Authorization="Bearer wrong")[0] == 401
+        assert stop(server.stop_url, Authorization=f"Bearer {other}")[0] == 200
+        path.write_text("{")
+        status, answer = stop(server.stop_url, Authorization=f"Bearer {viewer}", X_Name="script")
+        assert (status, answer["stop"]) == (200, "confirmed")
+        cookie = enter(server.url, viewer)
+        assert stop(server.stop_url, path="/stop", Cookie=cookie, Origin=server.url)[0] == 200
+
+
+def test_flood_of_presses_delays_no_other_stop(server: AppServer, program: Client) -> None:
+    async def flood(done: asyncio.Event) -> None:
+        while not done.is_set():
+            await asyncio.to_thread(stop, server.stop_url, X_Name="Flooder")
+
+    async def act() -> None:
+        done = asyncio.Event()
+        floods = [asyncio.create_task(flood(done)) for _ in range(3)]
+        await asyncio.sleep(1.0)
+        for _ in range(5):
+            status, answer = await asyncio.to_thread(stop, server.stop_url, X_Name="Vera")
+            assert (status, answer["stop"]) == (200, "confirmed")
+        done.set()
+        await asyncio.gather(*floods)
+
+    under_way(program)
+    asyncio.run(act())
+
+
+def test_client_stops_on_all_paths_and_clears_when_possible(
+    server: AppServer, program: Client
+) -> None:
+    under_way(program)
+    assert program.welcome.stop_port == int(server.stop_url.rpartition(":")[2])
+    assert program.stop() == "confirmed"
+    state = program.query(answers.State)
+    assert (state.stopped, state.clearable) == ("Driver pressed STOP.", False)
+    with pytest.raises(Exception, match="Clear the stop"):
+        program.ask(requests.ClearStop())
+    program.clear_stop()
+    assert program.query(answers.State).stopped is None

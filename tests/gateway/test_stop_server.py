@@ -1,0 +1,142 @@
+"""Test the decisions of the server of STOP, without a socket and without an arm."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h11
+import pytest
+
+from katana450.arm.control.lease import Role
+from katana450.arm.control.stop_cause import StopCause, pressed
+from katana450.arm.runtime.stop_messages import StopPress, StopStatus
+from katana450.server.web import stop_server
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator
+from katana450.server.web.stop_server import BURST, NO_STATE, StopServer
+from tests.gateway.client import HOUR
+
+CLIENT = ("127.0.0.1", 5000)
+RUNS = StopStatus(None, ())
+STOPPED = StopStatus(pressed("Anna", "a", "one", 1.0), ("one",))
+
+
+class FakeLink:
+    """A link to an arm that executes no press."""
+
+    def __init__(self) -> None:
+        self.status: StopStatus | None = RUNS
+        self.age = 0.0
+        self.presses: list[StopPress] = []
+
+    def press(self, press: StopPress) -> None:
+        self.presses.append(press)
+
+    async def executed(self, press: str, timeout: float) -> StopCause | None:
+        assert (press, timeout) == (self.presses[-1].cause.press, stop_server.CONFIRM_TIMEOUT)
+        return None
+
+
+class Port:
+    """The server of STOP, with two viewers."""
+
+    def __init__(self, folder: Path, listening: socket.socket) -> None:
+        file = AccessFile.create(folder / "access.json")
+        self.vera, self.otto = (
+            file.give(name, Role.VIEWER, time.time() + HOUR) for name in ("Vera", "Otto")
+        )
+        address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
+        authenticator = Authenticator(file, 8080, address)
+        self.link = FakeLink()
+        self.server = StopServer(self.link, authenticator, address, 8080, Acceptor(listening))
+
+    async def stop(self, token: str, press: str = "two") -> tuple[int, str]:
+        """Return status and stage of a STOP, which is answered at once."""
+        headers = [("host", "localhost"), ("authorization", f"Bearer {token}")]
+        target = f"/api/v1/stop?press={press}"
+        request = h11.Request(method="POST", target=target, headers=headers)
+        async with asyncio.timeout(5.0):
+            reply = await self.server.reply(request, CLIENT)
+        stage: str = json.loads(reply.body)["stop"] if reply.status < 400 else ""
+        return reply.status, stage
+
+
+@pytest.fixture
+def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Port]:
+    # A delayed answer does not come during the test.
+    monkeypatch.setattr(stop_server, "DELAY", math.inf)
+    with socket.socket() as listening:
+        yield Port(tmp_path, listening)
+
+
+async def exhaust(port: Port, token: str) -> None:
+    """Send STOP as ``token`` until an answer is delayed."""
+    for _ in range(10 * round(BURST)):
+        press = asyncio.create_task(port.stop(token))
+        done, _ = await asyncio.wait([press], timeout=0.5)
+        if not done:
+            press.cancel()
+            return
+    raise AssertionError("No answer was delayed.")
+
+
+def test_flood_of_one_link_delays_no_press_of_another(port: Port) -> None:
+    async def act() -> None:
+        port.link.status = STOPPED
+        await exhaust(port, port.vera)
+        assert await port.stop(port.otto) == (200, "confirmed")
+
+    asyncio.run(act())
+
+
+def test_press_that_finds_the_arm_running_is_never_delayed(port: Port) -> None:
+    async def act() -> None:
+        port.link.status = STOPPED
+        await exhaust(port, port.vera)
+        port.link.status, sent = RUNS, len(port.link.presses)
+        assert await port.stop(port.vera, "three") == (202, "requested")
+        assert [each.cause.press for each in port.link.presses[sent:]] == ["three"]
+
+    asyncio.run(act())
+
+
+def test_old_status_confirms_nothing(port: Port) -> None:
+    async def act() -> None:
+        port.link.status, port.link.age = STOPPED, NO_STATE
+        assert await port.stop(port.vera) == (202, "requested")
+        port.link.age = 0.0
+        assert await port.stop(port.vera) == (200, "confirmed")
+
+    asyncio.run(act())
+
+
+def test_wrong_tokens_of_an_address_are_delayed_and_send_nothing(port: Port) -> None:
+    async def act() -> None:
+        assert await port.stop("wrong") == (401, "")
+        await exhaust(port, "wrong")
+        assert port.link.presses == []
+        # They do not use up the rate of a link.
+        assert await port.stop(port.vera) == (202, "requested")
+
+    asyncio.run(act())
+
+
+def test_number_of_counted_clients_is_bounded(port: Port, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stop_server, "MAX_CLIENTS", 1)
+
+    async def act() -> None:
+        port.link.status = STOPPED
+        await exhaust(port, port.vera)
+        assert await port.stop(port.otto) == (200, "confirmed")
+        assert list(port.server._often) == [
+            each.actor.key for each in port.link.presses if each.cause.by == "Otto, Program"
+        ]
+
+    asyncio.run(act())
