@@ -34,7 +34,7 @@ from katana450.assembly.supervised import (
 from katana450.errors import ConfigurationError, KatanaError
 
 TURN = 0.05
-"""[s] Interval at which signals and messages are read; the end of a process wakes earlier."""
+"""[s] Interval at which signals and silence are checked; the end of a process wakes earlier."""
 
 START_SECONDS = 60.0
 """[s] Timeout for a process to be ready."""
@@ -51,6 +51,9 @@ RESTART_DELAYS = (0.0, 0.0, 0.0, 1.0, 5.0, 15.0)
 STABLE_SECONDS = 5.0
 """[s] A process that was ready for a longer time did not end early."""
 
+READ_SECONDS = 1.0
+"""[s] Timeout for reading the last messages of a process that has ended."""
+
 RETRY_SECONDS = 1.0
 """[s] Delay after the system refused to start a process."""
 
@@ -61,7 +64,7 @@ what ends it."""
 log = logging.getLogger(__name__)
 
 Kept = dict[bytes, bytes]
-"""The last known state of the arm, by the kinds KEPT and SCENE; None of it is read here."""
+"""The last known state of the arm, by the kinds KEPT and SCENE, which is not read here."""
 
 Work = Callable[[SupervisorLink], None]
 
@@ -119,23 +122,29 @@ class Child:
         self._first, self.due, self._ready_at, self.error = False, None, None, None
         self._started = self._heard = time.monotonic()
         self.statuses.clear()
+        self._reader = threading.Thread(target=self._read, args=(self._pipe,), daemon=True)
+        self._reader.start()
 
     @property
     def running(self) -> bool:
         """True while the process runs."""
         return self.due is None and self.process.is_alive()
 
-    def read(self) -> None:
-        """Read all messages of the process."""
+    def _read(self, pipe: Connection) -> None:
+        """Read all messages of the process, in a thread: half a message must not block others."""
         with suppress(EOFError, OSError):
-            while self._pipe.poll():
-                message = self._pipe.recv_bytes()
+            while True:
+                message = pipe.recv_bytes()
                 self._heard = time.monotonic()
                 kind, content = message[:1], message[1:]
                 if kind in (KEPT, SCENE):
                     self.kept[kind] = content
                 elif kind == REPORT:
                     self._note(pickle.loads(content))
+
+    def collect(self) -> None:
+        """Wait for the last messages of a process that has ended."""
+        self._reader.join(READ_SECONDS)
 
     def _note(self, report: str | KatanaError) -> None:
         if isinstance(report, KatanaError):
@@ -178,6 +187,7 @@ class Child:
     def ended(self) -> float:
         """Note the end of the process; return the delay until the next start [s]."""
         self.process.join()
+        self.collect()
         self._pipe.close()
         stable = self._ready_at is not None and time.monotonic() - self._ready_at > STABLE_SECONDS
         self._early_ends = 0 if stable else self._early_ends + 1
@@ -229,7 +239,8 @@ class Supervisor:
             self._wait()
             for child in self._children.values():
                 alive = child.running
-                child.read()
+                if not alive:
+                    child.collect()
                 if child.error is not None:
                     raise child.error
                 if not alive or child.hangs is not None:
@@ -269,17 +280,14 @@ class Supervisor:
                 self._start(child)
             return
         alive = child.running
-        child.read()
         if alive and (why := child.hangs) is not None:
             log.error("%s %s and is ended.", child.spec.title, why)
             child.process.kill()
-            child.process.join()
-            child.read()
             alive = False
         if not alive:
+            delay = child.ended()
             code = child.process.exitcode
             error = "" if child.error is None else f" {child.error}"
-            delay = child.ended()
             when = f" in {delay:g} s" if delay else ""
             text = f"{child.spec.title} ended with status {code} and is started again{when}."
             log.error("%s%s", text, error)
