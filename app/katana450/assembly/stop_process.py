@@ -141,7 +141,15 @@ async def _serve(config: StopConfig, pipe: Connection, pulses: Connection) -> No
     tls = tls_context(settings)
     raise_descriptor_limit()
     ended = asyncio.Event()
-    link = StopLink(pipe, ended.set)
+    pipes = iter((pipe,))
+
+    def connect() -> Connection:
+        for each in pipes:
+            return each
+        # The arm's process has ended.
+        raise EOFError
+
+    link = StopLink(connect, ended.set)
     acceptor = Acceptor(listening)
     authenticator = Authenticator(access, config.main_port, address)
     server = StopServer(link, authenticator, address, config.main_port, acceptor)
