@@ -58,7 +58,9 @@ async def _serve(config: StopConfig, supervisor: SupervisorLink) -> None:
     access = access_file(settings, listening)
     tls = tls_context(settings)
     raise_descriptor_limit()
-    link = StopLink(lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended))
+    link = StopLink(
+        lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended), lambda: None
+    )
     acceptor = Acceptor(listening)
     authenticator = Authenticator(access, config.main_port, address)
     server = StopServer(link, authenticator, address, config.main_port, acceptor)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -13,27 +14,33 @@ from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.runtime.readiness import writable
 from katana450.arm.runtime.stop_messages import StopPress, StopStatus
 
+MAX_UNSENT = 16
+"""Number of presses that are kept while there is no connection; one stops the arm."""
+
 
 class StopLink:
     """Sends presses of STOP to the arm's process and holds the newest answer.
 
-    It belongs to the event loop in which it is created. A thread of its own reads the pipe, and
-    connects again when the arm's process was started again.
+    It belongs to the event loop in which it is created; a thread of its own reads the pipe.
     """
 
-    def __init__(self, connect: Callable[[], Connection]) -> None:
-        """Connect from now on.
+    def __init__(self, connect: Callable[[], Connection], on_end: Callable[[], None]) -> None:
+        """Connect and read from now on.
 
-        ``connect``: waits for the arm's process and returns a pipe to it; raises EOFError at the
-        end of this process.
+        Args:
+            connect: returns a connection to the arm's process, also after one was cut; raises
+                EOFError if there will be no further one. Called in the thread.
+            on_end: called after that.
         """
         self._connect = connect
+        self._on_end = on_end
         self._pipe: Connection | None = None
+        self._unsent: deque[StopPress] = deque(maxlen=MAX_UNSENT)
         self._loop = asyncio.get_running_loop()
         self._heard = time.monotonic()
         self._changed = asyncio.Event()
         self.status: StopStatus | None = None
-        """The newest status; None before the arm is ready."""
+        """The newest status; None while there is no connection to the arm."""
         threading.Thread(target=self._listen, name="stop link", daemon=True).start()
 
     @property
@@ -42,13 +49,17 @@ class StopLink:
         return time.monotonic() - self._heard
 
     def press(self, press: StopPress) -> None:
-        """Send ``press``. A pipe that is full, with earlier presses, does not block."""
-        pipe = self._pipe
-        if pipe is None:
-            return
-        with suppress(OSError):
-            if writable(pipe.fileno()):
-                pipe.send(press)
+        """Send ``press``, or keep it for the next connection.
+
+        A pipe that is full, with earlier presses, does not block.
+        """
+        try:
+            if self._pipe is None:
+                self._unsent.append(press)
+            elif writable(self._pipe.fileno()):
+                self._pipe.send(press)
+        except OSError:
+            self._unsent.append(press)
 
     async def executed(self, press: str, timeout: float) -> StopCause | None:
         """Return the cause of the stop once a state includes ``press``; None after ``timeout`` [s].
@@ -68,16 +79,26 @@ class StopLink:
     def _listen(self) -> None:
         with suppress(EOFError):
             while True:
-                self._pipe = self._connect()
+                pipe = self._connect()
+                self._call(self._attach, pipe)
                 with suppress(EOFError, OSError):
                     while True:
-                        self._call(self._take, self._pipe.recv())
-                self._pipe = None
+                        self._call(self._take, pipe.recv())
+                self._call(self._attach, None)
+        self._call(self._on_end)
 
     def _call(self, act: Callable[..., None], *values: object) -> None:
         # The event loop is closed when the process ends.
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(act, *values)
+
+    def _attach(self, pipe: Connection | None) -> None:
+        """Use the new connection ``pipe``; None once it is cut."""
+        self._pipe, self.status = pipe, None
+        if pipe is not None:
+            unsent, self._unsent = self._unsent, deque(maxlen=MAX_UNSENT)
+            for press in unsent:
+                self.press(press)
 
     def _take(self, status: StopStatus) -> None:
         self._heard = time.monotonic()

@@ -1,0 +1,120 @@
+"""The two ends of the pipe of STOP: one in the process of STOP, one with a real control loop."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import os
+import queue
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+
+import pytest
+
+from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.session import Session
+from katana450.arm.control.stop_cause import pressed
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.stop_end import StopEnd
+from katana450.arm.runtime.stop_link import StopLink
+from katana450.arm.runtime.stop_messages import StopPress
+
+TIMEOUT = 5.0
+
+
+def press(name: str) -> StopPress:
+    person = Person("v", "Vera", Role.VIEWER)
+    return StopPress(pressed("Vera", "v", name, 1.0), Actor(person, CommandChannel.API))
+
+
+def connected(link: StopLink) -> bool:
+    return link.status is not None
+
+
+def _next(pipes: Iterator[Connection]) -> Connection:
+    for pipe in pipes:
+        return pipe
+    raise EOFError
+
+
+@contextmanager
+def arm_end(arm: ArmModel, session: Session) -> Iterator[Connection]:
+    """Run an arm; yield the far end of its pipe, which is cut afterwards."""
+    mailbox = Mailbox(session.check)
+    driver = SimulatedDriver(arm, session.ready, 0.0)
+    loop = ControlLoop(session, driver, mailbox, MonotonicClock(), 100.0)
+    ours, theirs = multiprocessing.Pipe()
+    end = StopEnd(ours, loop, mailbox)
+    loop.start()
+    end.start()
+    yield theirs
+    end.close()
+    # Closing alone does not wake the thread that reads.
+    with socket.socket(fileno=os.dup(ours.fileno())) as line:
+        line.shutdown(socket.SHUT_RDWR)
+    loop.stop()
+
+
+def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
+    arm: ArmModel, session: Session
+) -> None:
+    pipes: queue.Queue[Connection | None] = queue.Queue()
+
+    def connect() -> Connection:
+        pipe = pipes.get()
+        if pipe is None:
+            raise EOFError
+        return pipe
+
+    async def act() -> None:
+        ended = asyncio.Event()
+        link = StopLink(connect, ended.set)
+        # Before the arm is there.
+        link.press(press("one"))
+        assert await link.executed("one", 0.1) is None
+        with arm_end(arm, session) as first:
+            pipes.put(first)
+            assert await link.executed("one", TIMEOUT) == press("one").cause
+            # The cause stays that of the first press.
+            link.press(press("two"))
+            assert await link.executed("two", TIMEOUT) == press("one").cause
+            assert link.status is not None
+            assert link.status.presses == ("one", "two")
+            assert link.age < TIMEOUT
+        first.close()
+        async with asyncio.timeout(TIMEOUT):
+            while connected(link):
+                await asyncio.sleep(0.01)
+        link.press(press("three"))
+        with arm_end(arm, session) as second:
+            pipes.put(second)
+            assert await link.executed("three", TIMEOUT) == press("three").cause
+        second.close()
+        pipes.put(None)
+        async with asyncio.timeout(TIMEOUT):
+            await ended.wait()
+
+    asyncio.run(act())
+
+
+@pytest.mark.parametrize("name", ["one", "two"])
+def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
+    arm: ArmModel, session: Session, name: str
+) -> None:
+    async def act() -> None:
+        with arm_end(arm, session) as pipe:
+            pipes = iter((pipe,))
+            link = StopLink(lambda: _next(pipes), lambda: None)
+            link.press(press("one"))
+            found = await link.executed(name, TIMEOUT if name == "one" else 0.3)
+            assert (found is not None) == (name == "one")
+        pipe.close()
+
+    asyncio.run(act())
