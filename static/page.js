@@ -6,9 +6,7 @@
   const QUIET = 1000; // ms without a message after which a connection counts as bad
   const ANSWER = 250; // ms without an answer after which a STOP is also sent over HTTP
   const TOAST = 4000; // ms
-  const KEPT_OUT = 403; // status of a sign-in of somebody whom an admin has disconnected
   const SIGN_IN = 4401; // close code: the page has to sign in again
-  const MUTED = 429; // status of a STOP that does not count
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
@@ -30,6 +28,7 @@
   let trip = null;
   let asking = null;
   let press = null;
+  let people = null;
 
   // A reloaded page keeps its name; a second tab gets another.
   function name() {
@@ -64,14 +63,14 @@
     fetch(`stop?press=${press}&page=${page}`, { method: "POST", keepalive: true }).then(
       async (answer) => {
         if (answer.ok) stopped();
-        else if (answer.status === MUTED) notCounted(await answer.text());
+        else if (answer.status === 429) notCounted(await answer.text());
       },
       () => {},
     );
     asking = setTimeout(insist, 2 * ANSWER);
   }
 
-  // A press of a muted person that does not count is not sent again.
+  // The person is muted; the press is not sent again.
   function notCounted(why) {
     stopped();
     toast(why);
@@ -95,7 +94,7 @@
     const ends = event.key === " " || event.key === "Escape";
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
-      if (event.key === "Escape" && event.type === "keydown") for (const id of ["help", "people"]) byId(id).close();
+      if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();
     } else if (typing(event.target) || !Jog.key(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
@@ -175,8 +174,8 @@
     const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
     // Programs are included.
-    const connected = windows > 1 && status.role !== "admin" ? `, ${windows} connected` : "";
-    People.draw(status);
+    const connected = windows > 1 ? `, ${windows} connected` : "";
+    byId("people-help").hidden = status.role !== "admin";
     text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
     const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
     if (key !== drawnActs) {
@@ -249,7 +248,7 @@
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
-    else if (data.heard?.is === "people") People.heard(data.heard);
+    else if (data.heard?.is === "people") people.heard(data.heard);
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
@@ -290,7 +289,12 @@
   });
   Jog.begin({ say, stop });
   Objects.begin({ say });
-  People.begin({ say });
+  // Who is connected, for admins; loaded on first use.
+  byId("people-button").addEventListener("click", async () => {
+    help.close();
+    people ??= new (await import("./people/people.js")).People(say);
+    people.show();
+  });
 
   // The instruments, which are loaded on first use
 
@@ -329,8 +333,8 @@
     if (token) history.replaceState(null, "", location.pathname + location.search);
     const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
     byId("gate").hidden = answer.ok;
-    const because = token || answer.status === KEPT_OUT;
-    if (because && !answer.ok) byId("gate-why").textContent = await answer.text();
+    // 403: an admin has disconnected this person.
+    if (answer.status === 403 || (token && !answer.ok)) byId("gate-why").textContent = await answer.text();
     return answer.ok;
   }
 
