@@ -6,9 +6,7 @@
   const QUIET = 300; // ms without a message, of which ten come a second, from which the state of the arm counts as unknown
   const ANSWER = 500; // ms without an answer after which a STOP is sent again over HTTP
   const TOAST = 4000; // ms
-  const KEPT_OUT = 403; // status of a sign-in of somebody whom an admin has disconnected
   const SIGN_IN = 4401; // close code: the page has to sign in again
-  const MUTED = 429; // status of a STOP that does not count
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
   const SIMULATION =
@@ -34,6 +32,7 @@
   let press = null;
   let stopPort = null; // port of this host that serves STOP alone
   let proven = null; // cause of the stop that the arm has confirmed on another path
+  let people = null;
 
   // A reloaded page keeps its name; a second tab gets another.
   function name() {
@@ -78,7 +77,7 @@
       const query = `press=${sent}&page=${page}`;
       const answer = await fetch(`${path}stop?${query}`, { method: "POST", keepalive: true, credentials: "include" });
       if (sent !== press) return;
-      if (answer.status === MUTED) return notCounted(await answer.text());
+      if (answer.status === 429) return notCounted(await answer.text());
       if (!answer.ok) return;
       const { stop: stage, why } = answer.status === 204 ? {} : await answer.json();
       if (stage === "confirmed" && status?.stop !== "confirmed") proven = why;
@@ -88,13 +87,7 @@
     }
   }
 
-  // A press of a muted person that does not count is not sent again.
-  function notCounted(why) {
-    stopped();
-    toast(why);
-  }
-
-  // A press of a muted person that does not count is not sent again.
+  // The person is muted; the press is not sent again.
   function notCounted(why) {
     stopped();
     toast(why);
@@ -119,7 +112,7 @@
     const ends = event.key === " " || event.key === "Escape";
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
-      if (event.key === "Escape" && event.type === "keydown") for (const id of ["help", "people"]) byId(id).close();
+      if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();
     } else if (typing(event.target) || !Jog.key(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
@@ -207,8 +200,8 @@
     const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
     // Programs are included.
-    const connected = windows > 1 && status.role !== "admin" ? `, ${windows} connected` : "";
-    People.draw(status);
+    const connected = windows > 1 ? `, ${windows} connected` : "";
+    byId("people-help").hidden = status.role !== "admin";
     text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
     const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
     if (key !== drawnActs) {
@@ -282,7 +275,7 @@
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
-    else if (data.heard?.is === "people") People.heard(data.heard);
+    else if (data.heard?.is === "people") people.heard(data.heard);
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
@@ -324,7 +317,12 @@
   });
   Jog.begin({ say, stop });
   Objects.begin({ say });
-  People.begin({ say });
+  // Who is connected, for admins; loaded on first use.
+  byId("people-button").addEventListener("click", async () => {
+    help.close();
+    people ??= new (await import("./people/people.js")).People(say);
+    people.show();
+  });
 
   // The instruments, which are loaded on first use
 
@@ -364,8 +362,8 @@
     const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
     stopPort = answer.headers.get("X-Stop-Port") ?? stopPort;
     byId("gate").hidden = answer.ok;
-    const because = token || answer.status === KEPT_OUT;
-    if (because && !answer.ok) byId("gate-why").textContent = await answer.text();
+    // 403: an admin has disconnected this person.
+    if (answer.status === 403 || (token && !answer.ok)) byId("gate-why").textContent = await answer.text();
     return answer.ok;
   }
 

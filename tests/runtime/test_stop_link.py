@@ -31,7 +31,7 @@ TIMEOUT = 5.0
 
 def press(name: str) -> StopPress:
     person = Person("v", "Vera", Role.VIEWER)
-    return StopPress(pressed("Vera", "v", name, 1.0), Actor(person, CommandChannel.API))
+    return StopPress(pressed("Vera", "v", name, 1.0), Actor(person, CommandChannel.HTTP))
 
 
 def connected(link: StopLink) -> bool:

@@ -1,0 +1,131 @@
+// Who is connected, for admins: a list with buttons that mute and disconnect.
+const EVERY = 1000; // ms between two queries while the list is open
+const KINDS = { page: "page", scene: "scene", program: "program", lines: "TCP", posts: "HTTP" };
+const CONTENT = `
+  <form method="dialog"><h1 id="people-title">Who is connected</h1><button class="main" autofocus>Close</button></form>
+  <p id="people-for"><label>Disconnect for <select id="kick-for">
+    <option value="60">1 minute</option><option value="600">10 minutes</option><option value="3600">1 hour</option>
+    <option value="revoke">ever: revoke the link</option>
+  </select></label></p>
+  <ul id="people-list"></ul>
+  <p id="people-note">A muted person can still stop the arm, once in 10 s. A disconnected one can too, from a page that is open. STOP of the driver and of admins always counts.</p>
+`;
+/** @type {(id: string) => any} */
+const byId = (id) => document.getElementById(id);
+
+const time = (since) => new Date(since).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+
+// "2 pages, scene, TCP": the kinds of connections with their numbers.
+function connections(all) {
+  const kinds = Object.keys(KINDS).map((kind) => [kind, all.filter((each) => each.kind === kind).length]);
+  const words = kinds.filter(([, count]) => count);
+  return words.map(([kind, count]) => (count > 1 ? `${count} × ${KINDS[kind]}` : KINDS[kind])).join(", ");
+}
+
+function about(person) {
+  const { role, drives, asks, program, connections: all, refused, muted, kept_out: out, link } = person;
+  const addresses = [...new Set(all.map(({ address }) => address))].join(", ");
+  return [
+    role,
+    drives && (program ? `runs ${program}` : "drives"),
+    asks && "asks for the arm",
+    all.length > 0 && `${connections(all)} from ${addresses} since ${time(all[0].since)}`,
+    link && `link ${link.slice(0, 6)}`,
+    refused > 0 && `${refused} refused`,
+    muted !== null && `muted, one STOP in ${muted} s`,
+    out !== null && `disconnected for ${Math.ceil(out / 60)} min`,
+  ].filter(Boolean).join(" · ");
+}
+
+export class People {
+  // The dialog is below the bar and not modal, so that mouse and finger can press STOP.
+  constructor(say) {
+    this.say = say;
+    this.timer = null;
+    this.drawn = "";
+    const style = document.createElement("link");
+    style.rel = "stylesheet";
+    style.href = new URL("people.css", import.meta.url).href;
+    document.head.append(style);
+    this.dialog = document.createElement("dialog");
+    this.dialog.id = "people";
+    this.dialog.setAttribute("aria-labelledby", "people-title");
+    this.dialog.innerHTML = CONTENT;
+    document.querySelector("main").append(this.dialog);
+    this.dialog.addEventListener("close", () => {
+      clearInterval(this.timer);
+      byId("help-button").focus();
+    });
+  }
+
+  show() {
+    this.drawn = "";
+    this.dialog.show();
+    this.look();
+    this.timer = setInterval(() => this.look(), EVERY);
+  }
+
+  look() {
+    this.say({ do: "list_people" });
+  }
+
+  // `key` stays the same while the label changes, so that the focus finds the button again.
+  button(key, label, name, act) {
+    const made = document.createElement("button");
+    made.type = "button";
+    made.textContent = label;
+    made.setAttribute("aria-label", `${label} ${name}`);
+    made.dataset.key = key;
+    made.addEventListener("click", () => {
+      act();
+      this.look();
+    });
+    return made;
+  }
+
+  kick(person) {
+    const { value } = byId("kick-for");
+    if (value === "revoke") this.say({ do: "kick", person, revoke: true });
+    else this.say({ do: "kick", person, seconds: Number(value) });
+  }
+
+  row(each) {
+    const { person, name, role, you, muted, kept_out: out } = each;
+    const item = document.createElement("li");
+    const title = document.createElement("b");
+    title.textContent = you ? `${name} (you)` : name;
+    const line = document.createElement("span");
+    line.textContent = about(each);
+    const acts = document.createElement("div");
+    const add = (key, label, act) => acts.append(this.button(`${key} ${person}`, label, name, act));
+    if (role !== "admin" && muted === null) add("mute", "Mute", () => this.say({ do: "mute", person }));
+    if (muted !== null) add("mute", "Unmute", () => this.say({ do: "unmute", person }));
+    if (out !== null) add("kick", "Let in", () => this.say({ do: "kick", person, seconds: 0 }));
+    else if (!you) add("kick", "Disconnect", () => this.kick(person));
+    item.append(title, acts, line);
+    return item;
+  }
+
+  heard({ people }) {
+    const parts = (each) => [each.person, each.name, each.role, each.muted === null, each.kept_out === null];
+    const key = JSON.stringify(people.map(parts));
+    // Buttons are not replaced while they may be pressed.
+    if (key === this.drawn) {
+      const lines = byId("people-list").querySelectorAll("span");
+      people.forEach((each, number) => (lines[number].textContent = about(each)));
+      return;
+    }
+    this.drawn = key;
+    /** @type {HTMLElement | null} */
+    const focused = document.activeElement?.closest("#people-list button");
+    const kept = focused?.dataset.key;
+    byId("people-list").replaceChildren(...people.map((each) => this.row(each)));
+    byId("people-for").hidden = people.length < 2;
+    byId("kick-for").options[3].hidden = people.every(({ link }) => link === null);
+    byId("people-note").hidden = people.every(({ role }) => role === "admin");
+    // The focus stays on its button, although the list is drawn again.
+    /** @type {HTMLElement[]} */
+    const buttons = [...byId("people-list").querySelectorAll("button")];
+    if (kept) (buttons.find((each) => each.dataset.key === kept) ?? this.dialog.querySelector("button")).focus();
+  }
+}
