@@ -9,6 +9,7 @@
   const SIGN_IN = 4401; // close code: the page has to sign in again
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
+  const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
   /** @type {(id: string) => any} */
@@ -85,9 +86,16 @@
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
       if (byId("help").open && event.key === "Escape" && event.type === "keydown") byId("help").close();
+    } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
+      if (!event.repeat) say({ do: "go" });
     } else if (typing(event.target) || !Jog.key(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
+  }
+
+  // Whether this window may take the detour that the arm offers.
+  function mayGo() {
+    return up && status?.detour && status.role !== "viewer" && (status.mine || status.holder === null);
   }
 
   function typing(target) {
@@ -158,6 +166,7 @@
     // A press is complete when the arm's state shows the stop.
     stopButton.classList.toggle("asked", asking !== null || status.stop === "requested");
     byId("objects-button").hidden = status.role === "viewer";
+    byId("go").hidden = !mayGo();
     byId("clear-stop").hidden = !status.stopped || !status.may_clear_stop;
     const { mine, holder, windows, asking: requests } = status;
     const names = requests.map(({ name }) => name).join(", ");
@@ -187,6 +196,7 @@
   function unknown() {
     if (!status) return;
     body.dataset.mood = "starting";
+    byId("go").hidden = true;
     text("headline", "No connection");
     text("why", "");
   }
@@ -249,6 +259,7 @@
 
   // The rest of the bar
 
+  byId("go").addEventListener("click", () => say({ do: "go" }));
   byId("clear-stop").addEventListener("click", () => say({ do: "clear_stop" }));
   // Below the bar and not modal, so that mouse and finger can press STOP.
   const [help, helpButton] = [byId("help"), byId("help-button")];

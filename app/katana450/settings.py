@@ -28,6 +28,7 @@ class Settings:
         public_url: URL that people enter when the server is behind a reverse proxy.
         lines: TCP port of this machine for programs that send JSON lines; None for no such port.
         bare: whether the arm has no gripper.
+        go_on_release: whether the arm takes a detour that it offers when a drag ends, without Go.
     """
 
     host: str = "127.0.0.1"
@@ -43,3 +44,4 @@ class Settings:
     public_url: str | None = None
     lines: int | None = None
     bare: bool = False
+    go_on_release: bool = False

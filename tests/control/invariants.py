@@ -271,6 +271,8 @@ class JointRules(RuleBasedStateMachine):
         (command,) = commands
         again = isinstance(command, cmd.Stop) and before.stopped is not None
         elsewhere = isinstance(command, cmd.Follow) and not isinstance(after.mode, Following)
+        # What it follows is part of the mode.
+        elsewhere |= isinstance(command, cmd.Go)
         if again or elsewhere or effect_of(command, before) is not Effect.SUPERSEDES:
             return
         plain = replace(before, mode=Positioning(before.target))

@@ -54,6 +54,7 @@ def serve_with(options: Namespace) -> int:
         public_url=options.public_url,
         lines=options.lines,
         bare=options.bare,
+        go_on_release=options.go_on_release,
     )
     # The options are sent to another process, which does not need the command itself.
     values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})

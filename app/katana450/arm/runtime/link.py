@@ -153,7 +153,7 @@ class ArmEnd:
             self._mailbox.put(cmd.Stop())
 
     def _put(self, message: CommandMessage) -> None:
-        if isinstance(message.command, cmd.Follow):
+        if isinstance(message.command, cmd.Follow | cmd.OfferDetour):
             self._names.note(message.number, message.command.plan)
         with self._numbering:
             try:
@@ -302,7 +302,7 @@ class FrontEnd:
                     f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
                 )
             self._number += 1
-            if isinstance(command, cmd.Follow):
+            if isinstance(command, cmd.Follow | cmd.OfferDetour):
                 self._plans.note(self._number, command.plan)
             self._unsent.append(CommandMessage(self._number, command, actor))
             self._flush()

@@ -23,6 +23,7 @@ from katana450.server.service.object_requests import ObjectRequests
 
 COMMANDS: dict[type[requests.Request], cmd.Command] = {
     requests.EndDrag: cmd.EndDrag(),
+    requests.Go: cmd.Go(),
     requests.Home: cmd.Home(),
     requests.GoToZero: cmd.GoToZero(),
     requests.Hold: cmd.Hold(),

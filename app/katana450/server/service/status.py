@@ -54,6 +54,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "stop": None if stopped is None else stopped.stage,
         "stopped": None if stopped is None else stopped.why,
         "holder": None if holder is None else holder.name,
+        "detour": state is not None and state.detour is not None and age is None,
         "speed": 1.0 if state is None else state.speed,
         "windows": len(hub.windows),
     }

@@ -1,0 +1,110 @@
+"""Planning of detours in a thread of its own, while the hand rests at a gap or has let go."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import JointTarget
+from katana450.arm.control.plans import detour_from
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.runtime.planning_worker import PlanningWorker
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.errors import CancelledError, KatanaError
+from katana450.maths.planning.checkpoint import checked_by
+
+log = logging.getLogger(__name__)
+
+SETTLE_TIME = 0.15
+"""[s] Time without a new state after which the hand rests."""
+
+WAKE_INTERVAL = 0.5
+"""[s] Interval at which the end of the thread is checked."""
+
+
+class DetourPlanner:
+    """Offers a detour wherever a drag ended at a gap that a clear path on its branch leads round.
+
+    The session withdraws the offer when anything changes; then a new one is planned.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        state_publisher: StatePublisher,
+        arm: PlanningWorker,
+        *,
+        go_on_release: bool = False,
+    ) -> None:
+        """Prepare the thread.
+
+        Args:
+            session: the rules of the arm.
+            state_publisher: the source of states.
+            arm: the sink of commands.
+            go_on_release: whether the detour of a drag that has ended is followed at once.
+        """
+        self._session = session
+        self._state_publisher = state_publisher
+        self._arm = arm
+        self._go_on_release = go_on_release
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="detours", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._stopping.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        seen = self._state_publisher.snapshot
+        while not self._stopping.is_set():
+            wanted = _wants_detour(seen.state)
+            new = self._state_publisher.wait_for_change(
+                seen, SETTLE_TIME if wanted else WAKE_INTERVAL
+            )
+            if new is seen and wanted:
+                self._offer(seen)
+                # Planned at most once for each state.
+                new = self._changed(seen)
+            seen = new
+
+    def _changed(self, seen: Snapshot) -> Snapshot:
+        """Return the next snapshot after ``seen``, or ``seen`` when the thread ends."""
+        new = seen
+        while new is seen and not self._stopping.is_set():
+            new = self._state_publisher.wait_for_change(seen, WAKE_INTERVAL)
+        return new
+
+    def _offer(self, seen: Snapshot) -> None:
+        """Plan the detour of ``seen`` and offer it."""
+
+        def check() -> None:
+            if self._stopping.is_set() or self._state_publisher.snapshot is not seen:
+                raise CancelledError("The state of the arm has changed.")
+
+        state, actor = seen.state, self._arm.newest_actor
+        try:
+            with checked_by(check):
+                world = self._session.world_at(state)
+                plan = detour_from(self._session.require_arm(), world, state)
+                check()
+            self._arm.deliver(cmd.OfferDetour(plan), actor)
+            if self._go_on_release and isinstance(state.target, JointTarget):
+                self._arm.deliver(cmd.Go(), actor)
+        except KatanaError as error:
+            log.debug("No detour: %s", error)
+        except Exception:
+            log.exception("The planning of a detour failed.")
+
+
+def _wants_detour(state: State) -> bool:
+    """Return whether ``state`` rests at a gap without an offer."""
+    resting = not (state.moving or state.paused or state.blocked)
+    return resting and state.beyond_gap is not None and state.detour is None
