@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from katana450.cli.access_options import add_access_options
+from katana450.cli.go_options import add_go_options
 from katana450.cli.lines_options import add_fk_options, add_ik_options
 from katana450.cli.serve_options import add_serve_options
 from katana450.extension import CliCommand
@@ -43,8 +44,17 @@ def _access(options: Namespace) -> int:
     return access(options)
 
 
+def _go(options: Namespace) -> int:
+    from katana450.cli.go import go
+
+    return go(options)
+
+
 CORE_COMMANDS = (
     CliCommand("serve", "start the app and print its address", add_serve_options, _serve),
+    CliCommand(
+        "go", "move the tool on a running server, by a detour if necessary", add_go_options, _go
+    ),
     CliCommand(
         "fk",
         "JSON lines from stdin to stdout, joints to poses: "

@@ -65,6 +65,10 @@ class DetourPlanner:
     def _run(self) -> None:
         seen = self._state_publisher.snapshot
         while not self._stopping.is_set():
+            if self._go_on_release and _may_go(seen.state):
+                self._deliver(cmd.Go())
+                seen = self._changed(seen)
+                continue
             wanted = _wants_detour(seen.state)
             new = self._state_publisher.wait_for_change(
                 seen, SETTLE_TIME if wanted else WAKE_INTERVAL
@@ -89,22 +93,33 @@ class DetourPlanner:
             if self._stopping.is_set() or self._state_publisher.snapshot is not seen:
                 raise CancelledError("The state of the arm has changed.")
 
-        state, actor = seen.state, self._arm.newest_actor
+        state = seen.state
         try:
             with checked_by(check):
                 world = self._session.world_at(state)
                 plan = detour_from(self._session.require_arm(), world, state)
                 check()
-            self._arm.deliver(cmd.OfferDetour(plan), actor)
-            if self._go_on_release and isinstance(state.target, JointTarget):
-                self._arm.deliver(cmd.Go(), actor)
         except KatanaError as error:
             log.debug("No detour: %s", error)
         except Exception:
             log.exception("The planning of a detour failed.")
+        else:
+            self._deliver(cmd.OfferDetour(plan))
+
+    def _deliver(self, command: cmd.Command) -> None:
+        """Send ``command`` in the name of the actor of the drag; the session may refuse it."""
+        try:
+            self._arm.deliver(command, self._arm.newest_actor)
+        except KatanaError as error:
+            log.debug("No detour: %s", error)
 
 
 def _wants_detour(state: State) -> bool:
     """Return whether ``state`` rests at a gap without an offer."""
     resting = not (state.moving or state.paused or state.blocked)
     return resting and state.beyond_gap is not None and state.detour is None
+
+
+def _may_go(state: State) -> bool:
+    """Return whether ``state`` has a detour on offer after the end of its drag."""
+    return state.detour is not None and isinstance(state.target, JointTarget)
