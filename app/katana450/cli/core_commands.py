@@ -29,11 +29,16 @@ def _fk(options: Namespace) -> int:
 
 def _ik(options: Namespace) -> int:
     from katana450.cli.lines import Kinematics, answer_lines
+    from katana450.maths.kinematics.priority import Priority
 
-    in_base_frame, all_metrics = options.frame == "base", options.metrics
     return answer_lines(
         Kinematics(
-            options.urdf, options.tool, in_base_frame=in_base_frame, all_metrics=all_metrics
+            options.urdf,
+            options.tool,
+            in_base_frame=options.frame == "base",
+            all_metrics=options.metrics,
+            priority=Priority[options.priority.upper()],
+            with_nearest=options.nearest,
         ).ik
     )
 
@@ -65,7 +70,8 @@ CORE_COMMANDS = (
     CliCommand(
         "ik",
         "JSON lines from stdin to stdout, poses to joints: "
-        '{"T": [[4x4, m]], "tool": "tcp"} per line',
+        '{"T": [[4x4, m]], "tool": "tcp"} per line, or "p" with "wxyz", "xyzw", "rpy", or "pitch" '
+        'and "roll"',
         add_ik_options,
         _ik,
     ),

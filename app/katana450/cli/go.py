@@ -23,8 +23,8 @@ POLL_INTERVAL = 0.05
 def go(options: Namespace) -> int:
     """Move the tool to ``options.place`` [mm] in {S}, print the result, return the exit status.
 
-    The status is 1 if the tool point is not there afterwards. Raises RefusedError for a motion that is
-    refused, and LostError without a server.
+    The status is 1 if the tool point is not there afterwards. Raises RefusedError for a refused
+    motion, and LostError without a server.
     """
     x, y, z = (1e-3 * value for value in options.place)
     with connect(options.url, NAME, options.token) as client:
