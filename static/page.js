@@ -11,6 +11,7 @@
   const OPEN = "katana450.instruments.open";
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated: its next command moves it. After five seconds it stops";
+  const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
   /** @type {(id: string) => any} */
@@ -113,9 +114,16 @@
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
       if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();
+    } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
+      if (!event.repeat) say({ do: "go" });
     } else if (typing(event.target) || !Jog.key(event)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
+  }
+
+  // Whether this window may take the detour that the arm offers.
+  function mayGo() {
+    return up && status?.detour && status.role !== "viewer" && (status.mine || status.holder === null);
   }
 
   function typing(target) {
@@ -195,6 +203,7 @@
     clear.hidden = !status.stopped || !status.may_clear_stop;
     clear.disabled = status.wait !== "";
     clear.title = status.wait;
+    byId("go").hidden = !mayGo();
     const { mine, holder, windows, asking: requests } = status;
     const names = requests.map(({ name }) => name).join(", ");
     const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
@@ -226,6 +235,7 @@
   function unknown() {
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : "starting";
+    byId("go").hidden = true;
     text("headline", proven ? "Stopped" : "No connection");
     text("why", proven ?? "");
   }
@@ -291,6 +301,7 @@
 
   // The rest of the bar
 
+  byId("go").addEventListener("click", () => say({ do: "go" }));
   byId("clear-stop").addEventListener("click", () => say({ do: "clear_stop" }));
   // Below the bar and not modal, so that mouse and finger can press STOP.
   const [help, helpButton] = [byId("help"), byId("help-button")];

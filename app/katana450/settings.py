@@ -31,7 +31,8 @@ class Settings:
         lines: TCP port of this machine for programs that send JSON lines; None for no such port.
         bare: whether the arm has no gripper.
         stop_port: TCP port that serves STOP alone; None for the port after ``port``, or a free one.
-        clear_by: persons who may clear a stop; see ``server.service.command_gate.ClearBy``.
+        clear_by: persons who may clear a stop; see ``server.service.stop_state.ClearBy``.
+        go_on_release: whether the arm takes a detour that it offers when a drag ends, without Go.
     """
 
     host: str = "127.0.0.1"
@@ -50,3 +51,4 @@ class Settings:
     bare: bool = False
     stop_port: int | None = None
     clear_by: str = "driver"
+    go_on_release: bool = False

@@ -290,6 +290,8 @@ class JointRules(RuleBasedStateMachine):
         again = isinstance(command, cmd.Stop) and before.stopped is not None
         elsewhere = isinstance(command, cmd.Follow) and not isinstance(after.mode, Following)
         early = isinstance(command, cmd.ClearStop) and clear_refusal(before, t)
+        # What it follows is part of the mode.
+        elsewhere |= isinstance(command, cmd.Go)
         if again or elsewhere or early or effect_of(command, before) is not Effect.SUPERSEDES:
             return
         plain = replace(before, mode=Positioning(before.target))

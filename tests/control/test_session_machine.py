@@ -20,7 +20,7 @@ from katana450.arm.control.modes import (
     ToolTarget,
     Tracking,
 )
-from katana450.arm.control.plans import plan_to
+from katana450.arm.control.plans import detour_from, plan_to
 from katana450.errors import KatanaError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
@@ -97,6 +97,33 @@ class ArmRules(JointRules):
                 self.run([cmd.Stop()], ticks)
                 self.run([cmd.Home(), cmd.SetGripper(0.0)], 2)
                 self.wait_and_clear(5)
+
+    @precondition(lambda self: self.state.beyond_gap is not None)
+    @rule(go=st.booleans(), ticks=ticks)
+    def take_detour(self, go: bool, ticks: int) -> None:
+        """Wait for rest, offer a detour, and take it or not."""
+        for _ in range(300):
+            if not self.state.moving:
+                break
+            self.tick(())
+        arm, state = self.session.require_arm(), self.state
+        if state.beyond_gap is None or state.moving or state.paused or state.blocked:
+            return
+        try:
+            detour = detour_from(arm, self.session.world_at(state), state)
+        except KatanaError:
+            return
+        self.run([cmd.OfferDetour(detour)], ticks)
+        offered = self.state.detour
+        assert offered is not None
+        if go:
+            self.run([cmd.Go()], ticks)
+            assert self.state.following is not None
+
+    @rule(ticks=ticks)
+    def go_without_offer(self, ticks: int) -> None:
+        if self.state.detour is None:
+            self.run([cmd.Go()], ticks)
 
     @rule(pitch=fractions(1), roll=fractions(1), ticks=ticks)
     def turn(self, pitch: FloatArray, roll: FloatArray, ticks: int) -> None:

@@ -41,6 +41,8 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
         *(cmd.Stop(), cmd.ClearStop(), cmd.Pause(), cmd.Resume(), cmd.GoAlong(0.5)),
         *(
             cmd.Follow(plan_to(session.require_arm(), None, state, q)),
+            cmd.OfferDetour(plan_to(session.require_arm(), None, state, q)),
+            cmd.Go(),
             cmd.SpeedScale(0.5),
             cmd.Jog(np.ones(5)),
         ),

@@ -87,6 +87,10 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
             plan_to(session.require_arm(), None, state, session.ready + 0.3)
         ),
         cmd.GoAlong: lambda: cmd.GoAlong(0.3),
+        cmd.OfferDetour: lambda: cmd.OfferDetour(
+            plan_to(session.require_arm(), None, state, session.ready + 0.3)
+        ),
+        cmd.Go: cmd.Go,
         cmd.PlaceObject: lambda: cmd.PlaceObject(cup),
         cmd.Remove: lambda: cmd.Remove("cup"),
         cmd.Attach: lambda: cmd.Attach("cup", Attachment.TABLE),
@@ -172,6 +176,10 @@ def test_each_command_has_its_effect_in_each_mode(
         # A jog reports its own findings in every tick.
         assert Reason.NOT_AT_START in found or after.jogging is not None
         effect = Effect.ACCEPTED
+    if kind is cmd.Go:
+        # It is refused without an offer.
+        assert before.detour is None
+        effect = Effect.REFUSED
     match effect:
         case Effect.ACCEPTED:
             assert type(after.intent) is type(before.intent)

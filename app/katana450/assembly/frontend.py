@@ -9,6 +9,7 @@ from katana450.arm.control.scene_objects import Environment
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.arm_listener import FRONT, Greeting, connect, connect_when_ready
+from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
@@ -65,10 +66,14 @@ def build_frontend(
     view = _view(gateway, config, found, link, ViewOptions(layers, meshes))
     if config.options is not None:
         _add_folders(view, gateway, config.options, robot, link)
+    detours = DetourPlanner(
+        session, link.state_publisher, planning_worker, go_on_release=settings.go_on_release
+    )
     planning_worker.notify = gateway.announce
     planning_worker.redirected = guarded(gateway.hub.runner.redirected)
     link.start()
     gateway.attach(ArmHandle(robot, session, link, planning_worker, nodes))
+    detours.start()
     return link, view
 
 

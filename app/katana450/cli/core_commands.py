@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from katana450.cli.access_options import add_access_options
+from katana450.cli.go_options import add_go_options
 from katana450.cli.lines_options import add_fk_options, add_ik_options
 from katana450.cli.people_options import add_people_options
 from katana450.cli.serve_options import add_serve_options
@@ -29,11 +30,16 @@ def _fk(options: Namespace) -> int:
 
 def _ik(options: Namespace) -> int:
     from katana450.cli.lines import Kinematics, answer_lines
+    from katana450.maths.kinematics.priority import Priority
 
-    in_base_frame, all_metrics = options.frame == "base", options.metrics
     return answer_lines(
         Kinematics(
-            options.urdf, options.tool, in_base_frame=in_base_frame, all_metrics=all_metrics
+            options.urdf,
+            options.tool,
+            in_base_frame=options.frame == "base",
+            all_metrics=options.metrics,
+            priority=Priority[options.priority.upper()],
+            with_nearest=options.nearest,
         ).ik
     )
 
@@ -50,8 +56,17 @@ def _people(options: Namespace) -> int:
     return people(options)
 
 
+def _go(options: Namespace) -> int:
+    from katana450.cli.go import go
+
+    return go(options)
+
+
 CORE_COMMANDS = (
     CliCommand("serve", "start the app and print its address", add_serve_options, _serve),
+    CliCommand(
+        "go", "move the tool on a running server, by a detour if necessary", add_go_options, _go
+    ),
     CliCommand(
         "fk",
         "JSON lines from stdin to stdout, joints to poses: "
@@ -62,7 +77,8 @@ CORE_COMMANDS = (
     CliCommand(
         "ik",
         "JSON lines from stdin to stdout, poses to joints: "
-        '{"T": [[4x4, m]], "tool": "tcp"} per line',
+        '{"T": [[4x4, m]], "tool": "tcp"} per line, or "p" with "wxyz", "xyzw", "rpy", or "pitch" '
+        'and "roll"',
         add_ik_options,
         _ik,
     ),

@@ -12,20 +12,22 @@ from typing import Any, TextIO
 import numpy as np
 
 from katana450.arm.control.branch_options import contact_at
+from katana450.arm.control.findings import of_projection
+from katana450.arm.control.messages import REASONS
 from katana450.arm.robot.collision import initial_objects, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
+from katana450.cli.numbers import numbers, shown
+from katana450.cli.pose_requests import KEYS, requested_pose
 from katana450.errors import InputError
-from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import project
-
-MAX_SHOWN_CHARACTERS = 40
-"""Maximum number of characters of a wrong value that an error message repeats."""
 
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 
@@ -34,7 +36,14 @@ class Kinematics:
     """Forward and inverse kinematics of the arm in a URDF, on plain JSON values."""
 
     def __init__(
-        self, urdf: Path, tool: str | None, *, in_base_frame: bool, all_metrics: bool = False
+        self,
+        urdf: Path,
+        tool: str | None,
+        *,
+        in_base_frame: bool,
+        all_metrics: bool = False,
+        priority: Priority = Priority.POSE,
+        with_nearest: bool = False,
     ) -> None:
         """Load the arm.
 
@@ -44,8 +53,12 @@ class Kinematics:
             in_base_frame: whether poses are in the base frame on the table, else in {S}.
             all_metrics: whether solutions include the cost of moving there from the request's
                 ``q``.
+            priority: the part of a pose that is kept when five axes cannot satisfy all of it.
+            with_nearest: whether answers include the nearest posture inside the limits.
         """
         self._all_metrics = all_metrics
+        self._priority = priority
+        self._with_nearest = with_nearest
         robot = load(urdf, tool)
         self._arm = robot.require_arm()
         self._world = None
@@ -57,27 +70,28 @@ class Kinematics:
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Answer ``{"q": [n rad], "tool"}`` with ``{"T": 4x4}`` [m]."""
         chain = self._chain(request, {"q", "tool"})
-        q = chain.check_q(_numbers(request, "q", 1))
+        q = chain.check_q(numbers(request, "q", 1))
         return {"T": (self._T_frame_shoulder @ forward(chain, q)).tolist()}
 
     def ik(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Answer ``{"T": 4x4, "tool"}`` with all solutions for the nearest pose of five axes.
+        """Answer a pose with all solutions for the nearest pose of five axes.
 
-        A T printed with four decimals or more is replaced by the nearest rotation;
-        ``rotation_misfit`` is the deviation of its columns from orthonormal.
+        The forms of a pose are those of ``requested_pose``, with an optional ``"tool"``. A pose
+        printed with four decimals or more is replaced by the nearest rotation;
+        ``rotation_misfit`` is the deviation of its numbers from a rotation.
 
-        The residuals are the distance of that pose from ``T``, without regard to joint limits.
-        ``within_limits`` of each solution is True if the arm can go there. With all metrics each
-        solution also has its distance from ``q`` ([n rad]; the zero posture if not given), its
+        The residuals are the distance of that pose from the request, without regard to joint
+        limits. ``within_limits`` of each solution is True if the arm can go there. With all metrics
+        each solution also has its distance from ``q`` ([n rad]; the zero posture if not given), its
         smallest singular value, and the two parts in contact there, if any. The finger joint is
-        then at 0 or at the limit nearest to it.
+        then at 0 or at the limit nearest to it. ``nearest`` is the best posture inside the limits,
+        with what it loses and what keeps it from more.
         """
-        chain = self._chain(request, {"T", "tool", "q"} if self._all_metrics else {"T", "tool"})
-        start = chain.check_q(_numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
-        given = _numbers(request, "T", 2)
-        T = se3.printed(given, "T")
-        T_shoulder = se3.inverse(self._T_frame_shoulder) @ T
-        nearest = project(chain, T_shoulder, within_limits=False).T
+        takes_q = self._all_metrics or self._with_nearest
+        chain = self._chain(request, {*KEYS, "tool", "q"} if takes_q else {*KEYS, "tool"})
+        start = chain.check_q(numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
+        T_shoulder, misfit = requested_pose(request, chain, self._T_frame_shoulder)
+        nearest = project(chain, T_shoulder, within_limits=False, priority=self._priority).T
         # If the axes do not cross, some branches do not reach every pose.
         solutions = [solution for solution in inverse(chain, nearest) if solution.exact]
         reached = [forward(chain, solution.q) for solution in solutions]
@@ -97,7 +111,34 @@ class Kinematics:
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
             "residual_rad": max(so3.angle(T_shoulder[:3, :3], T_q[:3, :3]) for T_q in reached),
-            "rotation_misfit": so3.misfit(np.array(given)[:3, :3]),
+            "rotation_misfit": misfit,
+        } | (self._nearest(chain, T_shoulder, start, request) if self._with_nearest else {})
+
+    def _nearest(
+        self, chain: Chain, T: FloatArray, start: FloatArray, request: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the nearest posture to ``T`` (4, 4) in {S} inside the limits, and its losses.
+
+        Of equally good postures the nearest to ``start`` is taken. Axes count from 1.
+        """
+        # Pitch and roll leave the yaw to the arm.
+        yaw_counts = self._priority is Priority.POSE and "pitch" not in request
+        best = project(chain, T, priority=self._priority, q_hint=start if "q" in request else None)
+        findings = of_projection(chain, best, self._priority, yaw_was_given=yaw_counts)
+        links = (["axis 1"] if best.axis1 else []) + (["links"] if best.reach else [])
+        return {
+            "nearest": {
+                "q": best.q.tolist(),
+                "branch": str(best.branch),
+                "position_mm": 1e3 * best.position_error,
+                "rotation_rad": best.rotation_error,
+                "yaw_rad": best.yaw_error,
+                "pitch_rad": best.pitch_error,
+                "roll_rad": best.roll_error,
+                "limits": [axis + 1 for axis in best.limits],
+                "held_by": links,
+                "reason": "; ".join(REASONS[each.reason](each) for each in findings),
+            }
         }
 
     def _metrics(self, metrics: BranchMetrics) -> dict[str, Any]:
@@ -115,7 +156,7 @@ class Kinematics:
             raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(keys)}.")
         tool = request.get("tool", self._arm.default_tool)
         if not isinstance(tool, str):
-            raise InputError(f"'tool' is {_shown(tool)}; there is no tool with that name.")
+            raise InputError(f"'tool' is {shown(tool)}; there is no tool with that name.")
         return self._arm.chain_to(tool)
 
 
@@ -158,42 +199,8 @@ def _request(line: str) -> Mapping[str, Any]:
     except RecursionError as error:
         raise InputError("This is not JSON: it is nested too deeply.") from error
     if not isinstance(request, dict):
-        raise InputError(f"This is {_shown(request)}; a request is a JSON object.")
+        raise InputError(f"This is {shown(request)}; a request is a JSON object.")
     return request
-
-
-def _numbers(request: Mapping[str, Any], key: str, depth: int) -> Any:
-    """Return the value of ``key``: lists of JSON numbers, nested ``depth`` deep.
-
-    Raises InputError with the place of a value that is not a number. The caller checks shapes.
-    """
-    if key not in request:
-        raise InputError(f"The key {key!r} is missing.")
-    _check_numbers(request[key], key, depth)
-    return request[key]
-
-
-def _check_numbers(value: Any, place: str, depth: int) -> None:
-    if depth:
-        if not isinstance(value, list):
-            what = "numbers" if depth == 1 else "rows"
-            raise InputError(f"{place} is {_shown(value)}; it must be a list of {what}.")
-        for k, each in enumerate(value):
-            _check_numbers(each, f"{place}[{k}]", depth - 1)
-        if depth == 2 and len({len(row) for row in value}) > 1:
-            raise InputError(f"The rows of {place} have different lengths; its shape must be 4x4.")
-    elif isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{place} is {_shown(value)}; give plain finite numbers.")
-    elif isinstance(value, int) and abs(value) > sys.float_info.max:
-        raise InputError(f"{place} is too large; give plain finite numbers.")
-
-
-def _shown(value: Any) -> str:
-    """Return ``value`` as JSON shows it, shortened."""
-    if isinstance(value, dict | list):
-        return "an object" if isinstance(value, dict) else "a list"
-    text = json.dumps(value)
-    return text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
 
 
 def _distance(a: FloatArray, b: FloatArray) -> float:

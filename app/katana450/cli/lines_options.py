@@ -8,6 +8,9 @@ from katana450.cli.arm_options import add_arm_options
 
 FRAMES = ("shoulder", "base")
 
+PRIORITIES = ("pose", "pitch", "position")
+"""Names of the members of ``Priority``, in lower case."""
+
 
 def add_fk_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``fk`` to ``parser``."""
@@ -24,6 +27,20 @@ def add_ik_options(parser: argparse.ArgumentParser) -> None:
         help='add to each solution its distance_rad and time_s from "q" in the line (default: the '
         "zero posture), its smallest_singular_value, and as contact the two parts that would meet "
         "there, or null",
+    )
+    parser.add_argument(
+        "--priority",
+        choices=PRIORITIES,
+        default=PRIORITIES[0],
+        help="part of a pose that is kept when five axes cannot satisfy all of it: the position, "
+        "then the orientation; the pitch, then the position; or the position, then the pitch "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
+        "--nearest",
+        action="store_true",
+        help='add the nearest posture inside the limits, to "q" in the line if several are equally '
+        "good, with its losses and the limits that bind",
     )
     add_arm_options(parser)
 

@@ -62,6 +62,12 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         help="the arm without its gripper, as in the paper's circle",
     )
     parser.add_argument(
+        "--go-on-release",
+        action="store_true",
+        help="at the end of a drag that a gap held up, move along the detour that leads to its "
+        "target, without waiting for Go",
+    )
+    parser.add_argument(
         "--lines",
         type=_port,
         metavar="PORT",

@@ -44,7 +44,7 @@ def check(
             raise InputError(f"This arm has {n} joints, but the command has {q.size}.")
         case cmd.SetTool(name=name):
             arm.chain_to(name)
-        case cmd.Follow(plan=plan):
+        case cmd.Follow(plan=plan) | cmd.OfferDetour(plan=plan):
             chains = [segment.path.chain for segment in plan.segments]
             if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
                 raise InputError("The plan was made for another arm: plan it for this one.")

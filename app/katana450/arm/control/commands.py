@@ -56,6 +56,7 @@ __all__ = [
     "EndDrag",
     "Fill",
     "Follow",
+    "Go",
     "GoAlong",
     "GoToZero",
     "Hold",
@@ -64,6 +65,7 @@ __all__ = [
     "MoveObject",
     "MoveTool",
     "Nudge",
+    "OfferDetour",
     "Pause",
     "PlaceObject",
     "Remove",
@@ -263,6 +265,22 @@ class Follow(BaseCommand):
             raise InputError(f"`plan` must be a Plan, not {self.plan!r}.")
 
 
+@dataclass(frozen=True, eq=False)
+class OfferDetour(BaseCommand):
+    """Offer ``plan``, from the goal of a drag to the pose beyond its gap; nothing moves."""
+
+    traits: ClassVar[CommandTraits] = CommandTraits(supersedes=False, passive=True)
+
+    plan: Plan
+
+
+@dataclass(frozen=True)
+class Go(BaseCommand):
+    """Follow the detour on offer to the pose beyond the gap of the last drag."""
+
+    traits: ClassVar[CommandTraits] = CommandTraits()
+
+
 @dataclass(frozen=True)
 class GoAlong(BaseCommand):
     """Continue or go back on the plan to ``fraction`` of it: 0 is its start, 1 its end."""
@@ -362,6 +380,8 @@ Command = (
     | Pause
     | Resume
     | Follow
+    | OfferDetour
+    | Go
     | GoAlong
     | PlaceObject
     | Remove

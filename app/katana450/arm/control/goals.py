@@ -78,9 +78,11 @@ def end_drag(state: State) -> State:
     match state.intent:
         case Tracking() as tracking:
             return with_mode(state, replace(tracking, let_go=True))
-        case Positioning():
+        case Positioning() as positioning:
             state = replace(state, goal=state.setpoint if state.blocked else state.goal)
-            return with_mode(replace(state, blocked=False), Positioning(JointTarget(state.goal)))
+            # A detour stays on offer: it leads from where the arm rests.
+            ended = replace(positioning, target=JointTarget(state.goal))
+            return with_mode(replace(state, blocked=False), ended)
     goal = state.setpoint if state.blocked else state.goal
     return replace(state, goal=goal, blocked=False)
 
@@ -138,6 +140,30 @@ def follow_plan(chain: Chain, state: State, plan: Plan) -> State:
         finding = Finding(Reason.NOT_AT_START, float(distances[axis]), axis)
         return replace(state, findings=(*others, finding))
     return _along(chain, state, Following.begin(plan))
+
+
+def may_offer(state: State, plan: Plan) -> bool:
+    """Return whether ``plan`` is a detour from the rest of ``state`` to its pose beyond a gap."""
+    beyond = state.beyond_gap
+    if beyond is None or state.moving or state.paused or state.blocked:
+        return False
+    at_start = np.abs(state.setpoint - plan.start).max() <= START_TOLERANCE
+    return bool(at_start and (plan.end == beyond.q).all())
+
+
+def with_detour(state: State, plan: Plan | None) -> State:
+    """Return ``state`` with ``plan`` as its detour on offer; None withdraws the offer."""
+    positioning = state.mode
+    if not isinstance(positioning, Positioning) or positioning.detour is plan:
+        return state
+    return replace(state, mode=replace(positioning, detour=plan))
+
+
+def go_on_detour(state: State, findings: tuple[Finding, ...]) -> State:
+    """Return ``state`` that follows its detour. findings: the losses at its end."""
+    assert state.detour is not None
+    following = Following.begin(state.detour)
+    return with_goal(state, following.goal, findings, following)
 
 
 def move_along_plan(chain: Chain, state: State, fraction: float) -> State:

@@ -171,7 +171,19 @@ def sentence(state: State) -> str:
     """Return one sentence on why the arm does not reach its target; empty if it does."""
     if not state.findings:
         return ""
-    return _capital("; ".join(REASONS[each.reason](each) for each in state.findings)) + "."
+    return _capital("; ".join(_reason(state, each) for each in state.findings)) + "."
+
+
+def _reason(state: State, finding: Finding) -> str:
+    """Return the text of one finding; that of a gap offers the detour, if there is one."""
+    if finding.reason is not Reason.ACROSS_GAP or state.detour is None:
+        return REASONS[finding.reason](finding)
+    beyond = state.beyond_gap
+    exact = beyond is not None and beyond.position_error <= POSITION_WORTH_TELLING
+    seconds = state.detour.duration / state.speed
+    detour = f"a {seconds:.1f} s detour"
+    reached = f"reachable by {detour}" if exact else f"{detour} leads nearer"
+    return f"{reached}: press Enter or Go"
 
 
 def finding_text(finding: Finding) -> str:

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 from katana450.arm.control.following import Following
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.stream import Stream
+from katana450.maths.planning.plan import Plan
 
 __all__ = [
     "IDLE",
@@ -60,9 +62,18 @@ IDLE = Idle()
 
 @dataclass(frozen=True, eq=False)
 class Positioning:
-    """Travel to a fixed goal, and rest there. The goal is the nearest posture to ``target``."""
+    """Travel to a fixed goal, and rest there. The goal is the nearest posture to ``target``.
+
+    Attributes:
+        target: the target, or the goal after the end of a drag.
+        beyond_gap: the pose nearer to the target of a drag that only a leap would reach, on the
+            same branch; None without one.
+        detour: the offered plan from the goal to that pose; None without an offer.
+    """
 
     target: Target
+    beyond_gap: Projection | None = None
+    detour: Plan | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.goals import may_offer
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.scene_objects import MAX_OBJECTS, named
 from katana450.arm.control.state import (
@@ -21,6 +22,9 @@ from katana450.arm.control.transitions import Effect, effect_of
 
 INTENDED_REASONS = (Reason.STOPPED, Reason.PAUSED, Reason.WAITING, *CAUSES)
 """Reasons that are the purpose of a command, and limit nothing."""
+
+NO_DETOUR = "No detour is offered: drag the tool to a target that the arm cannot follow, and wait."
+"""Refusal of ``Go`` without an offer."""
 
 
 def refused(why: str) -> Outcome:
@@ -62,6 +66,10 @@ def refusal(state: State, command: cmd.Command) -> str:
     match command:
         case cmd.ClearStop(known=newest, t=t):
             return clear_refusal(state, max(t, state.t), newest)
+        case cmd.Go() if state.detour is None:
+            return NO_DETOUR
+        case cmd.OfferDetour(plan=plan) if not may_offer(state, plan):
+            return "The detour belongs to another state of the arm."
         case cmd.PlaceObject(scene_object=scene_object):
             known = named(state.objects, scene_object.name)
             if known is None and len(state.objects) >= MAX_OBJECTS:
@@ -80,6 +88,8 @@ def _why_refused(state: State, command: cmd.Command) -> str:
     if state.paused and not command.traits.while_paused:
         return "The arm is paused: resume first."
     match command:
+        case cmd.Go() | cmd.OfferDetour():
+            return NO_DETOUR
         case cmd.GoAlong():
             return "The arm follows no plan: send a plan first."
         case cmd.EndDrag():

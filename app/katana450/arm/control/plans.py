@@ -10,6 +10,8 @@ from katana450.arm.control.state import State
 from katana450.errors import BlockedError
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.planning.branch_region import BranchRegion
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, Plan, check_clear, plan
@@ -18,24 +20,30 @@ from katana450.maths.planning.scaling import Bounds
 
 
 def path_to(
-    arm: ArmModel, world: CollisionWorld | None, state: State, q_goal: FloatArray, seed: int = 0
+    arm: ArmModel,
+    world: CollisionWorld | None,
+    state: State,
+    q_goal: FloatArray,
+    seed: int = 0,
+    branch: Branch | None = None,
 ) -> JointPath:
     """Return the joint path from the setpoint of ``state`` to ``q_goal`` (n,) [rad].
 
-    The path is straight if that is clear of ``world``, else sampled at random with ``seed``. Raises
-    InputError if the goal is beyond the limits or is the present posture, and BlockedError if no
-    clear path was found.
+    The path is straight if that is clear of ``world`` and stays on ``branch``, else sampled at
+    random with ``seed``. Without a ``branch`` it may change it. Raises InputError if the goal is
+    beyond the limits or is the present posture, and BlockedError if no clear path was found.
     """
-    chain = arm.chain_to(state.tool)
+    chain, fingers = arm.chain_to(state.tool), state.gripper_setpoint
     straight = JointPath(chain, np.array((state.setpoint, chain.check_q(q_goal))))
-    if world is None:
-        return straight
+    start, end = straight.start, straight.end
     try:
-        check_clear(straight, world, state.gripper_setpoint)
+        if world is not None:
+            check_clear(straight, world, fingers)
+        if branch is None or BranchRegion(chain, branch).holds_line(start, end):
+            return straight
     except BlockedError:
-        start, end = straight.start, straight.end
-        return collision_free_path(chain, start, end, world, state.gripper_setpoint, seed)
-    return straight
+        pass
+    return collision_free_path(chain, start, end, world, fingers, seed, branch)
 
 
 def plan_to(
@@ -51,6 +59,16 @@ def plan_to(
     tool_speed: maximum speed of the tool point [m/s].
     """
     return plan_along(arm, world, state, [path_to(arm, world, state, q_goal, seed)], tool_speed)
+
+
+def detour_from(arm: ArmModel, world: CollisionWorld | None, state: State, seed: int = 0) -> Plan:
+    """Return the plan of a detour to the pose beyond the gap, to be sent as ``OfferDetour``.
+
+    It stays on the branch of ``state``, which has that pose. Raises BlockedError if there is none.
+    """
+    assert state.beyond_gap is not None
+    path = path_to(arm, world, state, state.beyond_gap.q, seed, state.branch)
+    return plan_along(arm, world, state, [path])
 
 
 def plan_along(

@@ -21,6 +21,7 @@ from katana450.arm.control.goals import (
     move_along_plan,
     paused,
     resumed,
+    with_detour,
     with_goal,
     with_mode,
     with_stream_sample,
@@ -66,6 +67,9 @@ TOOL_SPEED = 0.5
 
 MAX_STEP_TIME = 0.05
 """[s] Maximum time that one tick moves the arm by. It prevents a leap after a stalled machine."""
+
+KEEP_DETOUR = (cmd.EndDrag, cmd.SpeedScale, cmd.SetAppearance)
+"""Commands that leave a detour on offer; all others change what its plan depends on."""
 
 NO_BRANCH = BRANCHES[0]
 """The branch in the state of a robot that has none; nothing reads it."""
@@ -256,6 +260,8 @@ class Session:
 
     def _accepted(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` after a command that leaves the mode as it is."""
+        if not isinstance(command, KEEP_DETOUR):
+            state = with_detour(state, None)
         match command:
             case cmd.Pause():
                 return paused(state)
@@ -269,6 +275,8 @@ class Session:
                 return replace(state, priority=priority)
             case cmd.EndDrag():
                 return end_drag(state)
+            case cmd.OfferDetour(plan=plan):
+                return with_detour(state, plan)
             case cmd.SetGripper(angle=angle):
                 return self._grip(without_cause(state), angle)
         return with_scene_change(self.environment, self.pouring, state, command)
@@ -337,6 +345,8 @@ class Session:
                 return tool_targets.with_branch(arm, state, branch)
             case cmd.SetTool(name=name):
                 return self._retooled(state, name)
+            case cmd.Go():
+                return tool_targets.gone(arm, state)
             case cmd.Follow(plan=plan):
                 return follow_plan(arm.chain, state, plan)
         raise AssertionError(f"The table of transitions has no rule for {command!r}.")
@@ -345,13 +355,9 @@ class Session:
         """Return ``state`` with another tool frame: its goal stays, its target becomes the goal."""
         return self._aim(replace(state, tool=name), state.goal)
 
-    def _clamped(self, q: FloatArray) -> FloatArray:
-        """Return the posture inside the limits that is nearest to ``q`` (n,)."""
-        return frozen(np.clip(q, self._limits.lower, self._limits.upper))
-
     def _aim(self, state: State, q: FloatArray) -> State:
         """Return ``state`` that is positioning at ``q`` (n,), or as near as the limits allow."""
-        goal = self._clamped(q)
+        goal = frozen(np.clip(q, self._limits.lower, self._limits.upper))
         if self.arm is not None:
             state = replace(state, branch=branch_of(self.arm.chain_to(state.tool), goal))
         findings = of_joints(self._limits, self._robot.slides, q)

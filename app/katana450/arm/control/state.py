@@ -30,8 +30,10 @@ from katana450.arm.control.stop_cause import WATCHDOG, StopCause
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import Projection
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
+from katana450.maths.planning.plan import Plan
 
 __all__ = [
     "ACCEPTED",
@@ -321,6 +323,16 @@ class State:
     def since(self) -> ToolTarget | None:
         """Target up to which a drag has been followed along its path; None without a drag."""
         return self.intent.since if isinstance(self.intent, Tracking) else None
+
+    @property
+    def beyond_gap(self) -> Projection | None:
+        """The pose of a drag that only a leap or a detour reaches; None without one."""
+        return self.intent.beyond_gap if isinstance(self.intent, Positioning) else None
+
+    @property
+    def detour(self) -> Plan | None:
+        """The plan that ``Go`` follows; None without an offer."""
+        return self.intent.detour if isinstance(self.intent, Positioning) else None
 
     @property
     def moving(self) -> bool:

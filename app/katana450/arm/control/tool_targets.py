@@ -9,7 +9,7 @@ import numpy as np
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.branch_options import branch_option, current_target, target_on_branch
 from katana450.arm.control.findings import of_jog, of_projection, of_tracked
-from katana450.arm.control.goals import with_goal, with_mode
+from katana450.arm.control.goals import go_on_detour, with_goal, with_mode
 from katana450.arm.control.modes import (
     IDLE,
     Jogging,
@@ -24,7 +24,7 @@ from katana450.arm.control.motion_stepper import jog_twist
 from katana450.arm.control.state import GRIPPER_LIMITS, Reason, State
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch, branch_of
-from katana450.maths.kinematics.projection import project
+from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tracker import track
 
 NO_RATES = frozen(np.zeros(5))
@@ -66,7 +66,16 @@ def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
         return with_mode(replace(state, goal=found.best.q), replace(tracking, since=found.since))
     target = JointTarget(found.best.q) if tracking.let_go else tracking.target
     findings = of_tracked(chain, found, state.priority)
-    return with_goal(state, found.best.q, findings, Positioning(target))
+    mode = Positioning(target, found.beyond_gap)
+    return with_goal(state, found.best.q, findings, mode)
+
+
+def gone(arm: ArmModel, state: State) -> State:
+    """Return ``state`` that follows the detour on offer to the pose beyond the gap."""
+    assert state.beyond_gap is not None
+    chain = arm.chain_to(state.tool)
+    losses = of_projection(chain, state.beyond_gap, state.priority, yaw_was_given=False)
+    return go_on_detour(state, losses)
 
 
 def with_reapplied_priority(arm: ArmModel, state: State) -> State:
@@ -76,6 +85,9 @@ def with_reapplied_priority(arm: ArmModel, state: State) -> State:
             return with_pose_target(arm, state, target)
         case Positioning(target=ToolTarget() as target):
             return dragged(arm, state, target)
+        case Positioning(target=target, beyond_gap=Projection()):
+            # The pose beyond the gap was nearest by the earlier priority.
+            return with_mode(state, Positioning(target))
         case Tracking() as tracking:
             return dragged(arm, state, tracking.target, let_go=tracking.let_go)
     return state

@@ -72,6 +72,8 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     cmd.Servo: _row(Servoing,           S,   S,   S,   S,   C,   S),
     cmd.Follow: _row(Following,         S,   S,   S,   S,   S,   S),
     cmd.GoAlong: _row(None,             R,   R,   R,   R,   R,   C),
+    cmd.OfferDetour: _row(None,         R,   A,   R,   R,   R,   R),
+    cmd.Go: _row(Following,             R,   S,   R,   R,   R,   R),
     cmd.Stop: _row(Idle,                S,   S,   S,   S,   S,   S),
     cmd.ClearStop: _row(Idle,           S,   S,   S,   S,   S,   S),
     cmd.Hold: _row(Idle,                S,   S,   S,   S,   S,   S),

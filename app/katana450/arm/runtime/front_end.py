@@ -118,7 +118,7 @@ class FrontEnd:
                     f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
                 )
             self._number += 1
-            if isinstance(command, cmd.Follow):
+            if isinstance(command, cmd.Follow | cmd.OfferDetour):
                 self._plans.note(self._number, command.plan)
             seen = self.state_publisher.snapshot.state.t
             self._unsent.append(CommandMessage(self._number, command, actor, seen))

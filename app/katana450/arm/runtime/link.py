@@ -169,7 +169,7 @@ class ArmEnd:
             self._mailbox.put(cmd.Stop())
 
     def _put(self, message: CommandMessage) -> None:
-        if isinstance(message.command, cmd.Follow):
+        if isinstance(message.command, cmd.Follow | cmd.OfferDetour):
             self._names.note(message.number, message.command.plan)
         with self._numbering:
             try:

@@ -40,6 +40,8 @@ class PlanningWorker:
         """Called with the reason if no path was found."""
         self.redirected: Callable[[], None] = lambda: None
         """Called, in any thread, when a command gives the arm another motion, a hold or a stop."""
+        self.newest_actor: Actor | None = None
+        """The actor of the newest command that was not passive."""
 
     @property
     def last_ticket(self) -> int:
@@ -56,6 +58,7 @@ class PlanningWorker:
         traits = [each.traits for each in command.parts]
         if not all(each.passive for each in traits):
             self.cancel()
+            self.newest_actor = actor
         if any(each.supersedes for each in traits):
             self.redirected()
         if isinstance(command, cmd.TakeBranch):

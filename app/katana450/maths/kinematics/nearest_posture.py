@@ -171,6 +171,7 @@ def _nearest_postures(
     a, d = arm.a + outward, canonical.aside(arm)
     settled = not approach or d == 0.0 or canonical.on_axis
     roll_hint = None if hint is None else hint[4]
+    places: list[CanonicalTarget] = []
     for first in _theta1(limited, canonical, branch, hint):
         turn = first
         for _ in range(_TURNS):
@@ -202,6 +203,18 @@ def _nearest_postures(
                 theta1_bound=bound,
                 in_plane=found,
             )
+            if approach and canonical.along is not None and not canonical.on_axis:
+                place = canonical._replace(x=0.0, y=0.0, z=up - pv)
+                on_axis = d == 0.0 and abs(planar.behind(pu)) <= tolerances.ON_AXIS
+                if on_axis and place not in places:
+                    places.append(place)
+    for place in places:
+        # The nearest point is on axis 1, where every theta1 comes equally near.
+        for posture in _nearest_postures(limited, place, branch, planar, hint, approach=False):
+            yield posture._replace(
+                position_error=math.hypot(canonical.x, canonical.y, canonical.z - place.z),
+                in_plane=posture.in_plane._replace(posture_bound=True),
+            )
 
 
 def _theta1(
@@ -223,8 +236,8 @@ def _theta1(
         if bound and hint is not None:
             theta1 = min(interval, key=lambda end: abs(end - hint[0]))
         yield theta1, bound
-        if bound and hint is None and canonical.aside(limited.arm) != 0.0:
-            # Beside axis 1 the limit farther in angle may come nearer.
+        if bound and hint is None:
+            # The limit farther in angle may come nearer, in position or in orientation.
             yield sum(interval) - theta1, True
 
 

@@ -64,6 +64,11 @@ MAX_POSES_OUT_OF_REACH: Final = 3
 MAX_POSES_PER_STRIDE: Final = 2 * MAX_POSES_OUT_OF_REACH
 """Effort for the hops of one stride: two hops are enough without an obstacle."""
 
+MIN_HOPS_PER_STRIDE: Final = 3
+"""Minimum number of hops of one stride, whatever their effort. Beside the roll axis one hop takes
+many searches, and a goal that falls behind the hand loses the pitch.
+"""
+
 MIN_HOP_GAIN: Final = 1e-6
 """Smallest gain [m], [rad] of a hop; less is rounding."""
 
@@ -235,11 +240,12 @@ class _Pursuit:
     def follow(self, alpha: Five, maximum: int) -> NearestPosture:
         """Return `best` if it is a hop away, else the end of the hops from `alpha`.
 
-        `maximum` is the maximum effort of the hops.
+        `maximum` is the maximum effort of the hops after the first MIN_HOPS_PER_STRIDE.
         """
         arm = self.limited.arm
-        found, miss = None, _misses(arm, self.canonical, alpha)
-        while not self.ended and self.effort < maximum:
+        found, miss, hops = None, _misses(arm, self.canonical, alpha), 0
+        while not self.ended and (self.effort < maximum or hops < MIN_HOPS_PER_STRIDE):
+            hops += 1
             if _within_hop(alpha, self.best.alpha):
                 found, self.ended = _not_away(arm, alpha, self.canonical, self.best), True
                 break

@@ -1,5 +1,7 @@
 """A path around obstacles: two trees of clear postures that grow together, then shortcuts.
 
+The path can also be kept on one branch, whose edges are then obstacles.
+
 Sources: Kuffner and LaValle, RRT-Connect, ICRA 2000; Geraerts and Overmars, Creating high-quality
 paths for motion planning, 2007, for shortcuts. Random numbers come from a seed, and effort is
 counted in postures, so the same question has the same answer on every machine.
@@ -16,7 +18,10 @@ from katana450.errors import BlockedError
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.planning.branch_region import BranchRegion
+from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.clearance import SweptClearance
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.plan import MARGIN, check_clear
@@ -26,6 +31,9 @@ TREE_STEP: Final = 0.3
 
 MAX_POSTURES: Final = 3000
 """Maximum number of drawn postures before the search ends without success: some seconds."""
+
+MAX_DRAWS: Final = 50
+"""Maximum number of draws of one posture on a branch."""
 
 SHORTCUTS: Final = 150
 """Number of attempts to connect two places of the path by a straight line."""
@@ -65,34 +73,44 @@ class _Tree:
 
 
 class _Search:
-    """The search for one path between two postures in one world."""
+    """The search for one path between two postures in one world, or without one."""
 
     def __init__(
         self,
         chain: Chain,
-        world: CollisionWorld,
+        world: CollisionWorld | None,
         fingers: float,
         start: FloatArray,
         end: FloatArray,
+        region: BranchRegion | None,
     ) -> None:
         self.chain = chain
         self.fingers = fingers
+        self.region = region
         x = np.append(start, fingers), np.append(end, fingers)
-        self.room = SweptClearance.about(world, MARGIN, *x)
+        self.room = None if world is None else SweptClearance.about(world, MARGIN, *x)
         self.start, self.end = start, end
+
+    def clear(self, a: FloatArray, b: FloatArray) -> bool:
+        """Return True if the straight path from `a` to `b` is clear, and on the branch."""
+        checkpoint()
+        on_branch = self.region is None or self.region.holds_line(a, b)
+        return on_branch and self.met(a, b) is None
 
     def met(self, a: FloatArray, b: FloatArray) -> Contact | None:
         """Return the contact on the straight path from `a` to `b`; None when it is clear."""
+        if self.room is None:
+            return None
         found = self.room.blocked_line(np.append(a, self.fingers), np.append(b, self.fingers))
         return None if found is None else found.contact
 
     def connected(self, random: np.random.Generator) -> list[FloatArray] | None:
         """Return the vias of a clear path; None when MAX_POSTURES were not enough."""
-        chain, speed = self.chain, self.chain.speed
+        speed = self.chain.speed
         trees = _Tree([self.start]), _Tree([self.end])
         for turn in range(MAX_POSTURES):
             growing, other = trees[turn % 2], trees[1 - turn % 2]
-            drawn = random.uniform(chain.lower, chain.upper)
+            drawn = self._drawn(random)
             new = self._extended(growing, growing.nearest(drawn, speed), drawn)
             if new is None:
                 continue
@@ -105,13 +123,22 @@ class _Search:
                 return path if turn % 2 == 0 else path[::-1]
         return None
 
+    def _drawn(self, random: np.random.Generator) -> FloatArray:
+        """Return a random posture inside the limits, as a rule on the branch."""
+        drawn = random.uniform(self.chain.lower, self.chain.upper)
+        for _ in range(MAX_DRAWS):
+            if self.region is None or self.region.holds(drawn):
+                break
+            drawn = random.uniform(self.chain.lower, self.chain.upper)
+        return drawn
+
     def _extended(self, tree: _Tree, number: int, towards: FloatArray) -> int | None:
         """Add a step from posture `number`; return None when it is not clear."""
         here = tree.postures[number]
         step = towards - here
         fraction = TREE_STEP / float((np.abs(step) / self.chain.speed).max())
         q = towards if fraction >= 1.0 else here + fraction * step
-        return None if self.met(here, q) is not None else tree.grown(number, q)
+        return tree.grown(number, q) if self.clear(here, q) else None
 
     def _same(self, a: FloatArray, b: FloatArray) -> bool:
         return bool((np.abs(a - b) <= SAME_POSTURE_TIME * self.chain.speed).all())
@@ -128,7 +155,7 @@ class _Search:
             a = path[before] + (low - before) * (path[before + 1] - path[before])
             b = path[after] + (high - after) * (path[min(after + 1, len(path) - 1)] - path[after])
             around = [a, *path[before + 1 : after + 1], b]
-            if self._duration([a, b]) < 0.99 * self._duration(around) and self.met(a, b) is None:
+            if self._duration([a, b]) < 0.99 * self._duration(around) and self.clear(a, b):
                 path = self._tidied([*path[: before + 1], a, b, *path[after + 1 :]])
         return self._fewer(path)
 
@@ -136,7 +163,7 @@ class _Search:
         """Return `path` without the vias that it does not need."""
         number = 1
         while number < len(path) - 1:
-            if self.met(path[number - 1], path[number + 1]) is None:
+            if self.clear(path[number - 1], path[number + 1]):
                 del path[number]
             else:
                 number += 1
@@ -160,15 +187,27 @@ def collision_free_path(
     chain: Chain,
     start: FloatArray,
     end: FloatArray,
-    world: CollisionWorld,
+    world: CollisionWorld | None,
     fingers: float,
     seed: int,
+    branch: Branch | None = None,
 ) -> JointPath:
     """Return a clear path from `start` to `end` (5,) [rad] with the fingers at one angle [rad].
 
-    Raises BlockedError when an end is too near to an obstacle, or when no path was found.
+    Args:
+        chain: the arm.
+        start: the first posture (5,) [rad].
+        end: the last posture (5,) [rad].
+        world: the obstacles; None for no obstacles.
+        fingers: the finger joint [rad].
+        seed: the seed of the search.
+        branch: the branch that the path stays on; None to allow all.
+
+    Raises:
+        BlockedError: an end is too near to an obstacle, or no path was found.
     """
-    search = _Search(chain, world, fingers, start, end)
+    region = None if branch is None else BranchRegion(chain, branch)
+    search = _Search(chain, world, fingers, start, end, region)
     for name, q in (("start", start), ("end", end)):
         met = search.met(q, q)
         if met is not None:
@@ -194,11 +233,26 @@ def collision_free_path(
     for rounding in ROUNDINGS:
         blend = np.minimum(blend, rounding)
         path = JointPath(chain, np.array(vias), blend)
+        if region is not None and not _corners_held(region, path):
+            continue
         try:
-            check_clear(path, world, fingers)
+            if world is not None:
+                check_clear(path, world, fingers)
         except BlockedError:
             continue
         return path
     raise BlockedError(
         "The path found cannot be followed without stops at its corners. Try another seed."
     )
+
+
+def _corners_held(region: BranchRegion, path: JointPath) -> bool:
+    """Return True if the rounded corners of `path` are on the branch of `region`."""
+    for before, via, after, blend in zip(
+        path.vias, path.vias[1:], path.vias[2:], path.blend.tolist(), strict=False
+    ):
+        # A corner cuts off at most this fraction of each leg.
+        cut = 0.5 * blend
+        if not region.holds_corner(via + cut * (before - via), via, via + cut * (after - via)):
+            return False
+    return True

@@ -149,6 +149,17 @@ class EndDrag(Request, frozen=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
 
+class Go(Request, frozen=True):
+    """Move along the detour that the state offers, to the target that a drag did not reach.
+
+    A drag ends at a gap where a joint would have to leap. If a clear path on the same branch leads
+    to its target, the field ``detour`` of the state has its duration. Refused without an offer; any
+    change withdraws it.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+
 class Home(Request, frozen=True):
     """Move to the ready posture."""
 

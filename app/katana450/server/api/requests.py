@@ -44,6 +44,7 @@ from katana450.server.api.lease_requests import (
 )
 from katana450.server.api.motion_requests import (
     EndDrag,
+    Go,
     GoToZero,
     Gripper,
     Home,
@@ -86,6 +87,7 @@ __all__ = [
     "Frame",
     "Get",
     "Give",
+    "Go",
     "GoToZero",
     "Gripper",
     "Heartbeat",
@@ -317,6 +319,7 @@ AnyRequest = (
     | SetPriority
     | Branch
     | EndDrag
+    | Go
     | Home
     | GoToZero
     | Hold

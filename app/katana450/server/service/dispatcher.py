@@ -27,6 +27,7 @@ from katana450.server.service.people_requests import PeopleRequests
 
 COMMANDS: dict[type[requests.Request], cmd.Command] = {
     requests.EndDrag: cmd.EndDrag(),
+    requests.Go: cmd.Go(),
     requests.Home: cmd.Home(),
     requests.GoToZero: cmd.GoToZero(),
     requests.Hold: cmd.Hold(),

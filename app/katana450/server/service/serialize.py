@@ -110,6 +110,7 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         moving=now.moving,
         why=sentence(now),
         findings=[finding(each) for each in now.findings],
+        detour=None if now.detour is None else now.detour.duration / now.speed,
         speed=now.speed,
         holder=None,
         stopped=None,

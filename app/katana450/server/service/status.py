@@ -61,6 +61,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "stop_path": hub.stop_path.problem,
         "holder": None if holder is None else holder.name,
         "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
+        "detour": state is not None and state.detour is not None and age is None,
         "speed": 1.0 if state is None else state.speed,
         "windows": len(hub.windows),
     }

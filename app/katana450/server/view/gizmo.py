@@ -86,6 +86,7 @@ class Gizmo:
         self._current = current
         self._held: dict[str, Actor] = {}
         self._turns: dict[str, _Turn] = {}
+        self._sent: tuple[float, ...] = ()
         self._aim = _Aim((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
         bounds = ((-WORKSPACE, WORKSPACE),) * 3
         self._move = server.scene.add_transform_controls(
@@ -148,12 +149,24 @@ class Gizmo:
         if event.phase == "end":
             del self._held["move"]
         p = np.asarray(event.target.position, dtype=float) - self._arm.T_base_shoulder[:3, 3]
-        self._submit(event, actor, MoveTool(p @ self._arm.T_base_shoulder[:3, :3]))
+        command = MoveTool(p @ self._arm.T_base_shoulder[:3, :3])
+        self._submit(event, actor, command, tuple(event.target.position.tolist()))
 
-    def _submit(self, event: viser.TransformControlsEvent, actor: Actor, command: Command) -> None:
+    def _submit(
+        self,
+        event: viser.TransformControlsEvent,
+        actor: Actor,
+        command: Command,
+        place: tuple[float, ...],
+    ) -> None:
+        """Submit ``command`` of a drag to ``place``, and the end of the drag."""
+        # A hand that lets go without a motion gives no new target: the arm may be on a detour.
+        again = event.phase == "end" and place == self._sent
+        self._sent = () if event.phase == "end" else place
         # A drag sends 20 messages a second: the next one repeats the request or shows the refusal.
         with suppress(KatanaError):
-            self._gestures.submit(command, actor)
+            if not again:
+                self._gestures.submit(command, actor)
             if event.phase == "end":
                 self._gestures.submit(EndDrag(), actor)
 
@@ -165,13 +178,15 @@ class Gizmo:
         actor = self._gestures.actor(event.client_id)
         turn = self._turning(event, actor, "pitch")
         if turn is not None:
-            self._submit(event, actor, TurnTool(turn.pitch + turn.turned, turn.roll))
+            command = TurnTool(turn.pitch + turn.turned, turn.roll)
+            self._submit(event, actor, command, (command.pitch, command.roll))
 
     async def _rolled(self, event: viser.TransformControlsEvent) -> None:
         actor = self._gestures.actor(event.client_id)
         turn = self._turning(event, actor, "roll")
         if turn is not None:
-            self._submit(event, actor, TurnTool(turn.pitch, turn.roll + turn.turned))
+            command = TurnTool(turn.pitch, turn.roll + turn.turned)
+            self._submit(event, actor, command, (command.pitch, command.roll))
 
     def _turning(
         self, event: viser.TransformControlsEvent, actor: Actor, ring: str

@@ -1,0 +1,125 @@
+"""Planning of detours in a thread of its own, while the hand rests at a gap or has let go."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import JointTarget
+from katana450.arm.control.plans import detour_from
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.runtime.planning_worker import PlanningWorker
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.errors import CancelledError, KatanaError
+from katana450.maths.planning.checkpoint import checked_by
+
+log = logging.getLogger(__name__)
+
+SETTLE_TIME = 0.15
+"""[s] Time without a new state after which the hand rests."""
+
+WAKE_INTERVAL = 0.5
+"""[s] Interval at which the end of the thread is checked."""
+
+
+class DetourPlanner:
+    """Offers a detour wherever a drag ended at a gap that a clear path on its branch leads round.
+
+    The session withdraws the offer when anything changes; then a new one is planned.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        state_publisher: StatePublisher,
+        arm: PlanningWorker,
+        *,
+        go_on_release: bool = False,
+    ) -> None:
+        """Prepare the thread.
+
+        Args:
+            session: the rules of the arm.
+            state_publisher: the source of states.
+            arm: the sink of commands.
+            go_on_release: whether the detour of a drag that has ended is followed at once.
+        """
+        self._session = session
+        self._state_publisher = state_publisher
+        self._arm = arm
+        self._go_on_release = go_on_release
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="detours", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._stopping.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        seen = self._state_publisher.snapshot
+        while not self._stopping.is_set():
+            if self._go_on_release and _may_go(seen.state):
+                self._deliver(cmd.Go())
+                seen = self._changed(seen)
+                continue
+            wanted = _wants_detour(seen.state)
+            new = self._state_publisher.wait_for_change(
+                seen, SETTLE_TIME if wanted else WAKE_INTERVAL
+            )
+            if new is seen and wanted:
+                self._offer(seen)
+                # Planned at most once for each state.
+                new = self._changed(seen)
+            seen = new
+
+    def _changed(self, seen: Snapshot) -> Snapshot:
+        """Return the next snapshot after ``seen``, or ``seen`` when the thread ends."""
+        new = seen
+        while new is seen and not self._stopping.is_set():
+            new = self._state_publisher.wait_for_change(seen, WAKE_INTERVAL)
+        return new
+
+    def _offer(self, seen: Snapshot) -> None:
+        """Plan the detour of ``seen`` and offer it."""
+
+        def check() -> None:
+            if self._stopping.is_set() or self._state_publisher.snapshot is not seen:
+                raise CancelledError("The state of the arm has changed.")
+
+        state = seen.state
+        try:
+            with checked_by(check):
+                world = self._session.world_at(state)
+                plan = detour_from(self._session.require_arm(), world, state)
+                check()
+        except KatanaError as error:
+            log.debug("No detour: %s", error)
+        except Exception:
+            log.exception("The planning of a detour failed.")
+        else:
+            self._deliver(cmd.OfferDetour(plan))
+
+    def _deliver(self, command: cmd.Command) -> None:
+        """Send ``command`` in the name of the actor of the drag; the session may refuse it."""
+        try:
+            self._arm.deliver(command, self._arm.newest_actor)
+        except KatanaError as error:
+            log.debug("No detour: %s", error)
+
+
+def _wants_detour(state: State) -> bool:
+    """Return whether ``state`` rests at a gap without an offer."""
+    resting = not (state.moving or state.paused or state.blocked)
+    return resting and state.beyond_gap is not None and state.detour is None
+
+
+def _may_go(state: State) -> bool:
+    """Return whether ``state`` has a detour on offer after the end of its drag."""
+    return state.detour is not None and isinstance(state.target, JointTarget)

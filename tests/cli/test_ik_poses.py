@@ -1,0 +1,125 @@
+"""``katana450 ik`` takes a pose in every common form, with a priority and the nearest posture."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import project
+from tests.cli.test_lines import ask, random_postures
+
+
+def forms(arm: MountedArm, q: FloatArray, decimals: int) -> list[dict[str, Any]]:
+    """Return the pose of ``q`` (5,) in every form, printed with ``decimals``."""
+    T = forward(arm.chain, q)
+    w, x, y, z = so3.to_quaternion(T[:3, :3]).round(decimals).tolist()
+    p = T[:3, 3].round(decimals).tolist()
+    rpy = np.round(so3.to_rpy(T[:3, :3]), decimals).tolist()
+    return [
+        {"T": T.round(decimals).tolist()},
+        {"p": p, "wxyz": [w, x, y, z]},
+        {"p": p, "xyzw": [x, y, z, w]},
+        {"p": p, "rpy": rpy},
+    ]
+
+
+@pytest.mark.parametrize("frame", ["shoulder", "base"])
+def test_every_form_of_a_pose_gives_the_same_solutions(arm: MountedArm, frame: str) -> None:
+    T_frame_shoulder = arm.T_base_shoulder if frame == "base" else np.eye(4)
+    for q in random_postures(arm, 20):
+        T = T_frame_shoulder @ forward(arm.chain, q)
+        p, wxyz = T[:3, 3].tolist(), so3.to_quaternion(T[:3, :3]).tolist()
+        requests: list[dict[str, Any]] = [
+            {"T": T.tolist()},
+            {"p": p, "wxyz": wxyz},
+            {"p": p, "xyzw": [*wxyz[1:], wxyz[0]]},
+            {"p": p, "rpy": list(so3.to_rpy(T[:3, :3]))},
+        ]
+        for answer in ask("ik", requests, "--frame", frame):
+            assert min(np.abs(np.array(s["q"]) - q).max() for s in answer["solutions"]) < 1e-6
+            assert answer["rotation_misfit"] < 1e-12
+
+
+def test_pitch_and_roll_leave_the_yaw_to_the_arm(arm: MountedArm) -> None:
+    for q in random_postures(arm, 40):
+        pitch, roll = pitch_and_roll(arm.chain, q)
+        p = forward(arm.chain, q)[:3, 3]
+        request = {"p": p.tolist(), "pitch": pitch, "roll": roll}
+        (answer,) = ask("ik", [request])
+        assert answer["residual_mm"] < 1e-9
+        assert answer["residual_rad"] < 1e-9
+        same = 0
+        for solution in answer["solutions"]:
+            found = np.array(solution["q"])
+            np.testing.assert_allclose(forward(arm.chain, found)[:3, 3], p, atol=1e-9)
+            other = np.array(pitch_and_roll(arm.chain, found)) - (pitch, roll)
+            same += bool(np.abs(np.sin(0.5 * other)).max() < 1e-8)
+        assert same > 0
+
+
+@pytest.mark.parametrize("decimals", [6, 4, 3])
+def test_printed_quaternions_are_taken_and_their_rounding_reported(
+    arm: MountedArm, decimals: int
+) -> None:
+    rounding = 0.5 * 10.0**-decimals
+    for q in random_postures(arm, 50):
+        for answer in ask("ik", forms(arm, q, decimals)[1:]):
+            assert answer["rotation_misfit"] <= 2.0 * rounding
+
+
+BAD = [
+    ({"p": [0.3, 0.0, 0.1]}, "this has p"),
+    ({"wxyz": [1, 0, 0, 0]}, "this has wxyz"),
+    ({"p": [0.3, 0.0, 0.1], "wxyz": [1, 0, 0, 0], "rpy": [0, 0, 0]}, "one orientation"),
+    ({"p": [0.3, 0.0, 0.1], "pitch": 0.1}, "both pitch and roll"),
+    ({"p": [0.3, 0.0, 0.1], "pitch": None, "roll": 0.0}, "pitch is null"),
+    ({"p": [0.3, 0.0], "rpy": [0, 0, 0]}, "p "),
+    ({"p": [0.3, 0.0, True], "rpy": [0, 0, 0]}, "p[2] is true"),
+    ({"p": [0.3, 0.0, 0.1], "wxyz": [2, 0, 0, 0]}, "length 2"),
+    ({"p": [0.3, 0.0, 0.1], "wxyz": [0, 0, 0, 0]}, "length"),
+    ({"T": np.eye(4).tolist(), "p": [0, 0, 0]}, "A pose is T, or p with one orientation"),
+]
+
+
+@pytest.mark.parametrize(("request_", "expected"), BAD)
+def test_wrong_pose_is_refused_with_the_key_at_fault(
+    request_: dict[str, Any], expected: str
+) -> None:
+    (answer,) = ask("ik", [request_], status=1)
+    assert expected in answer["error"]
+
+
+@pytest.mark.parametrize("priority", Priority)
+def test_priority_chooses_what_is_kept(arm: MountedArm, priority: Priority) -> None:
+    T = np.eye(4)
+    T[:3, 3] = (0.1, 0.3, 0.7)
+    request = {"T": T.tolist()}
+    (answer,) = ask("ik", [request], "--priority", priority.name.lower(), "--nearest")
+    expected = project(arm.chain, T, priority=priority)
+    found = answer["nearest"]
+    np.testing.assert_allclose(found["q"], expected.q, atol=1e-12)
+    assert found["position_mm"] == pytest.approx(1e3 * expected.position_error)
+    assert found["limits"] == [axis + 1 for axis in expected.limits]
+    assert found["branch"] == str(expected.branch)
+    assert found["reason"]
+
+
+def test_nearest_is_inside_the_limits_and_names_the_binding_one(arm: MountedArm) -> None:
+    q = np.array(arm.chain.clamp(np.zeros(5)))
+    q[4] = arm.chain.upper[4] + 0.1
+    T = forward(arm.chain, q)
+    (answer,) = ask("ik", [{"T": T.tolist(), "q": q.tolist()}], "--nearest")
+    found = answer["nearest"]
+    assert arm.chain.within_limits(np.array(found["q"]))
+    assert found["limits"] == [5]
+    assert "axis 5 at its limit" in found["reason"]
+    (plain,) = ask("ik", [{"T": T.tolist()}])
+    assert "nearest" not in plain

@@ -1,0 +1,134 @@
+"""A detour on a real server: offered by the state, taken by a request, a command or a setting."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from katana450.client import Client, RefusedError, connect
+from katana450.server.api import answers, requests
+from tests.browser.server import APP, AppServer
+
+TARGET = (0.008, 0.025, 0.443)
+"""[m] A point above the shoulder. A drag there from the ready posture ends at limits."""
+
+PATIENCE = 20.0
+"""[s] Timeout of a step on a busy machine."""
+
+
+def wait_for(program: Client, holds: Callable[[answers.State], bool]) -> answers.State:
+    deadline = time.monotonic() + PATIENCE
+    while not holds(state := program.query(answers.State)):
+        assert time.monotonic() < deadline, state
+        time.sleep(0.02)
+    return state
+
+
+def held_at_the_gap(program: Client) -> answers.State:
+    """Drag from the ready posture to TARGET, and return the state with a detour on offer."""
+    program.go(requests.Home())
+    program.go(requests.Position(p=TARGET))
+    return wait_for(program, lambda state: state.detour is not None)
+
+
+def distance(state: answers.State) -> float:
+    assert state.T is not None
+    return math.dist([row[3] for row in state.T[:3]], TARGET)
+
+
+def test_offered_detour_is_taken_by_go(program: Client) -> None:
+    state = held_at_the_gap(program)
+    assert state.detour is not None
+    assert state.status == "gap"
+    assert f"Reachable by a {state.detour:.1f} s detour: press Enter or Go" in state.why
+    assert not state.moving
+    assert distance(state) > 0.01
+    program.ask(requests.EndDrag())
+    rested = program.query(answers.State)
+    assert rested.q == state.q
+    arrived = program.go(requests.Go())
+    assert distance(arrived) < 1e-6
+    assert arrived.branch == state.branch
+    assert arrived.detour is None
+
+
+def test_go_is_refused_without_an_offer_and_after_a_change(program: Client) -> None:
+    program.go(requests.Home())
+    with pytest.raises(RefusedError, match="No detour is offered"):
+        program.ask(requests.Go())
+    state = held_at_the_gap(program)
+    program.ask(requests.Hold())
+    with pytest.raises(RefusedError, match="No detour is offered"):
+        program.ask(requests.Go())
+    assert program.query(answers.State).q == state.q
+
+
+def test_stop_withdraws_the_offer(program: Client) -> None:
+    held_at_the_gap(program)
+    program.ask(requests.Stop())
+    wait_for(program, lambda state: state.stopped is not None)
+    with pytest.raises(RefusedError, match="clear the stop first"):
+        program.ask(requests.Go())
+    program.ask(requests.ClearStop())
+    with pytest.raises(RefusedError, match="No detour is offered"):
+        program.ask(requests.Go())
+    assert program.query(answers.State).detour is None
+
+
+def test_new_offer_follows_a_change_of_the_world(program: Client) -> None:
+    held_at_the_gap(program)
+    program.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.02]))
+    wait_for(program, lambda state: state.detour is not None)
+    program.ask(requests.Remove(name="ball"))
+    wait_for(program, lambda state: state.detour is not None)
+
+
+def test_command_line_takes_the_detour(program: Client, server: AppServer) -> None:
+    program.go(requests.Home())
+    program.ask(requests.ReleaseLease())
+    place = ",".join(f"{1e3 * x:g}" for x in TARGET)
+    done = subprocess.run(
+        [sys.executable, "-m", "katana450", "go", place, "--url", server.url],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Taking a 2.9 s detour." in done.stdout
+    assert distance(program.query(answers.State)) < 1e-6
+
+
+@pytest.fixture(scope="module")
+def automatic() -> Iterator[AppServer]:
+    with AppServer((*APP, "--go-on-release")) as server:
+        yield server
+
+
+def test_setting_takes_the_detour_when_the_hand_lets_go(automatic: AppServer) -> None:
+    with connect(automatic.url, "Test") as program:
+        state = held_at_the_gap(program)
+        time.sleep(0.5)
+        # A hand that rests is not a hand that lets go.
+        assert program.query(answers.State).q == state.q
+        program.ask(requests.EndDrag())
+        arrived = wait_for(program, lambda state: distance(state) < 1e-6 and not state.moving)
+        assert arrived.branch == state.branch
+
+
+def test_setting_takes_no_detour_after_a_stop(automatic: AppServer) -> None:
+    with connect(automatic.url, "Test") as program:
+        state = held_at_the_gap(program)
+        program.ask(requests.EndDrag())
+        program.ask(requests.Stop())
+        stopped = wait_for(program, lambda now: now.stop == "confirmed" and not now.moving)
+        program.ask(requests.ClearStop())
+        time.sleep(1.0)
+        np.testing.assert_allclose(program.query(answers.State).q, stopped.q, atol=1e-9)
+        assert distance(state) > 0.01
