@@ -17,6 +17,7 @@ from katana450.assembly.frontend_process import OPEN, FrontendConfig, run_fronte
 from katana450.assembly.log_lines import start_log
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import Supervisor, child_spec
+from katana450.errors import ConfigurationError
 from katana450.platform_support import pipe_address, stop_signals
 from katana450.resources import URDF_PATH
 from katana450.server.web.listen import LOOPBACK, listen
@@ -79,8 +80,7 @@ def serve(
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
-    # Only this user can open it.
-    folder = Path(tempfile.mkdtemp(prefix="katana450-"))
+    folder = _private_folder()
     address = ArmAddress(pipe_address(folder, "arm"), secrets.token_bytes(32))
     front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
     arm = ArmConfig(settings, urdf, tool, options, address, folder)
@@ -106,6 +106,16 @@ def serve(
         listening.close()
         shutil.rmtree(folder, ignore_errors=True)
     return 0
+
+
+def _private_folder() -> Path:
+    """Return a new folder that only this user can open. Raises ConfigurationError."""
+    try:
+        return Path(tempfile.mkdtemp(prefix="katana450-"))
+    except OSError as error:
+        raise ConfigurationError(
+            f"No private folder can be created: {error}. Set TMPDIR to a writable folder."
+        ) from error
 
 
 def _address(settings: Settings, port: int) -> str:
