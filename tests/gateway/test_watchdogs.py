@@ -12,7 +12,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -127,11 +127,9 @@ def strike(server: AppServer, process: str, number: signal.Signals, delay: float
     return Strike(shown, back)
 
 
-@contextmanager
-def lost_connection() -> Iterator[None]:
-    """Allow that the server closes a connection inside the block."""
-    with suppress(LostError, TimeoutError):
-        yield
+def lost_connection() -> suppress:
+    """Return a context in which the server may close the connection."""
+    return suppress(LostError, TimeoutError)
 
 
 @pytest.mark.parametrize(("process", "number"), FATES)

@@ -24,6 +24,7 @@ from katana450.assembly.output import say
 from katana450.assembly.stop_process import StopConfig, run_stop
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
+from katana450.errors import ConfigurationError
 from katana450.extension import serve_extensions
 from katana450.platform_support import pipe_address, stop_signals
 from katana450.resources import URDF_PATH
@@ -93,8 +94,7 @@ def serve(
     settings = replace(settings, stop_port=stop_port)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
     event_log = _server_log(options, listening.getsockname()[1])
-    # Only this user can open it.
-    folder = Path(tempfile.mkdtemp(prefix="katana450-"))
+    folder = _private_folder()
     address = ArmAddress(pipe_address(folder, "arm"), secrets.token_bytes(32))
     front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
     arm = ArmConfig(settings, urdf, tool, options, address, folder)
@@ -166,6 +166,16 @@ def _server_log(options: Namespace | None, port: int) -> ServerLog:
             if found is not None:
                 return found
     return ServerLog()
+
+
+def _private_folder() -> Path:
+    """Return a new folder that only this user can open. Raises ConfigurationError."""
+    try:
+        return Path(tempfile.mkdtemp(prefix="katana450-"))
+    except OSError as error:
+        raise ConfigurationError(
+            f"No private folder can be created: {error}. Set TMPDIR to a writable folder."
+        ) from error
 
 
 def _address(settings: Settings, port: int) -> str:
