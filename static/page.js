@@ -3,8 +3,8 @@
 (() => {
   const STALE = 1.0; // s, age from which a picture is marked as old
   const SLOW = 150; // ms, round trip from which a connection counts as slow
-  const QUIET = 300; // ms without a message after which the state counts as unknown
-  const ANSWER = 500; // ms without an answer after which a STOP is sent again over HTTP
+  const QUIET = 300; // ms without a message after which the state is unknown
+  const ANSWER = 500; // ms without an answer after which a STOP is repeated by HTTP
   const TOAST = 4000; // ms
   const SIGN_IN = 4401; // close code: the page has to sign in again
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
