@@ -3,8 +3,8 @@
 (() => {
   const STALE = 1.0; // s, age from which a picture is marked as old
   const SLOW = 150; // ms, round trip from which a connection counts as slow
-  const QUIET = 300; // ms without a message, of which ten come a second, from which the state of the arm counts as unknown
-  const ANSWER = 500; // ms without an answer after which a STOP is sent again over HTTP
+  const QUIET = 300; // ms without a message after which the state is unknown
+  const ANSWER = 500; // ms without an answer after which a STOP is repeated by HTTP
   const TOAST = 4000; // ms
   const SIGN_IN = 4401; // close code: the page has to sign in again
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
@@ -31,8 +31,8 @@
   let trip = null;
   let asking = null;
   let press = null;
-  let stopPort = null; // port of this host that serves STOP alone
-  let proven = null; // cause of the stop that the arm has confirmed on another path
+  let stopPort = null; // port of STOP alone
+  let proven = null; // cause of a stop confirmed on another path
   let people = null;
 
   // A reloaded page keeps its name; a second tab gets another.
@@ -53,8 +53,7 @@
 
   // STOP
 
-  // A press is sent on all paths at once, over HTTP until it is answered. It counts once, because on a
-  // slow connection its last message may arrive after the stop was cleared.
+  // A press is sent on all paths until one answers, and counts once.
   function stop() {
     press = randomName();
     say({ do: "stop", press, id: press });
@@ -64,27 +63,25 @@
   }
 
   function insist() {
-    const { protocol, hostname } = location;
-    const paths = [""];
-    if (stopPort) paths.push(`${protocol}//${hostname}:${stopPort}/`);
-    for (const path of paths) post(path, press);
+    post("", press);
+    if (stopPort) post(`//${location.hostname}:${stopPort}/`, press);
     clearTimeout(asking);
     asking = setTimeout(insist, ANSWER);
   }
 
-  // The server of STOP answers with its stage; the first answer that confirms it counts.
+  // The port of STOP answers with the stage.
   async function post(path, sent) {
+    const url = `${path}stop?press=${sent}&page=${page}`;
     try {
-      const query = `press=${sent}&page=${page}`;
-      const answer = await fetch(`${path}stop?${query}`, { method: "POST", keepalive: true, credentials: "include" });
+      const answer = await fetch(url, { method: "POST", keepalive: true, credentials: "include" });
       if (sent !== press) return;
       if (answer.status === 429) return notCounted(await answer.text());
       if (!answer.ok) return;
-      const { stop: stage, why } = answer.status === 204 ? {} : await answer.json();
-      if (stage === "confirmed" && status?.stop !== "confirmed") proven = why;
+      const found = answer.status === 204 ? {} : await answer.json();
+      if (found.stop === "confirmed" && status?.stop !== "confirmed") proven = found.why;
       stopped();
     } catch {
-      // Another path, or the next attempt, may reach the server.
+      // Sent again.
     }
   }
 
@@ -253,13 +250,13 @@
     const missing = status?.stop_path;
     banner.hidden = !(lost || bad || missing) || (lost && !status);
     banner.className = lost ? "lost" : "";
+    const stale = "The picture is old.";
     let words = "The picture is old, although the connection is fast: this device may draw too slowly.";
-    if (proven && (lost || bad)) words = "The arm has confirmed the stop on another path. The picture is old.";
-    else if (lost && asking !== null) words = "No connection to the arm. Your STOP is sent as soon as it is back.";
-    else if (lost) words = "No connection to the arm. The picture is old. Reconnecting.";
-    else if (!bad) words = missing;
-    else if (silent > QUIET) words = "The arm does not answer. The picture is old.";
-    else if (trip > SLOW) words = "The connection is slow. The picture is old.";
+    if (!lost && !bad) words = missing;
+    else if (proven) words = `The arm has confirmed the stop on another path. ${stale}`;
+    else if (lost) words = `No connection to the arm. ${asking ? "Your STOP is sent as soon as it is back." : `${stale} Reconnecting.`}`;
+    else if (silent > QUIET) words = `The arm does not answer. ${stale}`;
+    else if (trip > SLOW) words = `The connection is slow. ${stale}`;
     if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
   }
 

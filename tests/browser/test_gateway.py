@@ -118,7 +118,7 @@ def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, trut
 
 def reset_by_key(page: ViserPage, truth: Truth) -> None:
     """Clear the stop by a key, because the mouse is in use."""
-    page.page.wait_for_selector("#clear-stop:not([hidden])")
+    page.page.wait_for_selector("#clear-stop:not([hidden]):enabled")
     page.page.focus("#clear-stop")
     page.page.keyboard.press("Enter")
     truth.wait(stopped=None)

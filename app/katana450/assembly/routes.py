@@ -96,9 +96,8 @@ def application(
         except msgspec.MsgspecError as error:
             raise HTTPException(400, "A token is required.") from error
         response = Response(status_code=204)
-        stop_port = hub.stop_path.port_beside(request.headers["host"])
-        if stop_port is not None:
-            response.headers[STOP_PORT] = str(stop_port)
+        if hub.stop_path.origin_beside(request.headers["host"]) is not None:
+            response.headers[STOP_PORT] = str(hub.stop_path.port)
         if not entry.token and authenticator.identity(request.cookies) is not None:
             return response
         _check_admitted(authenticator, request, entry.token)
