@@ -24,7 +24,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.planning.branch_region import BranchRegion
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.sampling import collision_free_path
+from katana450.maths.planning.sampling import collision_free_paths
 
 TICK = 0.01
 
@@ -206,10 +206,10 @@ def test_sampled_path_stays_on_its_branch_with_rounded_corners(pincher_back: Bra
     region = pincher_back
     bent = [pair for pair in pairs_on(region, 60) if not region.holds_line(*pair)]
     for a, b in bent[:2]:
-        path = collision_free_path(region.chain, a, b, None, 0.0, 0, region.branch)
-        for sigma in np.linspace(0.0, 1.0, 500).tolist():
-            q = [joint.derivatives()[0] for joint in path.joints(Jet.constant(sigma))]
-            assert region.holds(np.array(q))
+        for path in collision_free_paths(region.chain, a, b, None, 0.0, 0, region.branch):
+            for sigma in np.linspace(0.0, 1.0, 500).tolist():
+                q = [joint.derivatives()[0] for joint in path.joints(Jet.constant(sigma))]
+                assert region.holds(np.array(q))
 
 
 @pytest.fixture
@@ -234,4 +234,4 @@ def test_no_path_on_the_branch_is_refused(shipped: Session) -> None:
     back = chain.clamp(np.radians((0.0, -120.0, 10.0, -100.0, 0.0)))
     assert not BranchRegion(chain, Branch("front", "up")).holds(back)
     with pytest.raises(BlockedError, match="was found"):
-        collision_free_path(chain, front, back, None, 0.0, 0, Branch("front", "up"))
+        collision_free_paths(chain, front, back, None, 0.0, 0, Branch("front", "up"))

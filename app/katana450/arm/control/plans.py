@@ -15,24 +15,32 @@ from katana450.maths.planning.branch_region import BranchRegion
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, Plan, check_clear, plan
-from katana450.maths.planning.sampling import collision_free_path
+from katana450.maths.planning.sampling import collision_free_paths
 from katana450.maths.planning.scaling import Bounds
 
 
 def path_to(
+    arm: ArmModel, world: CollisionWorld | None, state: State, q_goal: FloatArray, seed: int = 0
+) -> JointPath:
+    """Return the joint path from the setpoint of ``state`` to ``q_goal`` (n,) [rad].
+
+    The path is straight if that is clear of ``world``, else sampled at random with ``seed``. Raises
+    InputError if the goal is beyond the limits or is the present posture, and BlockedError if no
+    clear path was found.
+    """
+    (path,) = _paths_to(arm, world, state, q_goal, seed, None)
+    return path
+
+
+def _paths_to(
     arm: ArmModel,
     world: CollisionWorld | None,
     state: State,
     q_goal: FloatArray,
-    seed: int = 0,
-    branch: Branch | None = None,
-) -> JointPath:
-    """Return the joint path from the setpoint of ``state`` to ``q_goal`` (n,) [rad].
-
-    The path is straight if that is clear of ``world`` and stays on ``branch``, else sampled at
-    random with ``seed``. Without a ``branch`` it may change it. Raises InputError if the goal is
-    beyond the limits or is the present posture, and BlockedError if no clear path was found.
-    """
+    seed: int,
+    branch: Branch | None,
+) -> list[JointPath]:
+    """Return the paths as ``path_to``; those of a ``branch`` stay on it."""
     chain, fingers = arm.chain_to(state.tool), state.gripper_setpoint
     straight = JointPath(chain, np.array((state.setpoint, chain.check_q(q_goal))))
     start, end = straight.start, straight.end
@@ -40,10 +48,10 @@ def path_to(
         if world is not None:
             check_clear(straight, world, fingers)
         if branch is None or BranchRegion(chain, branch).holds_line(start, end):
-            return straight
+            return [straight]
     except BlockedError:
         pass
-    return collision_free_path(chain, start, end, world, fingers, seed, branch)
+    return collision_free_paths(chain, start, end, world, fingers, seed, branch)
 
 
 def plan_to(
@@ -67,8 +75,8 @@ def detour_from(arm: ArmModel, world: CollisionWorld | None, state: State, seed:
     It stays on the branch of ``state``, which has that pose. Raises BlockedError if there is none.
     """
     assert state.beyond_gap is not None
-    path = path_to(arm, world, state, state.beyond_gap.q, seed, state.branch)
-    return plan_along(arm, world, state, [path])
+    paths = _paths_to(arm, world, state, state.beyond_gap.q, seed, state.branch)
+    return plan_along(arm, world, state, [*paths])
 
 
 def plan_along(

@@ -11,7 +11,7 @@ from katana450.maths.kinematics.arm import Five, arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 
-EDGE: Final = 1e-9
+EDGE: Final = 1e-10
 """Distance [m] beyond the edge of a branch, or sine [1] of the elbow, that is only rounding."""
 
 MAX_PIECES: Final = 4000

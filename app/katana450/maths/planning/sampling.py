@@ -10,6 +10,7 @@ counted in postures, so the same question has the same answer on every machine.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -94,8 +95,10 @@ class _Search:
     def clear(self, a: FloatArray, b: FloatArray) -> bool:
         """Return True if the straight path from `a` to `b` is clear, and on the branch."""
         checkpoint()
-        on_branch = self.region is None or self.region.holds_line(a, b)
-        return on_branch and self.met(a, b) is None
+        return self._holds(a, b) and self.met(a, b) is None
+
+    def _holds(self, a: FloatArray, b: FloatArray) -> bool:
+        return self.region is None or self.region.holds_line(a, b)
 
     def met(self, a: FloatArray, b: FloatArray) -> Contact | None:
         """Return the contact on the straight path from `a` to `b`; None when it is clear."""
@@ -116,7 +119,7 @@ class _Search:
                 continue
             reached = growing.postures[new]
             number: int | None = other.nearest(reached, speed)
-            while number is not None and not self._same(other.postures[number], reached):
+            while number is not None and not self.same(other.postures[number], reached):
                 number = self._extended(other, number, reached)
             if number is not None:
                 path = growing.path(new)[::-1] + other.path(number)[1:]
@@ -140,7 +143,8 @@ class _Search:
         q = towards if fraction >= 1.0 else here + fraction * step
         return tree.grown(number, q) if self.clear(here, q) else None
 
-    def _same(self, a: FloatArray, b: FloatArray) -> bool:
+    def same(self, a: FloatArray, b: FloatArray) -> bool:
+        """Return True if two postures are next to each other."""
         return bool((np.abs(a - b) <= SAME_POSTURE_TIME * self.chain.speed).all())
 
     def taut(self, path: list[FloatArray], random: np.random.Generator) -> list[FloatArray]:
@@ -170,11 +174,18 @@ class _Search:
         return path
 
     def _tidied(self, path: list[FloatArray]) -> list[FloatArray]:
-        """Return `path` without vias next to each other or to its end."""
+        """Return `path` without vias next to each other or to its end.
+
+        Of two vias next to each other the one stays that keeps the path on the branch.
+        """
         kept = path[:1]
-        for q in path[1:-1]:
-            if not self._same(kept[-1], q) and not self._same(path[-1], q):
-                kept.append(q)
+        for q, after in pairwise(path[1:]):
+            near = self.same(kept[-1], q) or self.same(path[-1], q)
+            if near and self._holds(kept[-1], after):
+                continue
+            if near and len(kept) > 1 and self._holds(kept[-2], q):
+                kept.pop()
+            kept.append(q)
         return [*kept, path[-1]]
 
     def _duration(self, path: list[FloatArray]) -> float:
@@ -183,7 +194,7 @@ class _Search:
         return float(legs.max(axis=1).sum())
 
 
-def collision_free_path(
+def collision_free_paths(
     chain: Chain,
     start: FloatArray,
     end: FloatArray,
@@ -191,8 +202,10 @@ def collision_free_path(
     fingers: float,
     seed: int,
     branch: Branch | None = None,
-) -> JointPath:
-    """Return a clear path from `start` to `end` (5,) [rad] with the fingers at one angle [rad].
+) -> list[JointPath]:
+    """Return clear paths from `start` to `end` (5,) [rad] with the fingers at one angle [rad].
+
+    There is one path, except where a `branch` is so narrow that the arm has to stop in between.
 
     Args:
         chain: the arm.
@@ -228,13 +241,30 @@ def collision_free_path(
             f"{between} Try another seed, or add a posture in between."
         )
     vias = search.taut(vias, random)
-    # Each corner is as smooth as the free space allows.
-    blend = np.full(len(vias) - 2, ROUNDINGS[0])
+    blends = [
+        0.0
+        if region and (search.same(before, via) or search.same(via, after))
+        else _largest_blend(region, before, via, after)
+        for before, via, after in zip(vias, vias[1:], vias[2:], strict=False)
+    ]
+    # The arm stops at a corner that no rounding keeps on the branch, and beside another via.
+    stops = [0, *(n for n, blend in enumerate(blends, 1) if blend == 0.0), len(vias) - 1]
+    return [
+        _rounded(chain, vias[a : b + 1], np.array(blends[a : b - 1]), world, fingers)
+        for a, b in pairwise(stops)
+    ]
+
+
+def _rounded(
+    chain: Chain,
+    vias: list[FloatArray],
+    blend: FloatArray,
+    world: CollisionWorld | None,
+    fingers: float,
+) -> JointPath:
+    """Return the path along `vias`, each corner as smooth as `blend` and the free space allow."""
     for rounding in ROUNDINGS:
-        blend = np.minimum(blend, rounding)
-        path = JointPath(chain, np.array(vias), blend)
-        if region is not None and not _corners_held(region, path):
-            continue
+        path = JointPath(chain, np.array(vias), np.minimum(blend, rounding))
         try:
             if world is not None:
                 check_clear(path, world, fingers)
@@ -246,13 +276,14 @@ def collision_free_path(
     )
 
 
-def _corners_held(region: BranchRegion, path: JointPath) -> bool:
-    """Return True if the rounded corners of `path` are on the branch of `region`."""
-    for before, via, after, blend in zip(
-        path.vias, path.vias[1:], path.vias[2:], path.blend.tolist(), strict=False
-    ):
+def _largest_blend(
+    region: BranchRegion | None, before: FloatArray, via: FloatArray, after: FloatArray
+) -> float:
+    """Return the largest of ROUNDINGS that keeps a corner on the branch; 0 if none does."""
+    for blend in ROUNDINGS:
         # A corner cuts off at most this fraction of each leg.
         cut = 0.5 * blend
-        if not region.holds_corner(via + cut * (before - via), via, via + cut * (after - via)):
-            return False
-    return True
+        ends = via + cut * (before - via), via + cut * (after - via)
+        if region is None or region.holds_corner(ends[0], via, ends[1]):
+            return blend
+    return 0.0

@@ -1,0 +1,65 @@
+"""The offer of a detour on the page: in the sentence of the bar, taken by Go or Enter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser.conftest import Windows
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+
+MOVE = "/target/move"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
+        yield page
+
+
+def why(page: ViserPage) -> str:
+    return page.page.locator("#why").inner_text()
+
+
+def drag_to_the_gap(page: ViserPage) -> None:
+    """Lift the tool by 20 cm and pull it back over the shoulder, where limits hold it."""
+    page.drag_arrow(MOVE, "z", 0.2)
+    page.wait_until(lambda: page.page.locator("#headline").inner_text() == "On target", "rest")
+    page.drag_arrow(MOVE, "x", -0.45)
+    page.wait_until(lambda: page.page.locator("#go").is_visible(), "the offer", seconds=20.0)
+
+
+def test_detour_is_offered_in_the_sentence_and_taken_by_enter_or_go(
+    page: ViserPage, artefacts: Path
+) -> None:
+    for taken_by in ("Enter", "Go"):
+        drag_to_the_gap(page)
+        assert "s detour" in why(page)
+        assert "press Enter or Go" in why(page)
+        page.screenshot(artefacts / f"detour-{taken_by}.png")
+        if taken_by == "Enter":
+            page.page.keyboard.press("Enter")
+        else:
+            page.page.locator("#go").click()
+        page.wait_until(lambda: page.page.locator("#go").is_hidden(), "the detour")
+        page.wait_until(
+            lambda: page.page.locator("body").get_attribute("data-mood") in ("ok", "limited"),
+            "the arrival",
+            seconds=20.0,
+        )
+        assert "would have to leap" not in why(page)
+        page.click_button("Home")
+        page.wait_until(
+            lambda: page.page.locator("#headline").inner_text() == "On target",
+            "the ready posture",
+            seconds=20.0,
+        )
