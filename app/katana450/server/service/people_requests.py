@@ -39,6 +39,7 @@ class PeopleRequests:
                 self._mute(window, self._person(number), seconds)
             case requests.Unmute(person=number):
                 found = self._person(number)
+                self._note("unmute", window, found)
                 self._people.mutes.remove(found.session)
                 self._store_mute(window, found, None)
                 log.warning("%s ended the mute of %s.", window.person.name, self._name(found))
@@ -51,6 +52,7 @@ class PeopleRequests:
         if person.session == session_of(window.person.key):
             raise InputError("You cannot disconnect yourself. Close your windows instead.")
         if not request.revoke:
+            self._note("kick", window, person, seconds=request.seconds)
             if request.seconds:
                 log.warning("%s disconnected %s for %g s.", by, name, request.seconds)
                 people.kick(person, request.seconds)
@@ -63,6 +65,7 @@ class PeopleRequests:
             raise InputError("This server has no links that could be revoked.")
         if person.role is Role.ADMIN:
             raise LeaseError("Revoke the link of an admin with `katana450 access revoke`.")
+        self._note("revoke", window, person)
         people.kick(person, math.inf)
         log.warning("%s revoked the link of %s.", by, name)
         people.write(
@@ -75,8 +78,14 @@ class PeopleRequests:
             raise LeaseError("An admin cannot be muted.")
         self._people.mutes.add(person.session, seconds)
         name = self._name(person)
+        self._note("mute", window, person, seconds=seconds)
         log.warning("%s muted %s: one STOP per %g s.", window.person.name, name, seconds)
         self._store_mute(window, person, seconds)
+
+    def _note(self, kind: str, window: Window, person: Identity, **values: float) -> None:
+        """Note for the event log what an admin did to ``person``."""
+        what = {"person": self._name(person), "link": person.link, **values}
+        self._hub.recorder.note(kind, window.actor, what, always=True)
 
     def _store_mute(self, window: Window, person: Identity, interval: float | None) -> None:
         links = self._people.links
