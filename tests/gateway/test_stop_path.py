@@ -19,7 +19,7 @@ from katana450.arm.control.lease import Role
 from katana450.client import Client, connect
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
-from tests.browser.server import APP, AppServer
+from tests.browser.server import APP, AppServer, ServerError
 from tests.gateway.client import HOUR, ask, controlling, enter, page_name
 from tests.gateway.postures import THERE
 from tests.gateway.test_isolation import process_state, under_way
@@ -61,7 +61,7 @@ def until(true: Callable[[], bool], seconds: float = 10.0) -> None:
 
 
 def stop_processes(server: AppServer) -> list[int]:
-    with suppress(ValueError, OSError):
+    with suppress(ServerError, OSError):
         return [server.stop_process]
     return []
 
@@ -263,7 +263,7 @@ def test_page_behind_a_proxy_sends_stop_to_its_own_address() -> None:
         assert (status, answer["stop"]) == (200, "confirmed")
 
 
-def test_stop_process_ends_with_the_process_of_the_arm() -> None:
+def test_stop_process_ends_with_its_supervisor() -> None:
     with AppServer(APP) as server:
         number = server.stop_process
         os.kill(server.pid, signal.SIGKILL)
@@ -284,6 +284,24 @@ def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> 
         assert (status, answer["stop"]) == (200, "confirmed")
         cookie = enter(server.url, viewer)
         assert stop(server.stop_url, path="/stop", Cookie=cookie, Origin=server.url)[0] == 200
+
+
+def test_stop_of_a_muted_viewer_counts_once_per_interval(tmp_path: Path) -> None:
+    path = tmp_path / "access.json"
+    links = AccessFile.create(path)
+    muted = links.give("Vera", Role.VIEWER, time.time() + HOUR)
+    operator = links.give("Otto", Role.OPERATOR, time.time() + HOUR)
+    (number,) = (each for each, grant in links.grants.items() if grant.name == "Vera")
+    links.mute(number, 30.0)
+    with AppServer((*APP, "--access", str(path))) as server:
+        assert stop(server.stop_url, Authorization=f"Bearer {muted}")[0] == 200
+        with connect(server.url, "Driver", token=operator) as driver:
+            driver.clear_stop()
+            status, answer = stop(server.stop_url, Authorization=f"Bearer {muted}")
+            assert status == 429
+            assert "Your next one counts in" in answer["words"]
+            assert driver.query(answers.State).stopped is None
+            assert stop(server.stop_url, Authorization=f"Bearer {operator}")[0] == 200
 
 
 def test_flood_of_presses_delays_no_other_stop(server: AppServer, program: Client) -> None:

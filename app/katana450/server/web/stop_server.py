@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import math
 import secrets
 import time
 from collections.abc import Mapping
@@ -25,6 +26,7 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.stop_messages import StopPress, StopStatus
 from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.service.identity import PAGE, Identity
+from katana450.server.service.mutes import MutedError, Mutes
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.token_bucket import TokenBucket
@@ -108,6 +110,7 @@ class StopServer:
         self._main_port = main_port
         self._acceptor = acceptor
         self._often: dict[str, TokenBucket] = {}
+        self._mutes = Mutes(time.monotonic)
         self._kept = 0
 
     def protocol(self) -> asyncio.Protocol:
@@ -183,9 +186,9 @@ class StopServer:
             part.strip().partition("=")[::2] for part in headers.get("cookie", "").split(";")
         )
         if path == STOP_PATHS[0]:
-            return self._authenticator.identity(cookies)
+            return self._authenticator.identity(cookies, stopping=True)
         return self._authenticator.program(
-            headers.get("x-name", ""), headers.get("authorization", ""), cookies
+            headers.get("x-name", ""), headers.get("authorization", ""), cookies, stopping=True
         )
 
     async def _stop(
@@ -214,6 +217,10 @@ class StopServer:
         if stopped is not None and not self._takes(who):
             await asyncio.sleep(DELAY)
             return _stop_reply(stopped)
+        if stopped is None:
+            refusal = self._muted(identity)
+            if refusal is not None:
+                return refusal
         # Sent even if the arm is stopped, so that late copies of this press are recognised.
         link.press(StopPress(cause, actor))
         if stopped is None:
@@ -226,6 +233,19 @@ class StopServer:
             finally:
                 self._kept -= kept
         return _stop_reply(stopped)
+
+    def _muted(self, identity: Identity) -> Reply | None:
+        """Count a STOP of a muted ``identity``; return the refusal of one that does not count."""
+        if identity.muted is None:
+            self._mutes.remove(identity.session)
+            return None
+        self._mutes.add(identity.session, identity.muted)
+        try:
+            self._mutes.count_stop(identity.session)
+        except MutedError as error:
+            retry = ("retry-after", str(math.ceil(error.retry)))
+            return Reply(HTTPStatus.TOO_MANY_REQUESTS, str(error).encode(), headers=(retry,))
+        return None
 
     def _health(self) -> Reply:
         link = self._link
