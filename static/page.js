@@ -10,7 +10,7 @@
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
   const SIMULATION =
-    "pauses after a quarter of a second, because it is simulated: its next command moves it. After five seconds it stops";
+    "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
