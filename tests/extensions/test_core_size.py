@@ -11,7 +11,7 @@ import katana450
 
 PACKAGE = Path(katana450.__file__).parent
 CORE = ("maths", "arm", "server", "assembly", "cli")
-MAX_LINES = 20_000
+MAX_LINES = 21_000
 SILENT = frozenset(
     (
         tokenize.COMMENT,
@@ -38,7 +38,7 @@ def code_lines(text: str) -> int:
     return len(code - docstrings)
 
 
-def test_core_has_at_most_20000_lines_of_code() -> None:
+def test_core_has_at_most_21000_lines_of_code() -> None:
     files = [*PACKAGE.glob("*.py")]
     for name in CORE:
         files += (PACKAGE / name).rglob("*.py")
