@@ -1,10 +1,11 @@
-"""Accuracy with which streams of joint angles are followed, beside two peers with the same samples.
+"""Accuracy with which streams of joint angles are followed, beside three peers.
 
     python -m benchmarks.streams
 
 One joint of the arm (axis 1) and its limits. Peers: ruckig, which plans a path to the newest
-sample, extrapolated at its rate, in each tick; and a first-order smoothing filter, like that in
-front of many servo controllers, followed by limits of speed, acceleration and jerk. Each gets the
+sample, extrapolated at its rate, in each tick; a first-order smoothing filter, like that in front
+of many servo controllers, followed by limits of speed, acceleration and jerk; and the Butterworth
+filter of MoveIt Servo with its default coefficient, which bounds the speed alone. Each gets the
 same samples at the same times. The columns of each stream are:
 
 * used: fraction of the acceleration limit that the stream itself needs (above 1 it cannot be
@@ -38,6 +39,9 @@ TRANSPORT = 0.004
 
 SMOOTHING = 0.06
 """[s] Time constant of the smoothing peer."""
+
+SERVO_COEFFICIENT = 1.5
+"""[1] Default of ``low_pass_filter_coeff`` in the Butterworth filter of MoveIt Servo."""
 
 Signal = Callable[[float], float]
 
@@ -159,6 +163,26 @@ def smoothed(limiter: Limiter, feed: Feed) -> FloatArray:
     return np.array(found)
 
 
+def servo_filtered(limiter: Limiter, feed: Feed) -> FloatArray:
+    """Follow with the filter that MoveIt Servo ships by default, and the speed limit behind it.
+
+    It is a Butterworth low-pass of first order in the form of a bilinear transform. Like Servo, it
+    bounds the speed and neither acceleration nor jerk.
+    """
+    scale, feedback = 1.0 / (1.0 + SERVO_COEFFICIENT), 1.0 - SERVO_COEFFICIENT
+    top = float(limiter.limits.speed[0]) * TICK
+    goal, before, low, q, qd, found = None, 0.0, 0.0, 0.0, 0.0, []
+    for samples in feed.ticks:
+        for _, sample, _ in samples:
+            goal = sample
+        if goal is not None:
+            low, before = scale * (before + goal - feedback * low), goal
+        step = min(max(low - q, -top), top)
+        q, was, qd = q + step, qd, step / TICK
+        found.append((q, qd, (qd - was) / TICK))
+    return np.array(found)
+
+
 @dataclass(frozen=True)
 class Outcome:
     """The quality of following a stream, as described at the top of this file.
@@ -236,7 +260,12 @@ def cases() -> Iterator[Case]:
                     yield Case("too fast: steps of 0.5 rad", steps(0.5, 2.0), 2.0, 8.0, *how)
 
 
-PEERS: dict[str, Follower] = {"ours": ours, "ruckig": ruckigs, "smoothed": smoothed}
+PEERS: dict[str, Follower] = {
+    "ours": ours,
+    "ruckig": ruckigs,
+    "smoothed": smoothed,
+    "servo": servo_filtered,
+}
 
 
 def axis_1() -> Limiter:
@@ -257,22 +286,26 @@ def main() -> None:
     print(
         "| stream | Hz | qd | jitter, ms | used | beyond, % | amplitude, % | lag, ms "
         "| ruckig beyond, % | amplitude, % | error, ratio "
-        "| smoothed beyond, % | amplitude, % | lag, ms |"
+        "| smoothed beyond, % | amplitude, % | lag, ms "
+        "| Servo amplitude, % | lag, ms | acceleration, of its limit |"
     )
-    print("|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
+    print("|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
     for case in cases():
         if only and case.hz != only:
             continue
         feed = Feed.of(case)
-        own, other, low = (judged(case, follow(limiter, feed)) for follow in PEERS.values())
-        used = case.used / float(limiter.limits.acceleration[0])
+        followed = {name: follow(limiter, feed) for name, follow in PEERS.items()}
+        own, other, low, servo = (judged(case, each) for each in followed.values())
+        limit = float(limiter.limits.acceleration[0])
+        used, pushed = case.used / limit, np.abs(followed["servo"][2:, 2]).max() / limit
         rates, jitter = "yes" if case.rates else "no", 1e3 * case.jitter
         print(
             f"| {case.name} | {case.hz:g} | {rates} | {jitter:g} "
             f"| {'-' if used > 9 else format(used, '.2f')} "
             f"| {100 * own.beyond:.2f} | {100 * own.peak:.1f} | {1e3 * own.lag:.0f} "
             f"| {100 * other.beyond:.1f} | {100 * other.peak:.1f} | {other.left / own.left:.1f} "
-            f"| {100 * low.beyond:.1f} | {100 * low.peak:.1f} | {1e3 * low.lag:.0f} |"
+            f"| {100 * low.beyond:.1f} | {100 * low.peak:.1f} | {1e3 * low.lag:.0f} "
+            f"| {100 * servo.peak:.1f} | {1e3 * servo.lag:.0f} | {pushed:.1f} |"
         )
 
 

@@ -30,10 +30,14 @@ def why(page: ViserPage) -> str:
     return page.page.locator("#why").inner_text()
 
 
+def mood(page: ViserPage) -> str | None:
+    return page.page.locator("body").get_attribute("data-mood")
+
+
 def drag_to_the_gap(page: ViserPage) -> None:
     """Lift the tool by 20 cm and pull it back over the shoulder, where limits hold it."""
     page.drag_arrow(MOVE, "z", 0.2)
-    page.wait_until(lambda: page.page.locator("#headline").inner_text() == "On target", "rest")
+    page.wait_until(lambda: mood(page) == "limited", "rest")
     page.drag_arrow(MOVE, "x", -0.45)
     page.wait_until(lambda: page.page.locator("#go").is_visible(), "the offer", seconds=20.0)
 
@@ -52,7 +56,7 @@ def test_detour_is_offered_in_the_sentence_and_taken_by_enter_or_go(
             page.page.locator("#go").click()
         page.wait_until(lambda: page.page.locator("#go").is_hidden(), "the detour")
         page.wait_until(
-            lambda: page.page.locator("body").get_attribute("data-mood") in ("ok", "limited"),
+            lambda: mood(page) in ("ok", "limited"),
             "the arrival",
             seconds=20.0,
         )

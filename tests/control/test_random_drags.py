@@ -226,7 +226,7 @@ def check_detour(
     seen: Counter[str],
     number: int,
 ) -> None:
-    """Take the detour from ``state``; it exists wherever brute force finds a continuous path."""
+    """Take the detour from ``state``; it exists if brute force finds a continuous path."""
     assert state.beyond_gap is not None
     goal, branch, chain = state.beyond_gap.q, state.branch, arm.chain
     here, there = (regions.label(q, branch) for q in (state.setpoint, goal))

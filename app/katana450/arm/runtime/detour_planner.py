@@ -25,7 +25,7 @@ WAKE_INTERVAL = 0.5
 
 
 class DetourPlanner:
-    """Offers a detour wherever a drag ended at a gap that a clear path on its branch leads round.
+    """Offers a detour at each gap that ended a drag, if a clear path on the branch leads round it.
 
     The session withdraws the offer when anything changes; then a new one is planned.
     """
