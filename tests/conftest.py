@@ -26,6 +26,7 @@ BROWSER = "browser"
 
 SERVERS = (
     "gateway",
+    "event_log",
     "extensions",
     "cli/test_serve.py",
     "robot/test_other_arms.py",
