@@ -51,6 +51,8 @@ def pytest_report_header() -> str:
     return "every test with all its cases" if LONG else "without what is left to `make test-long`"
 
 
+# Before pytest-xdist reads the groups.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Deselect long tests unless all tests are requested, and share the rest among the workers.
 
