@@ -8,7 +8,13 @@ run_ok  := $(VENV)/.run-ready
 dev_ok  := $(VENV)/.dev-ready
 js_ok   := $(VENV)/.js-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
-at_once := $(bin)/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
+browser := tests/browser
+servers := tests/gateway tests/event_log tests/extensions tests/cli/test_serve.py tests/robot/test_other_arms.py \
+           tests/docs tests/examples tests/library/test_run.py
+heavy   := tests/control tests/kinematics tests/robot_description tests/collision tests/planning tests/robot \
+           tests/water tests/motion tests/geometry tests/exchange tests/packaging
+lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
+patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 javascript := tests/javascript
@@ -48,22 +54,32 @@ octave: $(dev_ok)             ## find GNU Octave, or install it where that can b
 exchange: $(dev_ok)           ## find the programs that read our exports, or install them
 	$(bin)/python tests/exchange/tools.py
 
-# As many workers as there are cores; tests/conftest.py shares the tests among them. What failed is
-# tried once more when nothing else runs, for a browser or server that was starved of time meanwhile.
+# Two at once, as many as there are cores: those that drive a browser, and beside them those that run
+# servers; after each of them a share of those that only compute, which give way to the others. A
+# browser or server that was starved of time meanwhile is tried once more when nothing else runs.
 tests: $(dev_ok)
 	@# Once, for the hundreds of processes that are started.
 	@$(bin)/python -m compileall -q app/katana450 robot_description
-	$(at_once) $(ARGS) || $(bin)/python -m pytest --last-failed --last-failed-no-failures none $(ARGS)
+	@rm -rf $(VENV)/again*
+	@( $(lane)-servers $(servers) > $(VENV)/servers.log 2>&1 || echo servers >> $(VENV)/again; \
+	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) \
+	      > $(VENV)/computed.log 2>&1 ) & beside=$$!; \
+	  $(lane)-browser $(browser) || echo browser >> $(VENV)/again; \
+	  $(patient) $(heavy) $(servers:%=--ignore=%); status=$$?; \
+	  wait $$beside || status=1; cat $(VENV)/servers.log $(VENV)/computed.log; \
+	  for which in $$(cat $(VENV)/again 2> $(VENV)/again-none); do \
+	    $(lane)-$$which --last-failed --last-failed-no-failures none || status=1; done; \
+	  exit $$status
 
 # With what takes long: demos as commands, programs on live servers, exports read by other programs; and
 # more of what `make test` does a few times: 200 STOPs instead of 12, 10,000 drags instead of 2,500.
 test-long: $(dev_ok) browser exchange ## every test with all its cases
-	KATANA450_LONG=1 $(at_once) $(ARGS) || KATANA450_LONG=1 $(bin)/python -m pytest --last-failed --last-failed-no-failures none $(ARGS)
+	KATANA450_LONG=1 $(bin)/python -m pytest $(ARGS)
 
 # Beside `make test`: measuring costs a quarter of the time of the tests (Python 3.11).
 coverage: $(dev_ok)           ## which lines of the app the tests without a browser run, servers among them
 	rm -f .coverage .coverage.*
-	$(bin)/coverage run -m pytest --ignore=tests/browser $(ARGS); status=$$?; \
+	$(bin)/coverage run -m pytest --ignore=$(browser) $(ARGS); status=$$?; \
 	  $(bin)/coverage combine --quiet && $(bin)/coverage report --sort=cover --skip-covered; exit $$status
 
 docs: $(dev_ok)               ## build the documentation site in build/site

@@ -7,7 +7,6 @@ import os
 import shutil
 import signal
 import tempfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,21 +19,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.settings import Settings
 
 LONG = "KATANA450_LONG" in os.environ
-
-BROWSER = "browser"
-"""Folder of the tests that drive a browser, which draws in software on all cores."""
-
-SERVERS = (
-    "gateway",
-    "event_log",
-    "extensions",
-    "cli/test_serve.py",
-    "robot/test_other_arms.py",
-    "docs",
-    "examples",
-    "library/test_run.py",
-)
-"""Folders and files of the tests that start servers and wait for them."""
 
 
 def pytest_configure() -> None:
@@ -51,30 +35,12 @@ def pytest_report_header() -> str:
     return "every test with all its cases" if LONG else "without what is left to `make test-long`"
 
 
-# Before pytest-xdist reads the groups.
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect long tests unless all tests are requested, and share the rest among the workers.
-
-    One worker drives the browser; the others take file by file, those of servers first, because
-    they wait the most.
-    """
+    """Deselect long tests unless all tests are requested."""
     left_out = [] if LONG else [item for item in items if item.get_closest_marker("long")]
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
-    items.sort(key=_turn)
-    for item in items:
-        name = BROWSER if _turn(item) == 0 else str(item.path)
-        item.add_marker(pytest.mark.xdist_group(name))
-
-
-def _turn(item: pytest.Item) -> int:
-    """Return 0 for tests of a browser, 1 for tests of servers, 2 for all others."""
-    path = item.path.relative_to(Path(__file__).parent).as_posix()
-    if path.startswith(BROWSER):
-        return 0
-    return 1 if path.startswith(SERVERS) else 2
 
 
 @pytest.fixture(scope="session")
