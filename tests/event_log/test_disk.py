@@ -106,7 +106,7 @@ def test_server_drives_and_stops_while_the_disk_is_full(tmp_path: Path) -> None:
         assert server.output.count("cannot be written") == 1
         device.unlink()
         wait(lambda: "is written again" in server.output)
-        arm.ask(requests.ClearStop())
+        arm.clear_stop()
     assert {"start", "command", "stop", "clear", "end"} <= {
         each["kind"] for each in records(folder)
     }
@@ -124,7 +124,7 @@ def test_server_drives_stops_and_ends_while_the_disk_is_stuck(tmp_path: Path) ->
                 began = time.perf_counter()
                 arm.ask(requests.Stop())
                 delays.append(time.perf_counter() - began)
-                arm.ask(requests.ClearStop())
+                arm.clear_stop()
         assert sorted(delays)[10] < 0.1
         server.stop()
         assert not server.running

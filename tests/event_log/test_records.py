@@ -210,7 +210,7 @@ def test_flood_of_stops_on_a_server_is_counted(tmp_path: Path) -> None:
             arm.ask(requests.Speed(value=0.5))
             for _ in range(400):
                 flood.ask(requests.Stop())
-            arm.ask(requests.ClearStop())
+            arm.clear_stop()
             arm.ask(requests.Nudge(axis=1, by=0.1))
         server.stop()
     found = records(tmp_path)

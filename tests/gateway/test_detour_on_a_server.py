@@ -75,7 +75,7 @@ def test_stop_withdraws_the_offer(program: Client) -> None:
     wait_for(program, lambda state: state.stopped is not None)
     with pytest.raises(RefusedError, match="clear the stop first"):
         program.ask(requests.Go())
-    program.ask(requests.ClearStop())
+    program.clear_stop()
     with pytest.raises(RefusedError, match="No detour is offered"):
         program.ask(requests.Go())
     assert program.query(answers.State).detour is None
@@ -128,7 +128,7 @@ def test_setting_takes_no_detour_after_a_stop(automatic: AppServer) -> None:
         program.ask(requests.EndDrag())
         program.ask(requests.Stop())
         stopped = wait_for(program, lambda now: now.stop == "confirmed" and not now.moving)
-        program.ask(requests.ClearStop())
+        program.clear_stop()
         time.sleep(1.0)
         np.testing.assert_allclose(program.query(answers.State).q, stopped.q, atol=1e-9)
         assert distance(state) > 0.01
