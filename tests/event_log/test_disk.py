@@ -113,6 +113,7 @@ def test_server_drives_and_stops_while_the_disk_is_full(tmp_path: Path) -> None:
     assert verified(folder).faults == []
 
 
+@pytest.mark.long
 def test_server_drives_stops_and_ends_while_the_disk_is_stuck(tmp_path: Path) -> None:
     """Give the log a pipe without a reader: opening it for writing never returns."""
     os.mkfifo(tmp_path / FIRST)
@@ -130,6 +131,7 @@ def test_server_drives_stops_and_ends_while_the_disk_is_stuck(tmp_path: Path) ->
         assert not server.running
 
 
+@pytest.mark.long
 def test_server_runs_where_the_log_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     with (

@@ -204,6 +204,7 @@ def test_notes_that_nobody_reads_do_not_pile_up() -> None:
     assert (recorder.notes.qsize(), recorder.lost) == (MAX_WAITING, 10)
 
 
+@pytest.mark.long
 def test_flood_of_stops_on_a_server_is_counted(tmp_path: Path) -> None:
     with AppServer((*APP, "--log", str(tmp_path))) as server:
         with connect(server.url, "Flood") as flood, connect(server.url, "Anna") as arm:

@@ -81,6 +81,7 @@ def test_stop_withdraws_the_offer(program: Client) -> None:
     assert program.query(answers.State).detour is None
 
 
+@pytest.mark.long
 def test_new_offer_follows_a_change_of_the_world(program: Client) -> None:
     held_at_the_gap(program)
     program.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.02]))
@@ -89,6 +90,7 @@ def test_new_offer_follows_a_change_of_the_world(program: Client) -> None:
     wait_for(program, lambda state: state.detour is not None)
 
 
+@pytest.mark.long
 def test_command_line_takes_the_detour(program: Client, server: AppServer) -> None:
     program.go(requests.Home())
     program.ask(requests.ReleaseLease())
@@ -111,6 +113,7 @@ def automatic() -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 def test_setting_takes_the_detour_when_the_hand_lets_go(automatic: AppServer) -> None:
     with connect(automatic.url, "Test") as program:
         state = held_at_the_gap(program)
@@ -122,6 +125,7 @@ def test_setting_takes_the_detour_when_the_hand_lets_go(automatic: AppServer) ->
         assert arrived.branch == state.branch
 
 
+@pytest.mark.long
 def test_setting_takes_no_detour_after_a_stop(automatic: AppServer) -> None:
     with connect(automatic.url, "Test") as program:
         state = held_at_the_gap(program)

@@ -157,8 +157,7 @@ def test_kicked_person_is_disconnected_and_comes_back_later(site: Site) -> None:
             await admin.say("acquire")
             assert ask(f"{url}/stop", data=b"", Cookie=cookie, Origin=url)[0] == 204
             await admin.wait(stopped="Kai pressed STOP.")
-            await admin.say("clear_stop")
-            await admin.wait(stopped=None)
+            await admin.clear_stop()
             assert ask(f"{url}/stop", data=b"", Cookie=cookie, Origin=url)[0] == 429
             assert ask(f"{url}/api/v1/stop", data=b"", **bearer)[0] == 429
             assert (await admin.wait())["stopped"] is None
@@ -256,6 +255,7 @@ def test_flooding_viewer_is_muted_and_others_still_stop(site: Site) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_mute_outlasts_the_server(tmp_path: Path) -> None:
     path = tmp_path / "access.json"
     file = AccessFile.create(path)

@@ -105,6 +105,7 @@ async def is_refused(site: Site, cookie: str) -> bool:
         return socket.close_code == LIMIT_CLOSE_CODE
 
 
+@pytest.mark.long
 def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(site: Site) -> None:
     async def act() -> None:
         driver, admin = site.cookie(Role.OPERATOR), site.cookie(Role.ADMIN)

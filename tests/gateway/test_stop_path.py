@@ -181,7 +181,7 @@ def test_stop_with_a_body_or_without_reading_the_answer_counts(
     until(lambda: program.query(answers.State).stop == "confirmed")
 
 
-@pytest.mark.parametrize("port", ["main", "stop"])
+@pytest.mark.parametrize("port", ["main", pytest.param("stop", marks=pytest.mark.long)])
 def test_stop_is_confirmed_among_silent_connections(
     server: AppServer, program: Client, port: str
 ) -> None:
@@ -210,6 +210,7 @@ def test_stop_is_confirmed_while_the_front_end_is_frozen() -> None:
         assert state.q[0] - before.q[0] < 1.5
 
 
+@pytest.mark.long
 def test_stop_of_a_frozen_arm_is_requested_and_then_executed() -> None:
     with AppServer(APP) as server, connect(server.url, "Driver") as program:
         under_way(program)
@@ -249,6 +250,7 @@ class ProxiedServer(AppServer):
         self.local, self.url = self.url, public
 
 
+@pytest.mark.long
 def test_page_behind_a_proxy_sends_stop_to_its_own_address() -> None:
     public = "https://arm.example.org"
     with ProxiedServer(public) as server:

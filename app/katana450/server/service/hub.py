@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from argparse import Namespace
 from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +27,7 @@ from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
+from katana450.server.service.mutes import MutedError
 from katana450.server.service.participants import Takeover, Window, key_of, session_of
 from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
@@ -229,14 +231,15 @@ class Hub:
         A repeated ``press`` counts once: it changes nothing, and the ticket is 0. Raises MutedError
         for a muted identity whose STOP does not count. The driver's always counts.
         """
-        if self.gate.is_known(press):
-            return 0
-        session = session_of(actor.key)
+        session, known = session_of(actor.key), self.gate.is_known(press)
         if not self.drives(session) and self.people.is_muted(session):
-            if self.stopped is not None:
-                # It changes nothing, and must not use up the next one.
+            # A press that changes nothing uses up nothing. A known one counted on another path.
+            if self.stopped is not None and not known:
                 return 0
-            self.people.count_stop(session)
+            with suppress(MutedError) if known else nullcontext():
+                self.people.count_stop(session)
+        if known:
+            return 0
         return self.gate.submit(cmd.Stop(pressed(actor.name, actor.key, press, 0.0)), actor)
 
     def drives(self, session: str) -> bool:
@@ -253,11 +256,10 @@ class Hub:
 
     def take(self, window: Window) -> None:
         """Take the lease from its holder for ``window``. Raises LeaseError if not allowed."""
-        driving = [
-            each.person.key for each in self.windows if self.giver(each) == self.lease.holder
-        ]
+        holder = self.lease.holder
+        driving = frozenset(w.person.key for w in self.windows if self.giver(w) == holder)
         self.gate.change(lambda lease, t: lease.take(window.person, t), window.actor)
-        self._takeover = Takeover(window.person, frozenset(driving))
+        self._takeover = Takeover(window.person, driving)
 
     def request(self, window: Window) -> None:
         """Request the lease from its holder for ``window``. Raises LeaseError."""
