@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import re
 import signal
 import socket
@@ -42,9 +43,8 @@ class ServerError(RuntimeError):
 
 def free_port() -> int:
     """Return a free port of PORTS. Raises ServerError if all are in use."""
-    for attempt in range(len(PORTS)):
-        # Each process begins at another port, so that parallel runs rarely collide.
-        port = PORTS[(37 * os.getpid() + attempt) % len(PORTS)]
+    # In another order each time, so that parallel runs rarely collide.
+    for port in random.sample(PORTS, len(PORTS)):
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:

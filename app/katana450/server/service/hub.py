@@ -256,10 +256,9 @@ class Hub:
 
     def take(self, window: Window) -> None:
         """Take the lease from its holder for ``window``. Raises LeaseError if not allowed."""
-        holder = self.lease.holder
-        driving = frozenset(w.person.key for w in self.windows if self.giver(w) == holder)
+        keys = frozenset(w.person.key for w in self.windows if self.giver(w) == self.lease.holder)
         self.gate.change(lambda lease, t: lease.take(window.person, t), window.actor)
-        self._takeover = Takeover(window.person, driving)
+        self._takeover = Takeover(window.person, keys)
 
     def request(self, window: Window) -> None:
         """Request the lease from its holder for ``window``. Raises LeaseError."""
@@ -271,10 +270,10 @@ class Hub:
 
     def taken_by(self, window: Window) -> str | None:
         """Return the name of the person who took the lease from ``window`` and still holds it."""
-        takeover = self._takeover
-        if takeover is None or window.person.key not in takeover.drivers:
+        took = self._takeover
+        if took is None or window.person.key not in took.drivers or self.lease.holder != took.taker:
             return None
-        return takeover.taker.name if self.lease.holder == takeover.taker else None
+        return took.taker.name
 
     def release_lease(self, window: Window) -> None:
         """Release the lease of ``window``. Raises LeaseError if another holds it."""
