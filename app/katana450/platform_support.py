@@ -123,7 +123,8 @@ def pipe_address(folder: Path, name: str) -> str:
     """Return the address of a listener for processes of this user, in the private ``folder``."""
     if sys.platform == "win32":
         return rf"\\.\pipe\{folder.name}-{name}"
-    return str(folder / name)
+    else:  # noqa: RET505 - so that mypy follows either system
+        return str(folder / name)
 
 
 def claim_port(sock: socket.socket) -> None:
@@ -184,11 +185,12 @@ def state_folder() -> Path:
     if sys.platform == "win32":
         default = Path.home() / "AppData" / "Local"
         return Path(os.environ.get("LOCALAPPDATA") or default)
-    if sys.platform == "darwin":
+    elif sys.platform == "darwin":  # noqa: RET505 - so that mypy follows either system
         return Path.home() / "Library" / "Application Support"
-    named = os.environ.get("XDG_STATE_HOME", "")
-    # The standard of these folders demands that a relative path is ignored.
-    return Path(named) if Path(named).is_absolute() else Path.home() / ".local" / "state"
+    else:
+        named = os.environ.get("XDG_STATE_HOME", "")
+        # The standard of these folders demands that a relative path is ignored.
+        return Path(named) if Path(named).is_absolute() else Path.home() / ".local" / "state"
 
 
 def _set_priority_class(priority: int) -> None:
