@@ -6,21 +6,25 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.restart import at_rest, restarted
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.arm.control.stop_cause import StopCause
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame
+from tests.control.clearing import cleared
 from tests.control.test_session import reasons, run
 
 LATE = Finding(Reason.LOOP_LATE, 0.3)
 
 
 def test_profile_chooses_between_stop_and_pause() -> None:
-    assert SilenceProfile.REAL_ARM.braking(LATE, 0.3) == cmd.Stop(finding=LATE)
+    stop = cmd.Stop(StopCause(f"{finding_text(LATE)}."), LATE)
+    assert SilenceProfile.REAL_ARM.braking(LATE, 0.3) == stop
     assert SilenceProfile.SIMULATION.braking(LATE, 0.3) == cmd.Hold(finding=LATE)
-    assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT) == cmd.Stop(finding=LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT) == stop
 
 
 @pytest.fixture
@@ -63,7 +67,7 @@ def test_stop_keeps_its_cause_until_it_is_cleared(session: Session, state: State
     assert reasons(stopped) == {Reason.STOPPED, Reason.LOOP_LATE}
     again = run(session, stopped, [cmd.Stop()])
     assert reasons(again) == {Reason.STOPPED, Reason.LOOP_LATE}
-    assert reasons(run(session, again, [cmd.ClearStop()])) == set()
+    assert reasons(cleared(session, again)) == set()
 
 
 def test_restarted_arm_is_stopped_with_the_scene_of_the_kept_state(

@@ -12,10 +12,13 @@ import os
 import re
 import subprocess
 import sys
+import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -221,18 +224,25 @@ def read_shape_guarded(
 
 def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:
     """Return the output of ``process`` for ``data``. Raises InputError after `SECONDS`."""
-    due, given = time.monotonic() + SECONDS, data
+    # After a timeout, communicate() sends no more of its input: a thread of its own sends it.
+    threading.Thread(target=_send, args=(process.stdin, data), daemon=True).start()
+    process.stdin = None
+    due = time.monotonic() + SECONDS
     while True:
         checkpoint()
         try:
-            return process.communicate(given, CHECK_EVERY)[0]
+            return process.communicate(timeout=CHECK_EVERY)[0]
         except subprocess.TimeoutExpired as error:
-            # What is given once is sent to its end.
-            given = b""
             if time.monotonic() > due:
                 raise InputError(
                     f"{file} takes longer than {SECONDS:g} s to read. Try a simpler export."
                 ) from error
+
+
+def _send(pipe: IO[bytes], data: bytes) -> None:
+    # A process that has ended reads nothing.
+    with suppress(OSError), pipe:
+        pipe.write(data)
 
 
 def label(name: str) -> str:
