@@ -40,6 +40,11 @@ FATES = [
     (process, number) for process in ("arm", "front") for number in (signal.SIGKILL, signal.SIGSTOP)
 ]
 
+QUICK_FATES = [
+    pytest.param(*fate, marks=[pytest.mark.long] if fate[1] == signal.SIGSTOP else [])
+    for fate in FATES
+]
+
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:
@@ -132,7 +137,7 @@ def lost_connection() -> suppress:
     return suppress(LostError, TimeoutError)
 
 
-@pytest.mark.parametrize(("process", "number"), FATES)
+@pytest.mark.parametrize(("process", "number"), QUICK_FATES)
 def test_lost_process_is_started_again_with_a_stopped_arm(
     server: AppServer, process: str, number: signal.Signals
 ) -> None:
@@ -222,7 +227,9 @@ def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer
     assert look(server)["stopped"] is None
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
 def test_no_process_outlives_the_supervisor(number: signal.Signals) -> None:
     with AppServer(ATTENTIVE_APP) as server:
         others = [server.arm, server.front]
