@@ -12,9 +12,12 @@ PACKAGE = Path(katana450.__file__).parent
 DELIVERIES = {
     ("server/service/command_gate.py", "self.arm"),
     ("server/service/command_gate.py", "arm"),
+    ("server/service/command_gate.py", "self.present()"),
     # Behind the gate the handle passes commands on; the worker also adds the planned path.
     ("server/service/arm_handle.py", "self._sink"),
     ("arm/runtime/planning_worker.py", "self._arm"),
+    # An offer moves nothing.
+    ("arm/runtime/detour_planner.py", "self._arm"),
 }
 """Files, and the objects to which they deliver commands."""
 

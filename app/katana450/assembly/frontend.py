@@ -29,11 +29,11 @@ from katana450.server.view.view_updater import ViewUpdater
 
 def build_frontend(
     gateway: Gateway, config: FrontendConfig, meshes: Meshes, ended: Event
-) -> tuple[FrontEnd, ViewUpdater]:
-    """Connect ``gateway`` to the arm and return the link to its process and the view.
+) -> tuple[FrontEnd, ViewUpdater, DetourPlanner | None]:
+    """Connect ``gateway`` to the arm; return the link to its process, the view, and the planner.
 
-    The link runs when this function returns, so no answer contains a state older than the link. The
-    view is not started.
+    The planner of detours is None for a robot without a tool. The link runs when this function
+    returns, so no answer contains a state older than the link. The view is not started.
 
     Args:
         gateway: the server of the page.
@@ -61,7 +61,7 @@ def build_frontend(
                 raise ConfigurationError(f"{layer.what} {robot.why}")
         link.start()
         gateway.attach(ArmHandle(robot, session, link, None, nodes))
-        return link, _machine_view(gateway, config, robot, link)
+        return link, _machine_view(gateway, config, robot, link), None
     planning_worker = PlanningWorker(session, link.state_publisher, link)
     view = _view(gateway, config, found, link, ViewOptions(layers, meshes))
     if config.options is not None:
@@ -74,7 +74,7 @@ def build_frontend(
     link.start()
     gateway.attach(ArmHandle(robot, session, link, planning_worker, nodes))
     detours.start()
-    return link, view
+    return link, view, detours
 
 
 def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:

@@ -92,7 +92,7 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
         # meanwhile.
         from katana450.assembly.frontend import build_frontend
 
-        link, view = build_frontend(gateway, config, meshes, supervisor.ended)
+        link, view, detours = build_frontend(gateway, config, meshes, supervisor.ended)
         view.start()
         # Exempt all present objects from garbage collection, which would delay STOP.
         gc.collect()
@@ -104,6 +104,8 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
         link.close()
         gateway.stop()
         view.stop()
+        if detours is not None:
+            detours.stop()
     except EOFError:
         # The server ends before this process is ready.
         return

@@ -130,6 +130,7 @@ class RunningArm:
             self._link.join()
         if self._stop_end is not None:
             self._stop_end.close()
+            self._stop_end.join()
         # Let Python collect reference cycles when it ends.
         gc.unfreeze()
 

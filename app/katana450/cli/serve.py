@@ -29,6 +29,7 @@ from katana450.extension import serve_extensions
 from katana450.platform_support import pipe_address, stop_signals
 from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
+from katana450.server.web.acceptor import raise_descriptor_limit
 from katana450.server.web.listen import LOOPBACK, listen, listen_beside
 from katana450.settings import Settings
 
@@ -84,6 +85,7 @@ def serve(
         options: options of the extensions; None if no extension takes part.
     """
     start_log()
+    raise_descriptor_limit()
     stopping = threading.Event()
     _set_on_signals(stopping)
     # Held by this process, so that the port stays taken while the front end is started again.

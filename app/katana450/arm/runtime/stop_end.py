@@ -58,7 +58,10 @@ class StopEnd:
 
     def _listen(self) -> None:
         with suppress(*PIPE_ERRORS):
-            while True:
+            while not self._cut.is_set():
+                # A press wakes this thread at once; the end of the arm's process does later.
+                if not self._pipe.poll(STATUS_INTERVAL):
+                    continue
                 press = self._pipe.recv()
                 if isinstance(press, StopPress):
                     self._mailbox.put(cmd.Stop(press.cause), press.actor)

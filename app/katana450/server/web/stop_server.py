@@ -26,7 +26,7 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.stop_messages import StopPress, StopStatus
 from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.service.identity import PAGE, Identity
-from katana450.server.service.mutes import MutedError, Mutes
+from katana450.server.service.mutes import MutedError
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.token_bucket import TokenBucket
@@ -110,7 +110,7 @@ class StopServer:
         self._main_port = main_port
         self._acceptor = acceptor
         self._often: dict[str, TokenBucket] = {}
-        self._mutes = Mutes(time.monotonic)
+        self._pressed: dict[str, float] = {}
         self._kept = 0
 
     def protocol(self) -> asyncio.Protocol:
@@ -235,17 +235,17 @@ class StopServer:
         return _stop_reply(stopped)
 
     def _muted(self, identity: Identity) -> Reply | None:
-        """Count a STOP of a muted ``identity``; return the refusal of one that does not count."""
-        if identity.muted is None:
-            self._mutes.remove(identity.session)
+        """Count a STOP of ``identity``; return the refusal of a muted one that does not count."""
+        now, before = time.monotonic(), self._pressed.pop(identity.session, -math.inf)
+        wait = 0.0 if identity.muted is None else before + identity.muted - now
+        self._pressed[identity.session] = before if wait > 0.0 else now
+        while len(self._pressed) > MAX_CLIENTS:
+            del self._pressed[next(iter(self._pressed))]
+        if wait <= 0.0:
             return None
-        self._mutes.add(identity.session, identity.muted)
-        try:
-            self._mutes.count_stop(identity.session)
-        except MutedError as error:
-            retry = ("retry-after", str(math.ceil(error.retry)))
-            return Reply(HTTPStatus.TOO_MANY_REQUESTS, str(error).encode(), headers=(retry,))
-        return None
+        error = MutedError("STOP", wait)
+        retry = ("retry-after", str(math.ceil(error.retry)))
+        return Reply(HTTPStatus.TOO_MANY_REQUESTS, str(error).encode(), headers=(retry,))
 
     def _health(self) -> Reply:
         link = self._link
