@@ -58,7 +58,9 @@ def wait(server: AppServer, status: str, seconds: float = 30.0) -> dict[str, Any
 
 
 def clear_stop(server: AppServer) -> None:
-    while not state_of(server)["clearable"]:
+    end = time.monotonic() + 10.0
+    while (state := state_of(server))["stopped"] is not None and not state["clearable"]:
+        assert time.monotonic() < end
         time.sleep(0.02)
     assert post(server, do="clear_stop")[0] == 200
     assert post(server, do="release_lease")[0] == 200
