@@ -209,18 +209,19 @@ class StopServer:
         channel = CommandChannel.PAGE if from_page else CommandChannel.HTTP
         actor = Actor(Person(key, name, identity.role), channel, None, Grounds.SAFETY)
         cause = pressed(name, key, press, time.time())
-        stopped = None
+        stopped, executed = None, False
         if link.status is not None and link.age < NO_STATE:
-            stopped = link.status.stopped
+            stopped, executed = link.status.stopped, press in link.status.presses
         known = self._authenticator.requires_link
         who = identity.session if known else _address_of(client)
         if stopped is not None and not self._takes(who):
             await asyncio.sleep(DELAY)
             return _stop_reply(stopped)
-        if stopped is None:
-            refusal = self._muted(identity)
-            if refusal is not None:
-                return refusal
+        # A press that another path has executed counts here too; any other press while the arm is
+        # stopped changes nothing, and uses up nothing.
+        refusal = self._muted(identity) if stopped is None or executed else None
+        if stopped is None and refusal is not None:
+            return refusal
         # Sent even if the arm is stopped, so that late copies of this press are recognised.
         link.press(StopPress(cause, actor))
         if stopped is None:
