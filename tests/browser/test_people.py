@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 from playwright.sync_api import Browser, Page
@@ -16,26 +15,13 @@ from katana450.arm.control.lease import Role
 from katana450.client import Client, connect
 from katana450.client.files import LostError
 from katana450.server.api import answers, requests
-from katana450.server.web.access_links import AccessFile
-from tests.browser.server import APP, AppServer
-from tests.gateway.client import HOUR
-
-
-class Site(NamedTuple):
-    """A server that requires links, and its access file."""
-
-    server: AppServer
-    file: AccessFile
-
-    def link(self, name: str, role: Role) -> str:
-        return self.file.give(name, role, time.time() + HOUR)
+from tests.gateway.site import Site, open_site
 
 
 @pytest.fixture
 def site(tmp_path: Path) -> Iterator[Site]:
-    file = AccessFile.create(tmp_path / "access.json")
-    with AppServer((*APP, "--access", str(file.path))) as server:
-        yield Site(server, file)
+    with open_site(tmp_path) as site:
+        yield site
 
 
 @contextmanager

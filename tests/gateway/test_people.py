@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed
@@ -33,24 +33,13 @@ from tests.gateway.client import (
     websocket,
 )
 from tests.gateway.lines import Lines
-
-
-class Site(NamedTuple):
-    """A server that requires links, and its access file."""
-
-    server: AppServer
-    file: AccessFile
-
-    def link(self, name: str, role: Role) -> str:
-        return self.file.give(name, role, time.time() + HOUR)
+from tests.gateway.site import Site, open_site
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    path = tmp_path_factory.mktemp("people") / "access.json"
-    file = AccessFile.create(path)
-    with AppServer((*APP, "--access", str(path), "--lines", "0")) as server:
-        yield Site(server, file)
+    with open_site(tmp_path_factory.mktemp("people"), "--lines", "0") as site:
+        yield site
 
 
 async def asked(control: Control, do: str, **request: Any) -> dict[str, Any]:

@@ -4,52 +4,33 @@ from __future__ import annotations
 
 import asyncio
 import json
-import time
-from collections.abc import Iterator
-from contextlib import AsyncExitStack, ExitStack, suppress
-from typing import NamedTuple
+from collections.abc import AsyncIterator, Iterator
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, suppress
 
 import pytest
 from websockets.exceptions import InvalidStatus
 
 from katana450.arm.control.lease import Role
 from katana450.server.viser_bridge.proxy import MAX_BROWSERS, MAX_BROWSERS_EACH
-from katana450.server.web.access_links import AccessFile
 from katana450.server.web.admission import LIMIT_CLOSE_CODE, SOCKETS, SOCKETS_EACH
 from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.program_socket import LINES, LINES_EACH
-from tests.browser.server import APP, AppServer
 from tests.gateway.client import (
-    HOUR,
     SUBPROTOCOL,
+    Control,
     Peer,
     controlling,
-    enter,
     page_name,
     websocket,
 )
 from tests.gateway.lines import Lines
-
-
-class Site(NamedTuple):
-    """A server that requires links, and its access file."""
-
-    server: AppServer
-    file: AccessFile
-
-    def link(self, role: Role) -> str:
-        return self.file.give(role.value.title(), role, time.time() + HOUR)
-
-    def cookie(self, role: Role) -> str:
-        return enter(self.server.url, self.link(role))
+from tests.gateway.site import Site, open_site
 
 
 @pytest.fixture
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    path = tmp_path_factory.mktemp("places") / "access.json"
-    file = AccessFile.create(path)
-    with AppServer((*APP, "--access", str(path), "--lines", "0")) as server:
-        yield Site(server, file)
+    with open_site(tmp_path_factory.mktemp("places"), "--lines", "0") as site:
+        yield site
 
 
 def test_reserved_places_are_free_when_all_others_are_taken() -> None:
@@ -98,6 +79,16 @@ async def whole_page(site: Site, cookie: str) -> None:
         await Peer(scene).learn()
 
 
+@asynccontextmanager
+async def driving(site: Site, cookie: str) -> AsyncIterator[Control]:
+    """Open the control socket of a page that drives the arm."""
+    async with controlling(site.server.url, cookie) as control:
+        await control.wait(mood="ok", seconds=10.0)
+        await control.say("acquire")
+        await control.wait(mine=True)
+        yield control
+
+
 async def is_refused(site: Site, cookie: str) -> bool:
     async with websocket(site.server.url, f"/control?page={page_name()}", cookie) as socket:
         async with asyncio.timeout(5.0):
@@ -109,13 +100,7 @@ async def is_refused(site: Site, cookie: str) -> bool:
 def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(site: Site) -> None:
     async def act() -> None:
         driver, admin = site.cookie(Role.OPERATOR), site.cookie(Role.ADMIN)
-        async with (
-            controlling(site.server.url, driver) as driving,
-            AsyncExitStack() as stack,
-        ):
-            await driving.wait(mood="ok", seconds=10.0)
-            await driving.say("acquire")
-            await driving.wait(mine=True)
+        async with driving(site, driver) as driver_page, AsyncExitStack() as stack:
             links = SOCKETS // SOCKETS_EACH
             await crowd_in(site, stack, "/control", links, SOCKETS_EACH)
             assert await is_refused(site, site.cookie(Role.VIEWER))
@@ -123,8 +108,8 @@ def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(site: Site) -
             assert await is_refused(site, site.cookie(Role.OPERATOR))
             await whole_page(site, admin)
             await whole_page(site, driver)
-            await driving.say("stop")
-            await driving.wait(stop="confirmed")
+            await driver_page.say("stop")
+            await driver_page.wait(stop="confirmed")
 
     asyncio.run(act())
 
@@ -139,11 +124,11 @@ def test_admin_gets_in_while_viewers_hold_the_tcp_port(site: Site) -> None:
 
     with ExitStack() as stack:
         for _ in range(LINES // LINES_EACH):
-            token = site.link(Role.VIEWER)
+            token = site.link("Viewer", Role.VIEWER)
             assert all(welcomed(stack, token) for _ in range(LINES_EACH))
             assert not welcomed(stack, token)
-        assert not welcomed(stack, site.link(Role.OPERATOR))
-        admin = site.link(Role.ADMIN)
+        assert not welcomed(stack, site.link("Operator", Role.OPERATOR))
+        admin = site.link("Admin", Role.ADMIN)
         assert [welcomed(stack, admin) for _ in range(3)] == [True, True, False]
 
 
@@ -151,13 +136,7 @@ def test_admin_gets_in_while_viewers_hold_the_tcp_port(site: Site) -> None:
 def test_admin_and_driver_get_the_scene_while_viewers_watch_everywhere(site: Site) -> None:
     async def act() -> None:
         driver, admin = site.cookie(Role.OPERATOR), site.cookie(Role.ADMIN)
-        async with (
-            controlling(site.server.url, driver) as driving,
-            AsyncExitStack() as stack,
-        ):
-            await driving.wait(mood="ok", seconds=10.0)
-            await driving.say("acquire")
-            await driving.wait(mine=True)
+        async with driving(site, driver), AsyncExitStack() as stack:
             links = MAX_BROWSERS // MAX_BROWSERS_EACH
             count = await crowd_in(site, stack, "/viser", links + 1, MAX_BROWSERS_EACH)
             assert count == MAX_BROWSERS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,15 +17,15 @@ JOG_TIME = 0.2
 """[s] Time that a jog, or a sample of a joint stream, is followed without another one."""
 
 
-class AxisCommand(BaseCommand):
+class AxisCommand(BaseCommand, ABC):
     """Base of the commands that give single joints another target."""
 
+    @abstractmethod
     def targets(self, goal: FloatArray) -> FloatArray:
         """Return the joint targets (n,) [rad], given the present goal (n,) [rad] of the joints.
 
         Raises InputError for an unknown axis.
         """
-        raise NotImplementedError
 
 
 def with_axes(goal: FloatArray, values: tuple[tuple[int, float], ...]) -> FloatArray:

@@ -224,7 +224,7 @@ def read_shape_guarded(
 
 def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:
     """Return the output of ``process`` for ``data``. Raises InputError after `SECONDS`."""
-    # After a timeout, communicate() sends no more of its input: a thread of its own sends it.
+    # communicate() sends no further input after a timeout, so a separate thread sends all of it.
     threading.Thread(target=_send, args=(process.stdin, data), daemon=True).start()
     process.stdin = None
     due = time.monotonic() + SECONDS

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from katana450.errors import LeaseError
 
@@ -33,11 +33,10 @@ class MutedError(LeaseError):
 
 @dataclass
 class _Mute:
-    """The mute of one identity. ``stop`` and ``request``: times from which the next counts [s]."""
+    """The mute of one identity. ``due``: times [s] from which the next STOP or request counts."""
 
     interval: float
-    stop: float = -math.inf
-    request: float = -math.inf
+    due: dict[str, float] = field(default_factory=dict)
 
 
 class Mutes:
@@ -68,18 +67,17 @@ class Mutes:
 
     def count_stop(self, session: str) -> None:
         """Count a STOP of ``session``. Raises MutedError if it does not count."""
-        known, t = self._mutes.get(session), self._clock()
-        if known is None:
-            return
-        if t < known.stop:
-            raise MutedError("STOP", known.stop - t)
-        known.stop = t + known.interval
+        self._count(session, "STOP")
 
     def count_request(self, session: str) -> None:
         """Count a request of ``session``. Raises MutedError if it does not count."""
+        self._count(session, "request")
+
+    def _count(self, session: str, what: str) -> None:
         known, t = self._mutes.get(session), self._clock()
         if known is None:
             return
-        if t < known.request:
-            raise MutedError("request", known.request - t)
-        known.request = t + known.interval
+        wait = known.due.get(what, -math.inf) - t
+        if wait > 0.0:
+            raise MutedError(what, wait)
+        known.due[what] = t + known.interval

@@ -46,12 +46,13 @@ class Runner:
         """Create a runner for ``hub``. ``options``: those of ``katana450 serve``."""
         self.hub = hub
 
-    def handle(self, window: Window, request: Request) -> answers.Answer:
+    def handle(self, window: Window, request: Request) -> answers.Answer:  # noqa: ARG002
         """Execute ``request``, one of ``request_types``, and return its answer.
 
         Raises LeaseError and InputError with the reason for a refusal.
         """
-        raise NotImplementedError
+        kind = type(request).__name__
+        raise AssertionError(f"{type(self).__name__} lists {kind} and does not execute it.")
 
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError where ``actor`` must not touch ``controls``. Called in any thread."""
