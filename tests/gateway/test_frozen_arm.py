@@ -119,7 +119,7 @@ def test_control_loop_that_ended_is_started_again_stopped(tmp_path: Path) -> Non
         with connect(server.url, "Driver") as arm:
             arm.ask(requests.Joints(q=FAR.tolist()))
             end = time.monotonic() + 15.0
-            while (state := arm.query(answers.State)).stopped is None or state.age > REPORTED:
+            while (state := arm.query(answers.State)).stop != "confirmed" or state.age > REPORTED:
                 assert time.monotonic() < end
                 time.sleep(0.05)
             assert not state.moving

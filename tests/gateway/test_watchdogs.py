@@ -223,7 +223,7 @@ def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer
     finally:
         os.kill(server.pid, signal.SIGCONT)
     until(lambda: healthy(server), 5.0)
-    # Its own absence is no silence of the others.
+    # A supervisor that was frozen does not take its own pause for silence of the processes.
     assert look(server)["stopped"] is None
 
 
