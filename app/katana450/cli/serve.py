@@ -101,11 +101,10 @@ def serve(
     front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
     arm = ArmConfig(settings, urdf, tool, options, address, folder)
     stop = StopConfig(settings, stopping_socket, listening.getsockname()[1], address)
+    front_end_work = _FrontendWork(front, event_log)
     specs = (
         child_spec(STOP, "The process of STOP", run_stop, stop, STOP_DEADLINE),
-        ChildSpec(
-            FRONT_END, "The page's server", _FrontendWork(front, event_log), FRONT_END_DEADLINE
-        ),
+        ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
         child_spec(ARM, "The arm's process", run_arm, arm, ARM_DEADLINE, keeps=True),
     )
     supervisor = Supervisor(specs, stopping, event_log.restart)
@@ -125,6 +124,8 @@ def serve(
         supervisor.run()
     finally:
         supervisor.stop()
+        # The event log is complete once the pipe of the last front end has ended.
+        front_end_work.close()
         listening.close()
         stopping_socket.close()
         event_log.close(requested=stopping.is_set())
@@ -141,13 +142,17 @@ class _FrontendWork:
         self._sender: Connection | None = None
 
     def __call__(self, _kept: object) -> Work:
-        if self._sender is not None:
-            # The front end before has ended, so its pipe must end too.
-            self._sender.close()
+        # The front end before has ended, so its pipe must end too.
+        self.close()
         ends: Any = multiprocessing.get_context("spawn").Pipe()
         receiver, self._sender = ends
         self._event_log.attach(receiver)
         return partial(run_frontend, self._config, self._sender)
+
+    def close(self) -> None:
+        """End the pipe of the newest front end, so that its reader ends too."""
+        if self._sender is not None:
+            self._sender.close()
 
 
 def _set_on_signals(stopping: threading.Event) -> None:
