@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.browser.conftest import Windows
@@ -34,10 +35,17 @@ def mood(page: ViserPage) -> str | None:
     return page.page.locator("body").get_attribute("data-mood")
 
 
+def rests(page: ViserPage) -> bool:
+    """Return whether the handle keeps its place; it follows the arm once it is released."""
+    before = page.node_pose(MOVE)
+    page.page.wait_for_timeout(300)
+    return np.array_equal(before, page.node_pose(MOVE))
+
+
 def drag_to_the_gap(page: ViserPage) -> None:
     """Lift the tool by 20 cm and pull it back over the shoulder, where limits hold it."""
     page.drag_arrow(MOVE, "z", 0.2)
-    page.wait_until(lambda: mood(page) == "limited", "rest")
+    page.wait_until(lambda: mood(page) == "limited" and rests(page), "rest")
     page.drag_arrow(MOVE, "x", -0.45)
     page.wait_until(lambda: page.page.locator("#go").is_visible(), "the offer", seconds=20.0)
 

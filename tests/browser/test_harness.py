@@ -79,8 +79,10 @@ def test_a_ring_turns_the_box_about_its_axis(
     page: ViserPage, node: str, axis: Axis, radians: float
 ) -> None:
     page.drag_ring(node, axis, radians)
-    turned = _rotation_vector(page.node_pose(BOX))
-    assert turned == pytest.approx(radians * np.eye(3)["xyz".index(axis)], abs=1e-4)
+    vector = radians * np.eye(3)["xyz".index(axis)]
+    page.wait_until(
+        lambda: _rotation_vector(page.node_pose(BOX)) == pytest.approx(vector, abs=1e-4), "the box"
+    )
     assert page.node_pose(BOX)[:3, 3] == pytest.approx(START, abs=1e-6)
 
 

@@ -356,12 +356,12 @@ def test_client_stops_on_all_paths_and_clears_when_possible(
     assert program.welcome.stop_port == int(server.stop_url.rpartition(":")[2])
     assert program.stop() == "confirmed"
     state, clear_too_early = program.query(answers.State), None
-    assert state.stopped == "Driver pressed STOP."
+    assert state.stopped == f"{program.welcome.name} pressed STOP."
     try:
         program.ask(requests.ClearStop())
     except RefusedError as error:
         clear_too_early = str(error)
-    # Only a starved machine is asks so late that the stop can be cleared.
+    # Only a starved machine asks so late that the stop can be cleared.
     if clear_too_early is None:
         assert state.stopped_at is not None
         assert time.time() - state.stopped_at > HOLD_OFF
