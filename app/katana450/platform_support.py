@@ -193,6 +193,18 @@ def state_folder() -> Path:
         return Path(named) if Path(named).is_absolute() else Path.home() / ".local" / "state"
 
 
+def cache_folder() -> Path:
+    """Return the folder for what programs of this user can compute again; it need not exist."""
+    if sys.platform == "win32":
+        default = Path.home() / "AppData" / "Local"
+        return Path(os.environ.get("LOCALAPPDATA") or default) / "Cache"
+    elif sys.platform == "darwin":  # noqa: RET505 - so that mypy follows either system
+        return Path.home() / "Library" / "Caches"
+    else:
+        named = os.environ.get("XDG_CACHE_HOME", "")
+        return Path(named) if Path(named).is_absolute() else Path.home() / ".cache"
+
+
 def _set_priority_class(priority: int) -> None:
     if sys.platform == "win32":
         kernel = ctypes.windll.kernel32

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yourdfpy
 
+from katana450 import disk_cache
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.urdf import Urdf, urdf_of
 from katana450.arm.robot.visual import GREY
@@ -125,6 +126,8 @@ def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         opened.append(file)
         return parse(file, **options)
 
+    # Nothing is kept from an earlier test.
+    monkeypatch.setattr(disk_cache, "_folder", lambda: None)
     monkeypatch.setattr(expat, "ParserCreate", counted)
     monkeypatch.setattr(yourdfpy.URDF, "load", parsed)
     robot = load(path)

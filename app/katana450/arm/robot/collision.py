@@ -9,6 +9,7 @@ from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, Props
 from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.visual import Visual
 from katana450.errors import InputError
 from katana450.maths.collision.linkage import GROUND, Linkage, RigidGroup
 from katana450.maths.collision.pairs import pairs_that_meet
@@ -117,7 +118,12 @@ def _shapes(link: Link) -> tuple[tuple[CollisionShape, ...], list[str]]:
     refused: list[str] = []
     for collision in link.collisions:
         try:
-            shapes.append(hull(collision.mesh.vertices))
+            shapes.append(hull(_vertices(collision)))
         except InputError as error:
             refused.append(f"A collision shape of link {link.name!r} is left out: {error}")
     return tuple(shapes), refused
+
+
+def _vertices(collision: Visual) -> FloatArray:
+    """Return the vertices (n, 3) of a shape in the frame of its link [m]."""
+    return collision.kept(lambda: np.asarray(collision.mesh.vertices))

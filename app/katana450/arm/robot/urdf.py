@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.arm.robot.visual import GREY, Color, Maker, Visual, box, cylinder, mesh_file, sphere
+from katana450.arm.robot.visual import GREY, Color, Primitive, Visual, mesh_file
+from katana450.disk_cache import kept
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
@@ -103,6 +105,10 @@ class Urdf:
         return order
 
 
+FILENAME = re.compile(rb"filename\s*=\s*[\"']([^\"']*)[\"']")
+"""The name of a mesh file in the contents of a URDF file."""
+
+
 class _Stream:
     """A file that is read once, in one piece.
 
@@ -122,6 +128,13 @@ def urdf_of(data: bytes, folder: Path) -> Urdf:
 
     ``folder``: the folder of the file, to which the names of mesh files are relative.
     """
+    # Which file a name refers to depends on the files that exist.
+    files = [mesh_file(name.decode(errors="replace"), folder) for name in FILENAME.findall(data)]
+    found = [f"{each} {each.is_file()}" for each in files]
+    return kept(lambda: _read(data, folder), data, str(folder), *found)
+
+
+def _read(data: bytes, folder: Path) -> Urdf:
     # Imported here, because the import takes longer than reading a file.
     import yourdfpy
 
@@ -170,13 +183,16 @@ def _visual(
 ) -> Visual | None:
     """Return the shape of a visual or collision; None for a missing file, added to ``missing``."""
     geometry, scale = shape.geometry, np.ones(3)
-    source: Path | Maker
+    source: Path | Primitive
     if geometry.box is not None:
-        source = box(geometry.box.size)
+        source = Primitive("box", {"extents": geometry.box.size})
     elif geometry.cylinder is not None:
-        source = cylinder(geometry.cylinder.radius, geometry.cylinder.length)
+        source = Primitive(
+            "cylinder",
+            {"radius": geometry.cylinder.radius, "height": geometry.cylinder.length},
+        )
     elif geometry.sphere is not None:
-        source = sphere(geometry.sphere.radius)
+        source = Primitive("icosphere", {"subdivisions": 3, "radius": geometry.sphere.radius})
     else:
         source = mesh_file(geometry.mesh.filename, folder)
         if not source.is_file():

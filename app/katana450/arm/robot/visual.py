@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from katana450.disk_cache import kept
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, frozen
+
+T = TypeVar("T")
 
 Color = tuple[int, int, int]
 """Red, green and blue, 0..255."""
 
-Maker = Callable[[], Any]
-"""Returns a new trimesh [m]. Shapes are made on demand, because most robots are read only for their
-joints."""
 
 GREY: Color = (150, 156, 163)
 """Colour of a shape that has none of its own."""
@@ -30,6 +30,29 @@ ROD_LENGTH = 1e-3
 """[m] Shorter rods are not drawn."""
 
 
+SINGLE_FILES = (".glb", ".ply", ".stl")
+"""Suffixes of mesh files that refer to no other file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Primitive:
+    """A shape that is made on demand, because most robots are read only for their joints.
+
+    Attributes:
+        kind: name of the function of ``trimesh.creation`` that makes it.
+        options: its arguments [m].
+    """
+
+    kind: str
+    options: Mapping[str, Any]
+
+    def mesh(self) -> Any:
+        """Return a new trimesh [m]."""
+        import trimesh
+
+        return getattr(trimesh.creation, self.kind)(**self.options)
+
+
 @dataclass(frozen=True, eq=False)
 class Visual:
     """One shape.
@@ -37,13 +60,13 @@ class Visual:
     Attributes:
         T_body_visual: (4, 4) pose in its body [m].
         scale: (3,) factors on the coordinates in the file.
-        source: a mesh file, or the maker of a primitive shape.
+        source: a mesh file, a primitive shape, or a function that returns a new trimesh [m].
         colour: red, green and blue, 0..255, for shapes that have no colour of their own.
     """
 
     T_body_visual: FloatArray
     scale: FloatArray
-    source: Path | Maker
+    source: Path | Primitive | Callable[[], Any]
     colour: Color = GREY
 
     @property
@@ -66,10 +89,27 @@ class Visual:
                 mesh = trimesh.load_scene(self.source).to_mesh()
             except Exception as error:
                 raise unreadable_mesh(self.source) from error
+        elif isinstance(self.source, Primitive):
+            mesh = self.source.mesh()
         else:
             mesh = self.source()
         mesh.apply_transform(self.T_body_visual @ np.diag([*self.scale, 1.0]))
         return mesh
+
+    def kept(self, make: Callable[[], T]) -> T:
+        """Return the value of ``make``, kept on disk where the shape comes from one file.
+
+        The value depends on the shape alone.
+        """
+        if not isinstance(self.source, Path) or self.source.suffix.lower() not in SINGLE_FILES:
+            return make()
+        try:
+            data = self.source.read_bytes()
+        except OSError:
+            # The reader of the mesh explains why.
+            return make()
+        own = (self.T_body_visual, self.scale, str(self.colour))
+        return kept(make, self.source.suffix, data, *own)
 
 
 def unreadable_mesh(source: Path) -> RobotDescriptionError:
@@ -84,52 +124,14 @@ def unreadable_mesh(source: Path) -> RobotDescriptionError:
 def rods(ends: Sequence[FloatArray]) -> tuple[Visual, ...]:
     """Return thin cylinders from a link's origin to each of ``ends`` (3,) [m] in its frame."""
     return tuple(
-        Visual(frozen(np.eye(4)), frozen(np.ones(3)), _rod(end))
+        Visual(
+            frozen(np.eye(4)),
+            frozen(np.ones(3)),
+            Primitive("cylinder", {"radius": ROD_RADIUS, "segment": [np.zeros(3), end]}),
+        )
         for end in ends
         if float(np.linalg.norm(end)) > ROD_LENGTH
     )
-
-
-def _rod(end: FloatArray) -> Maker:
-    def made() -> Any:
-        import trimesh
-
-        return trimesh.creation.cylinder(radius=ROD_RADIUS, segment=[np.zeros(3), end])
-
-    return made
-
-
-def box(size: FloatArray) -> Maker:
-    """Return the maker of a box; ``size``: (3,) lengths of its edges [m]."""
-
-    def made() -> Any:
-        import trimesh
-
-        return trimesh.creation.box(extents=size)
-
-    return made
-
-
-def cylinder(radius: float, length: float) -> Maker:
-    """Return the maker of a cylinder about z [m]."""
-
-    def made() -> Any:
-        import trimesh
-
-        return trimesh.creation.cylinder(radius=radius, height=length)
-
-    return made
-
-
-def sphere(radius: float) -> Maker:
-    """Return the maker of a sphere [m]."""
-
-    def made() -> Any:
-        import trimesh
-
-        return trimesh.creation.icosphere(subdivisions=3, radius=radius)
-
-    return made
 
 
 def mesh_file(name: str, folder: Path) -> Path:

@@ -228,6 +228,10 @@ class Gap:
 
 def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Return vertices (n, 3) [m] and faces (m, 3) of a shape without materials and details."""
+    return visual.kept(lambda: _surface(visual))
+
+
+def _surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     mesh = visual.mesh.copy()
     # One vertex per corner halves the data that is sent.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import trimesh
 import viser
 
 from katana450.arm.control.actor import Actor
@@ -278,14 +277,21 @@ class _Shape:
             # The arm's process knows this object from before the start of this process.
             return _of(_hull(scene_object.solid))
         if self._prop is not None:
-            made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop).mesh
-            made.merge_vertices(merge_tex=True, merge_norm=True)
-            return _of(made)
+            visual = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop)
+            return visual.kept(lambda: _merged(visual))
         return _of(_plain(scene_object))
+
+
+def _merged(visual: Visual) -> Drawn:
+    made = visual.mesh
+    made.merge_vertices(merge_tex=True, merge_norm=True)
+    return _of(made)
 
 
 def _hull(solid: Solid) -> Any:
     """Return the convex body that stands for a mesh."""
+    import trimesh
+
     return trimesh.Trimesh(solid.corners).convex_hull
 
 
@@ -298,6 +304,9 @@ def form(scene_object: SceneObject) -> Any:
 
 def _plain(scene_object: SceneObject) -> Any:
     """Return a trimesh [m] of the object's shape at scale 1."""
+    # Imported here, because the import takes longer than the rest of the start.
+    import trimesh
+
     match scene_object.shape:
         case Shape.BOX:
             made, height = trimesh.creation.box(scene_object.size), scene_object.size[2]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import trimesh
 import viser
-from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
+from katana450.disk_cache import kept
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
@@ -169,6 +167,14 @@ def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:
 
 def _glossy(corners: FloatArray, faces: Faces, opacity: float) -> bytes:
     """Return a GLB file of a shape that mirrors and is translucent."""
+    return kept(lambda: _exported(corners, faces, opacity), corners, faces, str(opacity))
+
+
+def _exported(corners: FloatArray, faces: Faces, opacity: float) -> bytes:
+    import trimesh
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
     # trimesh has no types for these classes.
     pbr: Any = PBRMaterial
     textured: Any = TextureVisuals

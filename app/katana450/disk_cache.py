@@ -1,0 +1,148 @@
+"""Values that take long to compute, kept in files of this user between starts.
+
+Reading a robot imports trimesh and with it SciPy, which takes longer than everything else at the
+start of a server. A value that is kept needs neither.
+
+A file is found by a hash of the inputs, of the version of Python and the libraries, and of the size
+and time of every file of this package, so an old value is never used. Its content begins with its
+own hash: a damaged file counts as missing. Where nothing can be written, each start computes the
+values.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import pickle
+import stat
+import sys
+import tempfile
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from katana450.platform_support import cache_folder
+
+T = TypeVar("T")
+
+MAX_FILES = 500
+"""Number of files after which the oldest are deleted."""
+
+LIBRARIES = ("numpy", "trimesh", "yourdfpy")
+"""Libraries whose version may change a value."""
+
+HASH_LENGTH = hashlib.sha256().digest_size
+
+
+def kept(make: Callable[[], T], *inputs: bytes | str | np.ndarray[Any, Any]) -> T:
+    """Return the value of ``make``, from the disk if it was computed before from ``inputs``.
+
+    Args:
+        make: computes the value, which depends on ``inputs`` alone. Its name is part of the hash.
+        inputs: everything on which the value depends.
+    """
+    folder = _folder()
+    if folder is None:
+        return make()
+    name = f"{make.__module__}.{make.__qualname__}"
+    file = folder / _digest((_surroundings(), name, *inputs)).hex()
+    with suppress(OSError, _DamagedError):
+        found: T = _loaded(file.read_bytes())
+        return found
+    value = make()
+    with suppress(OSError):
+        _store(file, value)
+    return value
+
+
+class _DamagedError(Exception):
+    """A file that cannot be used."""
+
+
+def _digest(parts: Iterable[bytes | str | np.ndarray[Any, Any]]) -> bytes:
+    total = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            data = f"{part.dtype} {part.shape} ".encode() + part.tobytes()
+        else:
+            data = part.encode() if isinstance(part, str) else part
+        # With its length, so that no two lists of parts have the same bytes.
+        total.update(f"{len(data)} ".encode() + data)
+    return total.digest()
+
+
+@cache
+def _surroundings() -> bytes:
+    """Return a hash of the code and the libraries that compute the values."""
+    package = Path(__file__).parent
+    files = sorted(package.rglob("*.py"))
+    known = [f"{each.relative_to(package)} {_stamp(each)}" for each in files]
+    libraries = [f"{each} {version(each)}" for each in LIBRARIES]
+    return _digest([sys.version, *libraries, *known])
+
+
+def _stamp(file: Path) -> str:
+    found = file.stat()
+    return f"{found.st_size} {found.st_mtime_ns}"
+
+
+@cache
+def _folder() -> Path | None:
+    """Return the folder of the files; None if it cannot be created or others may write to it."""
+    folder = cache_folder() / "katana450"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+    except OSError:
+        return None
+    # Loading a file may run code, so the files must come from this user alone.
+    if sys.platform != "win32" and (
+        found.st_uid != os.getuid() or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    ):
+        return None
+    return folder
+
+
+def _loaded(data: bytes) -> Any:
+    """Return the value in the content of a file. Raises _DamagedError."""
+    if hashlib.sha256(data[HASH_LENGTH:]).digest() != data[:HASH_LENGTH]:
+        raise _DamagedError
+    return pickle.loads(data[HASH_LENGTH:])
+
+
+def _store(file: Path, value: object) -> None:
+    """Write ``value`` whole or not at all. Raises OSError."""
+    stream = io.BytesIO()
+    _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
+    content = stream.getvalue()
+    descriptor, name = tempfile.mkstemp(dir=file.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as new:
+            new.write(hashlib.sha256(content).digest() + content)
+        Path(name).replace(file)
+    except OSError:
+        Path(name).unlink(missing_ok=True)
+        raise
+    files = sorted(file.parent.iterdir(), key=lambda each: each.stat().st_mtime)
+    for each in files[:-MAX_FILES]:
+        each.unlink(missing_ok=True)
+
+
+class _Pickler(pickle.Pickler):
+    """Keeps arrays read-only, which pickle forgets."""
+
+    def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, np.ndarray) and not value.flags.writeable:
+            return _read_only, (value.copy(),)
+        return NotImplemented
+
+
+def _read_only(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,170 @@
+"""Test values that are kept on disk: found again, never old, never damaged, never another's."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from katana450 import disk_cache
+from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.loader import load
+from katana450.disk_cache import kept
+from katana450.resources import URDF_PATH
+
+
+class Made:
+    """Counts how often a value is computed."""
+
+    def __init__(self, value: object = 1.0) -> None:
+        self.times = 0
+        self.value = value
+        self.__module__, self.__qualname__ = __name__, "Made"
+
+    def __call__(self) -> object:
+        self.times += 1
+        return self.value
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of the files, which is new."""
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setattr(disk_cache, "_folder", disk_cache._folder.__wrapped__)
+    found = disk_cache._folder()
+    assert found is not None
+    return found
+
+
+@pytest.mark.usefixtures("folder")
+def test_value_is_computed_once_for_the_same_inputs() -> None:
+    made = Made(np.arange(3.0))
+    for _ in range(3):
+        np.testing.assert_array_equal(kept(made, b"a", "b", np.eye(2)), np.arange(3.0))
+    assert made.times == 1
+    for others in ((b"ab",), (b"a", "b"), (b"a", "b", np.zeros((2, 2))), (b"a", "b", np.eye(4))):
+        kept(made, *others)
+    assert made.times == 5
+
+
+@pytest.mark.usefixtures("folder")
+def test_read_only_array_stays_read_only() -> None:
+    array = np.arange(3.0)
+    array.setflags(write=False)
+    for _ in range(2):
+        found = kept(Made((array, np.zeros(2))), b"")
+        assert isinstance(found, tuple)
+        assert [each.flags.writeable for each in found] == [False, True]
+
+
+def test_damaged_file_is_replaced(folder: Path) -> None:
+    made = Made()
+    kept(made, b"a")
+    (file,) = folder.iterdir()
+    whole = file.read_bytes()
+    for damaged in (b"", whole[:-1], whole[:40], whole[:-1] + b"x"):
+        file.write_bytes(damaged)
+        assert kept(made, b"a") == 1.0
+        assert file.read_bytes() == whole
+    assert made.times == 5
+
+
+def test_change_of_the_code_makes_a_value_old(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Made()
+    kept(made, b"a")
+    monkeypatch.setattr(disk_cache, "_stamp", str)
+    monkeypatch.setattr(disk_cache, "_surroundings", disk_cache._surroundings.__wrapped__)
+    kept(made, b"a")
+    assert made.times == 2
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_error_is_raised_again_and_leaves_no_file(folder: Path) -> None:
+    def fail() -> None:
+        raise ValueError("unreadable")
+
+    for _ in range(2):
+        with pytest.raises(ValueError, match="unreadable"):
+            kept(fail, b"a")
+    assert list(folder.iterdir()) == []
+
+
+def test_number_of_files_is_bounded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(disk_cache, "MAX_FILES", 3)
+    for number in range(6):
+        kept(Made(), str(number))
+    assert len(list(folder.iterdir())) == 3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such permissions")
+def test_folder_that_others_may_write_to_is_not_used(folder: Path) -> None:
+    made = Made()
+    kept(made, b"a")
+    folder.chmod(0o777)
+    for _ in range(2):
+        kept(made, b"a")
+    assert made.times == 3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such permissions")
+@pytest.mark.skipif(
+    hasattr(os, "geteuid") and os.geteuid() == 0, reason="root may write to every folder"
+)
+def test_folder_that_is_read_only_changes_nothing(folder: Path) -> None:
+    folder.chmod(0o500)
+    assert kept(Made(), b"a") == 1.0
+
+
+RUN = """
+import sys
+from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.loader import load
+robot = load()
+world_of(robot)
+print("trimesh" in sys.modules)
+"""
+
+
+@pytest.mark.usefixtures("folder")
+def test_robot_that_was_read_before_needs_no_trimesh() -> None:
+    needed = []
+    for _ in range(2):
+        run = [sys.executable, "-c", RUN]
+        done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=60)
+        needed.append(done.stdout.strip())
+    assert needed == ["True", "False"]
+
+
+@pytest.mark.usefixtures("folder")
+def test_kept_robot_is_the_robot_in_its_file() -> None:
+    fresh, found = load(), load()
+    for one, other in zip(fresh.links, found.links, strict=True):
+        assert one.name == other.name
+        assert one.T_parent_link.tobytes() == other.T_parent_link.tobytes()
+        assert (one.mass, one.center.tolist()) == (other.mass, other.center.tolist())
+        for a, b in zip(one.shapes, other.shapes, strict=True):
+            assert (a.vertices == b.vertices).all()
+            assert a.material == b.material
+    (world, _), (kept_world, _) = world_of(fresh), world_of(found)
+    assert world is not None
+    assert kept_world is not None
+    assert world.fingerprint.differs_by(kept_world.fingerprint) == 0.0
+
+
+@pytest.mark.usefixtures("folder")
+def test_changed_file_is_read_again(tmp_path: Path) -> None:
+    text = URDF_PATH.read_text(encoding="utf-8")
+    file = tmp_path / URDF_PATH.name
+    file.write_text(text, encoding="utf-8")
+    before = load(file)
+    assert "There is no mesh at" in " ".join(before.notes)
+    (tmp_path.parent / "meshes").mkdir(exist_ok=True)
+    file.write_text(text.replace('name="katana450"', 'name="other"', 1), encoding="utf-8")
+    assert load(file).name == "other"
