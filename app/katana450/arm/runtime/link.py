@@ -12,7 +12,6 @@ import logging
 import threading
 import time
 from collections import deque
-from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
@@ -142,10 +141,6 @@ class ArmEnd:
     def close(self) -> None:
         """Cut the link: the front end disconnects, and the arm stops."""
         self._lose()
-        # A front end that hangs reads nothing, and its pipe may be full.
-        with suppress(*PIPE_ERRORS):
-            if writable(self._pipe.fileno()):
-                self._pipe.send(None)
 
     def join(self) -> None:
         """Return once the threads have ended, which they do when both ends are closed."""
@@ -196,6 +191,9 @@ class ArmEnd:
             last = event_log[-1] if event_log else None
             while not self.cut.is_set():
                 snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
+                if self.cut.is_set():
+                    # The stop of this end is no news for a front end that disconnects.
+                    break
                 now = time.monotonic()
                 if snapshot is seen and self._loop.ticks == ticks:
                     # A loop that does not tick must give no pulse.
@@ -218,6 +216,9 @@ class ArmEnd:
                     )
                 )
                 seen = snapshot
+            # A front end that hangs reads nothing, and its pipe may be full.
+            if writable(self._pipe.fileno()):
+                self._pipe.send(None)
         except PIPE_ERRORS:
             self._lose()
 
