@@ -114,6 +114,7 @@ def serve(
         supervisor.wait_for(FRONT_END, OPEN)
         if not stopping.is_set():
             say(f"Open {url} in a browser.")
+        supervisor.wait_for(STOP, READY)
         supervisor.wait_for(FRONT_END, READY)
         if not stopping.is_set():
             if lines is not None:
