@@ -1,7 +1,8 @@
 """The supervisor: starts the processes of the server, watches each, and starts it again.
 
-It imports almost nothing and does no other work, so that it is always there. A process that ends is
-noticed at once. A process that hangs is noticed by the silence of its pipe, and is ended.
+It also keeps the arm's last state and, in a thread, writes the event log. It imports almost
+nothing, so that it is always there. A process that ends is noticed at once. A process that hangs is
+noticed by the silence of its pipe, and is ended.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 The control loop has a process of its own. So slow work in the front end, such as rendering for many
 viewers, cannot delay the loop, and a crash there cannot leave the arm in motion without control.
-Commands and heartbeats come in by the pipe, and snapshots go out. When no message comes any more,
-the arm stops.
+Commands and heartbeats come in by the pipe, and snapshots go out. When the pipe is cut, the arm
+stops. When it is silent, a moving arm stops, or pauses if it is simulated.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class ArmEnd:
     """The end of the link in the arm's process.
 
     It delivers commands to the mailbox and sends what the loop publishes. It stops the arm when the
-    link is cut or silent.
+    link is cut. When the link is silent, a moving arm stops, or pauses if it is simulated.
     """
 
     def __init__(
