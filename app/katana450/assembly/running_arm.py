@@ -1,4 +1,4 @@
-"""A simulated arm with its control loop, driven by the front end at the end of a pipe."""
+"""A simulated arm with its control loop, for the other processes at the ends of pipes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BRAKING_TIMEOUT = 2.0
 
 
 class RunningArm:
-    """A simulated arm with its control loop, driven by the front end at the end of a pipe."""
+    """A simulated arm with its control loop, for the other processes at the ends of pipes."""
 
     def __init__(
         self,
