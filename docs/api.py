@@ -118,8 +118,8 @@ curl -H "X-Program: $KEY" -H 'X-Name: By hand' -d '{{"do": "joint", "axis": 1, "
 curl http://127.0.0.1:8080/api/v{version}/state
 ```
 
-A moving arm is stopped a quarter of a second after the last message of its program. So a single
-`curl` begins a motion and does not finish a long one.
+A moving arm stops, or pauses if it is simulated, a quarter of a second after the last message of
+its program. So a single `curl` begins a motion and does not finish a long one.
 """
 
 

@@ -70,6 +70,21 @@ def test_simulated_arm_pauses_and_the_next_command_moves_it(table: Table, driver
     assert table.arm.stops == 0
 
 
+def test_paused_arm_does_not_move_for_a_driver_without_heartbeats(
+    table: Table, driver: Window
+) -> None:
+    table.wait(1.0)
+    assert not moves(table)
+    for _ in range(15):
+        table.wait(0.1)
+        # The control socket stalls, but gestures in the scene arrive.
+        with pytest.raises(LeaseError, match="just paused"):
+            table.touch(driver.person.key)
+    table.wait(2 * TICK, driver)
+    table.wait(SETTLE_TIME, driver)
+    table.touch(driver.person.key)
+
+
 def test_pause_becomes_a_stop_after_longer_silence(table: Table, driver: Window) -> None:
     table.wait(PAUSE_TIMEOUT - 5 * TICK)
     assert table.arm.stops == 0
@@ -83,7 +98,7 @@ def test_other_driver_ends_the_pause(table: Table) -> None:
     table.wait(1.0)
     other = table.join(PAGES[1])
     table.hub.take(other)
-    table.wait(SETTLE_TIME, other)
+    table.wait(SETTLE_TIME + TICK, other)
     table.hub.move(other, JOG)
     table.wait(2 * PAUSE_TIMEOUT, other)
     assert table.hub.stopped is None

@@ -232,7 +232,7 @@ def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer
 )
 def test_no_process_outlives_the_supervisor(number: signal.Signals) -> None:
     with AppServer(ATTENTIVE_APP) as server:
-        others = [server.arm, server.front]
+        others = [server.arm, server.front, server.stop_process]
         with suppress(KatanaError, OSError), connect(server.url, "Driver") as arm:
             arm.ask(requests.Joints(q=FAR.tolist()))
             time.sleep(0.3)

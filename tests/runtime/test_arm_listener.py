@@ -64,6 +64,26 @@ def test_client_that_stalls_keeps_no_other_out(
         assert greetings.get(timeout=5.0).role == "front"
 
 
+class RefusedThread(threading.Thread):
+    """A thread that the system refuses to start."""
+
+    def start(self) -> None:
+        raise RuntimeError("can't start new thread")
+
+
+def test_connection_for_which_no_thread_starts_keeps_no_later_one_out(
+    address: ArmAddress, greetings: SimpleQueue[Greeting], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr("katana450.arm.runtime.arm_listener.threading.Thread", RefusedThread)
+        with Client(address.name) as refused:
+            assert refused.poll(5.0)
+            with pytest.raises((EOFError, OSError)):
+                refused.recv()
+    with connect(address, Greeting("front")):
+        assert greetings.get(timeout=5.0).role == "front"
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no socket files")
 def test_socket_file_of_a_killed_process_is_replaced(address: ArmAddress) -> None:
     with socket.socket(socket.AF_UNIX) as left:

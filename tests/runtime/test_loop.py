@@ -13,6 +13,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Status
+from katana450.arm.control.stop_cause import pressed
 from katana450.arm.drivers.driver import SentSetpoint
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
@@ -126,6 +127,30 @@ def test_failing_driver_makes_the_arm_hold_and_report_it(
     clock.t += 0.01
     loop.tick()
     assert loop.state_publisher.snapshot.state.findings == ()
+
+
+def test_stop_in_a_failed_tick_is_executed_in_the_next(arm: ArmModel, session: Session) -> None:
+    clock, mailbox = SteppedClock(), Mailbox(session.check)
+    driver = BrokenDriver(arm, session.ready, 0.0)
+    loop = ControlLoop(session, driver, mailbox, clock, RATE)
+    press = cmd.Stop(pressed("Anna", "a", "one", 1.0))
+    driver.broken = True
+    mailbox.put(press)
+    for _ in range(2):
+        clock.t += 0.01
+        loop.tick()
+    assert loop.state_publisher.snapshot.state.stopped is None
+    driver.broken = False
+    # A copy of the press by another path is no second stop.
+    mailbox.put(press)
+    mailbox.put(cmd.SetJoint(0, 2.0))
+    for _ in range(20):
+        clock.t += 0.01
+        loop.tick()
+    state = loop.state_publisher.snapshot.state
+    assert state.stopped is not None
+    assert (state.stopped.cause.why, state.presses) == ("Anna pressed STOP.", ("one",))
+    np.testing.assert_array_equal(state.q, session.ready)
 
 
 def test_wait_for_change_returns_on_change_or_timeout(parts: LoopParts) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason
 from katana450.arm.control.stop_cause import pressed
 from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.mailbox import CAPACITY, Drained, Mailbox, Submission
@@ -110,6 +111,16 @@ def test_flood_is_refused_and_waiting_commands_are_kept(mailbox: Mailbox) -> Non
         mailbox.put(cmd.Home())
     assert len(mailbox.drain().commands) == CAPACITY
     assert mailbox.put(cmd.Home()) == CAPACITY + 1
+
+
+def test_full_mailbox_refuses_no_pause_by_the_server(mailbox: Mailbox) -> None:
+    for _ in range(CAPACITY):
+        mailbox.put(cmd.Home())
+    pause = cmd.Hold(finding=Finding(Reason.LOOP_LATE, 0.3))
+    assert mailbox.put(pause) == CAPACITY + 1
+    with pytest.raises(InputError, match="slower"):
+        mailbox.put(cmd.Hold())
+    assert mailbox.drain().commands[-1] is pause
 
 
 def test_unsupported_command_is_refused_by_the_session(mailbox: Mailbox) -> None:

@@ -74,8 +74,7 @@ def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
         return pipe
 
     async def act() -> None:
-        ended = asyncio.Event()
-        link = StopLink(connect, ended.set)
+        link = StopLink(connect)
         # Before the arm is there.
         link.press(press("one"))
         assert await link.executed("one", 0.1) is None
@@ -97,9 +96,11 @@ def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
             pipes.put(second)
             assert await link.executed("three", TIMEOUT) == press("three").cause
         second.close()
+        assert link.running
         pipes.put(None)
         async with asyncio.timeout(TIMEOUT):
-            await ended.wait()
+            while link.running:
+                await asyncio.sleep(0.01)
 
     asyncio.run(act())
 
@@ -111,7 +112,7 @@ def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
     async def act() -> None:
         with arm_end(arm, session) as pipe:
             pipes = iter((pipe,))
-            link = StopLink(lambda: _next(pipes), lambda: None)
+            link = StopLink(lambda: _next(pipes))
             link.press(press("one"))
             found = await link.executed(name, TIMEOUT if name == "one" else 0.3)
             assert (found is not None) == (name == "one")

@@ -9,11 +9,20 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from katana450.assembly import supervisor as supervisor_module
 from katana450.assembly.supervised import KEPT, READY, SupervisorLink
-from katana450.assembly.supervisor import ChildSpec, Supervisor, child_spec
+from katana450.assembly.supervisor import (
+    START_SILENCE,
+    Child,
+    ChildSpec,
+    Supervisor,
+    Work,
+    child_spec,
+)
 from katana450.errors import ConfigurationError
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals of Linux and macOS")
@@ -111,7 +120,7 @@ def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("work", "message"), [(refusing, "The reason."), (failing, "It did not start; see the log")]
+    ("work", "message"), [(refusing, "The reason."), (failing, "It did not start: it ended; see")]
 )
 def test_error_of_the_first_start_ends_the_server(
     tmp_path: Path, work: Callable[[Path, SupervisorLink], None], message: str
@@ -121,3 +130,39 @@ def test_error_of_the_first_start_ends_the_server(
     with pytest.raises(ConfigurationError, match=message):
         supervisor.wait_for("it", READY)
     supervisor.stop()
+
+
+def test_hang_at_the_first_start_ends_the_server_with_its_reason(tmp_path: Path) -> None:
+    spec = child_spec("stubborn", "It", stubborn, tmp_path, 0.5)
+    supervisor = Supervisor([spec], threading.Event())
+    supervisor.start()
+    with pytest.raises(ConfigurationError, match="did not start: it has not answered for"):
+        supervisor.wait_for("stubborn", "another word")
+    supervisor.stop()
+
+
+def test_supervisor_ends_although_a_process_could_not_be_started(tmp_path: Path) -> None:
+
+    def work(_kept: object) -> Work:
+        raise OSError("no more processes")
+
+    specs = [
+        child_spec("idler", "The idler", idler, tmp_path, 1.0),
+        ChildSpec("it", "It", work, 1.0),
+        child_spec("later", "The later one", idler, tmp_path, 1.0),
+    ]
+    supervisor = Supervisor(specs, threading.Event())
+    with pytest.raises(OSError, match="no more"):
+        supervisor.start()
+    supervisor.stop()
+
+
+def test_excused_time_ends_now(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(supervisor_module, "time", SimpleNamespace(monotonic=lambda: now))
+    child = Child(child_spec("it", "It", idler, tmp_path, 1.0))
+    # More than the time since the last message, as when one has just been read.
+    child.excuse(2 * now)
+    assert child.hangs is None
+    now += START_SILENCE + 1.0
+    assert child.hangs == f"has not answered for {START_SILENCE + 1.0:.1f} s"

@@ -85,8 +85,9 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
         log.critical("The control loop has ended, so the arm's process ends.")
         # At once, without waiting for other threads: a new process begins stopped.
         os._exit(1)
-    arm.stop()
+    # First, so that nothing connects again to an arm that ends.
     listener.close()
+    arm.stop()
     keeper.join()
     # A supervisor that was killed leaves it.
     shutil.rmtree(config.folder, ignore_errors=True)

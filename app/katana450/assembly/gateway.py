@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import secrets
 import socket
 import threading
@@ -218,7 +219,11 @@ class Gateway:
         port, host = self._settings.stop_port, self._listening.getsockname()[0]
         if port is not None:
             secure = self._settings.tls_cert is not None
-            yield watch_stop_path(self.hub.stop_path, host, port, secure=secure)
+            yield watch_stop_path(self.hub.stop_path, host, port, self._arm_age, secure=secure)
+
+    def _arm_age(self) -> float:
+        """Return the time since the arm's process was heard [s]; infinite before."""
+        return math.inf if self.hub.arm is None else self.hub.arm.age
 
     async def _watch(self) -> None:
         while True:

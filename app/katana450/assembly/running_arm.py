@@ -1,4 +1,4 @@
-"""A simulated arm with its control loop, driven by the front end at the end of a pipe."""
+"""A simulated arm with its control loop, for the other processes at the ends of pipes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BRAKING_TIMEOUT = 2.0
 
 
 class RunningArm:
-    """A simulated arm with its control loop, driven by the front end at the end of a pipe."""
+    """A simulated arm with its control loop, for the other processes at the ends of pipes."""
 
     def __init__(
         self,
@@ -118,24 +118,24 @@ class RunningArm:
         return ticks != proven
 
     def stop(self) -> None:
-        """Brake to rest, end the loop, and close the pipe."""
-        if self._moves():
-            self._mailbox.put(cmd.Stop())
+        """Brake to rest, end the loop, and close the pipes."""
+        ends = [each for each in (self._link, self._stop_end) if each is not None]
+        for each in ends:
+            each.close()
+        # Even at rest: a command that has just arrived may begin a motion.
+        self._mailbox.put(cmd.Stop())
         end = time.monotonic() + BRAKING_TIMEOUT
-        while self._moves() and self.running and time.monotonic() < end:
+        while not self._stands_stopped() and self.running and time.monotonic() < end:
             time.sleep(0.01)
         self._loop.stop()
-        if self._link is not None:
-            self._link.close()
-            self._link.join()
-        if self._stop_end is not None:
-            self._stop_end.close()
-            self._stop_end.join()
+        for each in ends:
+            each.join()
         # Let Python collect reference cycles when it ends.
         gc.unfreeze()
 
-    def _moves(self) -> bool:
-        return self.state_publisher.snapshot.state.moving
+    def _stands_stopped(self) -> bool:
+        state = self.state_publisher.snapshot.state
+        return state.stopped is not None and not state.moving
 
 
 def _be_prompt() -> None:

@@ -58,9 +58,7 @@ async def _serve(config: StopConfig, supervisor: SupervisorLink) -> None:
     access = access_file(settings, listening)
     tls = tls_context(settings)
     raise_descriptor_limit()
-    link = StopLink(
-        lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended), lambda: None
-    )
+    link = StopLink(lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended))
     acceptor = Acceptor(listening)
     authenticator = Authenticator(access, config.main_port, address)
     server = StopServer(link, authenticator, address, config.main_port, acceptor)
@@ -69,7 +67,7 @@ async def _serve(config: StopConfig, supervisor: SupervisorLink) -> None:
     gc.collect()
     gc.freeze()
     turned = time.monotonic()
-    supervisor.prove(lambda: time.monotonic() - turned < HANG_TIMEOUT)
+    supervisor.prove(lambda: link.running and time.monotonic() - turned < HANG_TIMEOUT)
     supervisor.report(READY)
     while not supervisor.ended.is_set():
         turned = time.monotonic()

@@ -1,7 +1,8 @@
 """The supervisor: starts the processes of the server, watches each, and starts it again.
 
-It imports almost nothing and does no other work, so that it is always there. A process that ends is
-noticed at once. A process that hangs is noticed by the silence of its pipe, and is ended.
+It also keeps the arm's last state and, in a thread, writes the event log. It imports almost
+nothing, so that it is always there. A process that ends is noticed at once. A process that hangs is
+noticed by the silence of its pipe, and is ended.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ class Child:
         self.statuses: set[str] = set()
         self.error: KatanaError | None = None
         self.kept: Kept = {}
-        self.due: float | None = None
+        self.due: float | None = 0.0
         """Time of the next start [s]; None while a process runs."""
         self._early_ends = 0
         self._ready_at: float | None = None
@@ -119,11 +120,12 @@ class Child:
         self.process.start()
         # Closed here, so that each side notices when the other is gone.
         theirs.close()
-        self._first, self.due, self._ready_at, self.error = False, None, None, None
+        self._first, self._ready_at, self.error = False, None, None
         self._started = self._heard = time.monotonic()
         self.statuses.clear()
         self._reader = threading.Thread(target=self._read, args=(self._pipe,), daemon=True)
         self._reader.start()
+        self.due = None
 
     @property
     def running(self) -> bool:
@@ -156,8 +158,10 @@ class Child:
 
     def excuse(self, late: float) -> None:
         """Do not count the time ``late`` [s], in which the supervisor itself was held up."""
-        self._started += late
-        self._heard += late
+        # What arrived meanwhile is newer.
+        now = time.monotonic()
+        self._started = min(self._started + late, now)
+        self._heard = min(self._heard + late, now)
 
     @property
     def hangs(self) -> str | None:
@@ -233,7 +237,7 @@ class Supervisor:
     def wait_for(self, name: str, word: str) -> None:
         """Wait until the process ``name`` reports ``word``, at the start of the server.
 
-        Raises the error that a process reports, and ConfigurationError if one ends.
+        Raises the error that a process reports, and ConfigurationError if one ends or hangs.
         """
         while word not in self._children[name].statuses and not self._stopping.is_set():
             self._wait()
@@ -243,10 +247,9 @@ class Supervisor:
                     child.collect()
                 if child.error is not None:
                     raise child.error
-                if not alive or child.hangs is not None:
-                    raise ConfigurationError(
-                        f"{child.spec.title} did not start; see the log above."
-                    )
+                why = child.hangs if alive else "ended; see the log above"
+                if why is not None:
+                    raise ConfigurationError(f"{child.spec.title} did not start: it {why}.")
 
     def run(self) -> None:
         """Watch all processes until ``stopping`` is set."""

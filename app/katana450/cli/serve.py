@@ -44,7 +44,8 @@ FRONT_END_DEADLINE = 1.5
 does not cause silence."""
 
 STOP_DEADLINE = 2.0
-"""[s] Time without a turn of its event loop after which the process of STOP is ended."""
+"""[s] Silence after which the process of STOP is ended. It falls silent 1 s after the last turn of
+its event loop, and at once when its thread that reads from the arm's process has ended."""
 
 
 def serve_with(options: Namespace) -> int:
@@ -114,6 +115,7 @@ def serve(
         supervisor.wait_for(FRONT_END, OPEN)
         if not stopping.is_set():
             say(f"Open {url} in a browser.")
+        supervisor.wait_for(STOP, READY)
         supervisor.wait_for(FRONT_END, READY)
         if not stopping.is_set():
             if lines is not None:

@@ -136,9 +136,13 @@ class ArmListener:
                 continue
             if self._closed.is_set():
                 return
-            threading.Thread(
-                target=self._greet, args=(connection,), name="greeting", daemon=True
-            ).start()
+            try:
+                threading.Thread(
+                    target=self._greet, args=(connection,), name="greeting", daemon=True
+                ).start()
+            except RuntimeError as error:
+                log.error("A connection to the arm's process was closed: %s.", error)
+                connection.close()
 
     def _greet(self, connection: Any) -> None:
         try:

@@ -2,8 +2,8 @@
 
 The control loop has a process of its own. So slow work in the front end, such as rendering for many
 viewers, cannot delay the loop, and a crash there cannot leave the arm in motion without control.
-Commands and heartbeats come in by the pipe, and snapshots go out. When no message comes any more,
-the arm stops.
+Commands and heartbeats come in by the pipe, and snapshots go out. When the pipe is cut, the arm
+stops. When it is silent, a moving arm stops, or pauses if it is simulated.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import logging
 import threading
 import time
 from collections import deque
-from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
@@ -97,7 +96,7 @@ class ArmEnd:
     """The end of the link in the arm's process.
 
     It delivers commands to the mailbox and sends what the loop publishes. It stops the arm when the
-    link is cut or silent.
+    link is cut. When the link is silent, a moving arm stops, or pauses if it is simulated.
     """
 
     def __init__(
@@ -142,10 +141,6 @@ class ArmEnd:
     def close(self) -> None:
         """Cut the link: the front end disconnects, and the arm stops."""
         self._lose()
-        # A front end that hangs reads nothing, and its pipe may be full.
-        with suppress(*PIPE_ERRORS):
-            if writable(self._pipe.fileno()):
-                self._pipe.send(None)
 
     def join(self) -> None:
         """Return once the threads have ended, which they do when both ends are closed."""
@@ -196,6 +191,9 @@ class ArmEnd:
             last = event_log[-1] if event_log else None
             while not self.cut.is_set():
                 snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
+                if self.cut.is_set():
+                    # The stop of this end is no news for a front end that disconnects.
+                    break
                 now = time.monotonic()
                 if snapshot is seen and self._loop.ticks == ticks:
                     # A loop that does not tick must give no pulse.
@@ -218,6 +216,9 @@ class ArmEnd:
                     )
                 )
                 seen = snapshot
+            # A front end that hangs reads nothing, and its pipe may be full.
+            if writable(self._pipe.fileno()):
+                self._pipe.send(None)
         except PIPE_ERRORS:
             self._lose()
 

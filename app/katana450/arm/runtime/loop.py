@@ -118,6 +118,7 @@ class ControlLoop:
             # The loop continues after any error and the arm holds: the state reports the error.
             log.exception("The control loop met an error; the arm holds.")
             state = replace(self._session.fail(before), outcomes=(FAILED,) * len(drained.commands))
+            self._put_stops_again(drained)
         self._state = state
         # A state that differs only in its time is not published.
         if drained.last != self.state_publisher.snapshot.ticket or _differs(before, state):
@@ -126,6 +127,14 @@ class ControlLoop:
                 Snapshot(state, drained.last), self._entries(before, state)
             )
         self.ticks += 1
+
+    def _put_stops_again(self, drained: Drained) -> None:
+        """Leave each stop of the failed tick for the next tick: a stop is never lost."""
+        for command, actor in drained.submissions:
+            if isinstance(command, Stop):
+                # Without a name it counts again, although the mailbox knows its presses.
+                cause = replace(command.cause, press="")
+                self._mailbox.put(replace(command, cause=cause, others=command.presses), actor)
 
     def _entries(self, before: State, after: State) -> tuple[LogEntry, ...]:
         """Return the new entries of the event log, attributed to the newest command."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command, Stop
+from katana450.arm.control.commands import Command, Hold, Stop
 from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError
@@ -89,7 +89,8 @@ class Mailbox:
     def put(self, command: Command, actor: Actor | None = None) -> int:
         """Leave ``command`` for the next tick, and return its ticket. Never blocks for long.
 
-        Raises InputError for an invalid command, and when the mailbox is full.
+        Raises InputError for an invalid command, and when the mailbox is full, which refuses
+        neither a stop nor a pause by the server.
         """
         self._check(command)
         with self._lock:
@@ -111,7 +112,7 @@ class Mailbox:
             elif self._waiting and command.replaces(self._waiting[-1].command):
                 self._waiting.pop()
                 replaced = self._of_waiting.pop()
-            elif len(self._waiting) >= CAPACITY:
+            elif len(self._waiting) >= CAPACITY and not _pauses(command):
                 raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")
             self._tickets += 1
             self._waiting.append(Submission(command, actor))
@@ -136,3 +137,7 @@ class Mailbox:
         """The ticket of the newest command."""
         with self._lock:
             return self._tickets
+
+
+def _pauses(command: Command) -> bool:
+    return isinstance(command, Hold) and command.finding is not None

@@ -24,16 +24,13 @@ class StopLink:
     It belongs to the event loop in which it is created; a thread of its own reads the pipe.
     """
 
-    def __init__(self, connect: Callable[[], Connection], on_end: Callable[[], None]) -> None:
+    def __init__(self, connect: Callable[[], Connection]) -> None:
         """Connect and read from now on.
 
-        Args:
-            connect: returns a connection to the arm's process, also after one was cut; raises
-                EOFError if there will be no further one. Called in the thread.
-            on_end: called after that.
+        ``connect``: returns a connection to the arm's process, also after one was cut; raises
+        EOFError if there will be no further one. Called in the thread.
         """
         self._connect = connect
-        self._on_end = on_end
         self._pipe: Connection | None = None
         self._unsent: deque[StopPress] = deque(maxlen=MAX_UNSENT)
         self._loop = asyncio.get_running_loop()
@@ -41,7 +38,13 @@ class StopLink:
         self._changed = asyncio.Event()
         self.status: StopStatus | None = None
         """The newest status; None while there is no connection to the arm."""
-        threading.Thread(target=self._listen, name="stop link", daemon=True).start()
+        self._thread = threading.Thread(target=self._listen, name="stop link", daemon=True)
+        self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """True while the thread reads; False once it has ended for any reason."""
+        return self._thread.is_alive()
 
     @property
     def age(self) -> float:
@@ -85,7 +88,6 @@ class StopLink:
                     while True:
                         self._call(self._take, pipe.recv())
                 self._call(self._attach, None)
-        self._call(self._on_end)
 
     def _call(self, act: Callable[..., None], *values: object) -> None:
         # The event loop is closed when the process ends.

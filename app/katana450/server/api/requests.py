@@ -143,7 +143,9 @@ class Hello(Request, frozen=True, kw_only=True):
 
 
 class Heartbeat(Request, frozen=True, kw_only=True):
-    """A heartbeat. The holder of the lease sends ten a second; otherwise a moving arm is stopped.
+    """A heartbeat. The holder of the lease sends ten a second.
+
+    Otherwise a moving arm stops, or pauses if it is simulated.
 
     Attributes:
         n: Number that the answer repeats, for measuring the round trip.

@@ -227,6 +227,11 @@ class CommandGate:
         """
         with self._lock:
             self._revoke()
+            self.refuse_motion()
+
+    def refuse_motion(self) -> None:
+        """Refuse motion for SETTLE_TIME from now on."""
+        with self._lock:
             self._settled = self._clock() + SETTLE_TIME
 
     def _note_pause(self) -> None:

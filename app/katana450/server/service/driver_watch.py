@@ -84,3 +84,6 @@ class DriverWatch:
         elif t - pause.since >= PAUSE_TIMEOUT:
             self._pause = None
             self._gate.protect(f"{pause.driver.name} was silent for {PAUSE_TIMEOUT:g} s.")
+        elif holder == pause.driver:
+            # Gestures in the scene are no heartbeats, so they could move the arm unwatched.
+            self._gate.refuse_motion()

@@ -57,9 +57,9 @@ class Hub:
     ) -> None:
         """Create a hub without participants.
 
-        ``hold_after``: heartbeat timeout of the driver [s] after which a moving arm is stopped.
-        ``meshes``: initial meshes. ``runner``: factory of the ``Runner``; None for one that never
-        drives. ``clear_by``: persons who may clear a stop.
+        ``hold_after``: heartbeat timeout of the driver [s] after which a moving arm stops, or
+        pauses if it is simulated. ``meshes``: initial meshes. ``runner``: factory of the
+        ``Runner``; None for one that never drives. ``clear_by``: persons who may clear a stop.
         """
         self.clock = clock
         self._hold_after = hold_after

@@ -1,10 +1,11 @@
-"""Regular requests to the port of STOP, which prove that it answers."""
+"""Regular requests to the port of STOP, which prove that it answers and reaches the arm."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import ssl
+from collections.abc import Callable
 
 from katana450.server.service.stop_path import StopPath
 
@@ -19,16 +20,27 @@ ANSWER_TIMEOUT = 0.5
 MAX_FAILURES = 2
 """Failures in a row after which the path counts as missing."""
 
+WELL, WITHOUT_ARM = b"HTTP/1.1 200", b"HTTP/1.1 503"
+"""Begin of an answer of a healthy server, and of one that has no answer from the arm."""
+
 REQUEST = b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
 ANYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 """Address of this machine for a socket that listens on all of its addresses."""
 
 
-async def watch_stop_path(path: StopPath, host: str, port: int, *, secure: bool) -> None:
+async def watch_stop_path(
+    path: StopPath, host: str, port: int, arm_age: Callable[[], float], *, secure: bool
+) -> None:
     """Keep ``path.problem`` true for the server of STOP on ``host`` and ``port``, until cancelled.
 
-    ``secure``: whether it uses TLS.
+    Args:
+        path: the path of STOP.
+        host: address on which the server listens.
+        port: its port.
+        arm_age: returns the time since this process heard the arm's process [s]. While it is
+            CHECK_EVERY or longer, the server of STOP need not reach the arm either.
+        secure: whether the server uses TLS.
     """
     tls = None
     if secure:
@@ -39,11 +51,12 @@ async def watch_stop_path(path: StopPath, host: str, port: int, *, secure: bool)
     while True:
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT):
-                answers = await _answers(ANYWHERE.get(host, host), port, tls)
-        except (OSError, TimeoutError):
-            answers = False
-        failures = 0 if answers else failures + 1
-        if path.problem and answers:
+                answer = await _answer(ANYWHERE.get(host, host), port, tls)
+        except (OSError, EOFError, TimeoutError):
+            answer = b""
+        serves = answer == WELL or (answer == WITHOUT_ARM and arm_age() >= CHECK_EVERY)
+        failures = 0 if serves else failures + 1
+        if path.problem and serves:
             path.problem = ""
             log.warning("STOP is served on port %d again.", port)
         elif failures == MAX_FAILURES:
@@ -54,10 +67,11 @@ async def watch_stop_path(path: StopPath, host: str, port: int, *, secure: bool)
         await asyncio.sleep(CHECK_EVERY)
 
 
-async def _answers(host: str, port: int, tls: ssl.SSLContext | None) -> bool:
+async def _answer(host: str, port: int, tls: ssl.SSLContext | None) -> bytes:
+    """Return the begin of the answer, up to its status."""
     reader, writer = await asyncio.open_connection(host, port, ssl=tls)
     try:
         writer.write(REQUEST)
-        return (await reader.read(9)).startswith(b"HTTP/1.1 ")
+        return await reader.readexactly(len(WELL))
     finally:
         writer.transport.abort()

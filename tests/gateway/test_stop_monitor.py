@@ -1,0 +1,94 @@
+"""Test that a port of STOP counts as missing when it does not answer or cannot reach the arm."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from katana450.server.service.stop_path import StopPath
+from katana450.server.web.stop_monitor import watch_stop_path
+from tests.browser.server import AppServer, ServerError
+from tests.gateway.client import ask
+
+# Ends the thread that reads the pipe to the arm, like an unexpected error, once a file exists.
+# Every process of the server imports this file.
+FATAL = """
+import pathlib
+import sys
+from katana450.cli.main import main
+from katana450.arm.runtime.stop_link import StopLink
+call = StopLink._call
+def fatal(link, act, *values):
+    pathlib.Path(sys.argv[2]).unlink()
+    raise SystemExit
+def checked(link, act, *values):
+    return (fatal if pathlib.Path(sys.argv[2]).exists() else call)(link, act, *values)
+StopLink._call = checked
+if __name__ == "__main__":
+    sys.exit(main(["serve", "--port", sys.argv[1]]))
+"""
+
+
+async def problem_with(answer: bytes, arm_age: float) -> str:
+    """Return the problem of a server of STOP that gives ``answer``, after several checks."""
+    path, asked = StopPath(), asyncio.Semaphore(0)
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readline()
+        asked.release()
+        writer.write(answer)
+        writer.close()
+
+    async with await asyncio.start_server(serve, "127.0.0.1") as server:
+        port = server.sockets[0].getsockname()[1]
+        watch = asyncio.create_task(
+            watch_stop_path(path, "127.0.0.1", port, lambda: arm_age, secure=False)
+        )
+        # The fourth request follows the judgement of the third answer.
+        for _ in range(4):
+            await asyncio.wait_for(asked.acquire(), 10.0)
+        watch.cancel()
+        await asyncio.gather(watch, return_exceptions=True)
+    return path.problem
+
+
+@pytest.mark.parametrize(
+    ("answer", "arm_age", "serves"),
+    [
+        (b"HTTP/1.1 200 OK\r\n\r\n", 0.0, True),
+        (b"HTTP/1.1 503 Service Unavailable\r\n\r\n", 0.1, False),
+        (b"HTTP/1.1 503 Service Unavailable\r\n\r\n", math.inf, True),
+        (b"HTTP/1.1 500 Internal Server Error\r\n\r\n", math.inf, False),
+        (b"", math.inf, False),
+    ],
+)
+def test_port_serves_stop_only_if_it_reaches_the_arm(
+    answer: bytes, arm_age: float, serves: bool
+) -> None:
+    problem = asyncio.run(problem_with(answer, arm_age))
+    assert bool(problem) != serves
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the server's processes by their names")
+def test_stop_process_that_no_longer_reads_from_the_arm_is_replaced(tmp_path: Path) -> None:
+    app, fuse = tmp_path / "fatal.py", tmp_path / "fuse"
+    app.write_text(FATAL, encoding="utf-8")
+    with AppServer((sys.executable, str(app), "{port}", str(fuse))) as server:
+        killed = server.stop_process
+        fuse.touch()
+        end = time.monotonic() + 20.0
+        while True:
+            try:
+                if server.stop_process != killed and ask(f"{server.stop_url}/health")[0] == 200:
+                    break
+            except (ServerError, OSError):
+                pass
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        assert "The process of STOP has not answered" in server.output
+        assert "STOP is not served on port" in server.output
