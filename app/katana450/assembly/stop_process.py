@@ -58,9 +58,7 @@ async def _serve(config: StopConfig, supervisor: SupervisorLink) -> None:
     access = access_file(settings, listening)
     tls = tls_context(settings)
     raise_descriptor_limit()
-    link = StopLink(
-        lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended), lambda: None
-    )
+    link = StopLink(lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended))
     acceptor = Acceptor(listening)
     authenticator = Authenticator(access, config.main_port, address)
     server = StopServer(link, authenticator, address, config.main_port, acceptor)
@@ -73,6 +71,7 @@ async def _serve(config: StopConfig, supervisor: SupervisorLink) -> None:
     supervisor.report(READY)
     while not supervisor.ended.is_set():
         turned = time.monotonic()
+        server.follow()
         await asyncio.sleep(TURN_INTERVAL)
     acceptor.close()
     await acceptor.wait_closed()

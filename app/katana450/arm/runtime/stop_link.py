@@ -24,16 +24,14 @@ class StopLink:
     It belongs to the event loop in which it is created; a thread of its own reads the pipe.
     """
 
-    def __init__(self, connect: Callable[[], Connection], on_end: Callable[[], None]) -> None:
+    def __init__(self, connect: Callable[[], Connection]) -> None:
         """Connect and read from now on.
 
         Args:
             connect: returns a connection to the arm's process, also after one was cut; raises
                 EOFError if there will be no further one. Called in the thread.
-            on_end: called after that.
         """
         self._connect = connect
-        self._on_end = on_end
         self._pipe: Connection | None = None
         self._unsent: deque[StopPress] = deque(maxlen=MAX_UNSENT)
         self._loop = asyncio.get_running_loop()
@@ -85,7 +83,6 @@ class StopLink:
                     while True:
                         self._call(self._take, pipe.recv())
                 self._call(self._attach, None)
-        self._call(self._on_end)
 
     def _call(self, act: Callable[..., None], *values: object) -> None:
         # The event loop is closed when the process ends.

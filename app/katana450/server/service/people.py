@@ -19,7 +19,7 @@ from typing import Protocol
 
 from katana450.errors import KatanaError
 from katana450.server.service.identity import Identity
-from katana450.server.service.mutes import Mutes
+from katana450.server.service.mutes import STOP_INTERVAL, Mutes
 
 log = logging.getLogger(__name__)
 
@@ -50,6 +50,9 @@ class LinkStore(Protocol):
 
     def mute(self, number: str, interval: float | None) -> None:
         """Store the interval of a mute [s], or its end. Raises KatanaError or OSError."""
+
+    def keep_out(self, number: str, until: float) -> None:
+        """Store until when a person is kept out [s since the epoch]; see ``mute``."""
 
 
 @dataclass(eq=False)
@@ -89,7 +92,6 @@ class People:
         self._counted = 0
         self._refusals: Counter[str] = Counter()
         self._kept_out: dict[str, float] = {}
-        self._away = Mutes(clock)
         self._writing = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -207,16 +209,10 @@ class People:
 
     # STOP
 
-    def is_muted(self, session: str) -> bool:
-        """Return whether ``session`` is muted or kept out, so that not every STOP counts."""
-        return self.mutes.interval(session) is not None or self.kept_out(session) > 0.0
-
-    def count_stop(self, session: str) -> None:
-        """Count a STOP of ``session``. Raises MutedError if it is muted and does not count.
+    def stop_interval(self, session: str) -> float | None:
+        """Return the interval [s] in which one STOP of ``session`` counts; None if each does.
 
         An identity that is kept out counts as muted. It can still stop the arm over HTTP.
         """
-        if self.kept_out(session):
-            self._away.add(session)
-            self._away.count_stop(session)
-        self.mutes.count_stop(session)
+        interval = self.mutes.interval(session)
+        return max(STOP_INTERVAL, interval or 0.0) if self.kept_out(session) else interval

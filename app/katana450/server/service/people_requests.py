@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import time
 from datetime import UTC, datetime
 
 from katana450.arm.control.lease import Role
@@ -49,6 +50,7 @@ class PeopleRequests:
 
     def _kick(self, window: Window, person: Identity, request: requests.Kick) -> None:
         by, name, people = window.person.name, self._name(person), self._people
+        links = people.links
         if person.session == session_of(window.person.key):
             raise InputError("You cannot disconnect yourself. Close your windows instead.")
         if not request.revoke:
@@ -59,8 +61,14 @@ class PeopleRequests:
             else:
                 log.warning("%s let %s in again.", by, name)
                 people.let_in(person.session)
+            if links is not None:
+                # The process of STOP finds it there.
+                until = time.time() + request.seconds if request.seconds else 0.0
+                people.write(
+                    lambda: links.keep_out(person.session, until),
+                    lambda why: _report(window, f"The port of STOP does not know this. {why}"),
+                )
             return
-        links = people.links
         if links is None:
             raise InputError("This server has no links that could be revoked.")
         if person.role is Role.ADMIN:
@@ -126,7 +134,7 @@ class PeopleRequests:
             role=identity.role.value,
             link=None if people.links is None else session,
             you=you,
-            drives=hub.drives(session),
+            drives=session in hub.drivers,
             asks=any(session_of(each.key) == session for each in hub.lease.waiting),
             program=program.person.name if program is not None and owns else None,
             refused=people.refusals(session),

@@ -37,12 +37,14 @@ class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
         role: Role of the person.
         expires: End of the validity [s since the epoch].
         muted: Interval [s] in which one STOP counts; None unless an admin has muted the person.
+        kept_out: End of the time [s since the epoch] for which an admin keeps the person out.
     """
 
     name: str
     role: Role
     expires: float
     muted: float | None = None
+    kept_out: float = 0.0
 
 
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -116,10 +118,17 @@ class AccessFile:
 
         So it lasts when the server is started again, and each process that admits STOP knows it.
         """
+        self._update(number, muted=interval)
+
+    def keep_out(self, number: str, until: float) -> None:
+        """Store until when [s since the epoch] the person is kept out, as ``mute`` does."""
+        self._update(number, kept_out=until)
+
+    def _update(self, number: str, **changes: float | None) -> None:
         grants = self.grants
         if number not in grants:
             raise InputError(f"There is no link {number!r}.")
-        grants[number] = msgspec.structs.replace(grants[number], muted=interval)
+        grants[number] = msgspec.structs.replace(grants[number], **changes)
         self._write(_Content(self._content.secret, grants))
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:

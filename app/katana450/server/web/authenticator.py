@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
+from katana450.server.service.mutes import STOP_INTERVAL
 from katana450.server.service.people import Connection, People
 from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile, Grant
 
@@ -229,4 +230,7 @@ class Authenticator:
 
 
 def _of_link(number: str, grant: Grant) -> Identity:
-    return Identity(number, grant.name, grant.role, number, grant.name, grant.muted)
+    muted = grant.muted
+    if time.time() < grant.kept_out:
+        muted = max(STOP_INTERVAL, muted or 0.0)
+    return Identity(number, grant.name, grant.role, number, grant.name, muted)
