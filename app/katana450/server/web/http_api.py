@@ -26,7 +26,7 @@ from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import MutedError
-from katana450.server.service.participants import Window, actor_of
+from katana450.server.service.participants import SHARED_SESSION, Window, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
@@ -154,6 +154,8 @@ class Api:
             )
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.MAX_REQUEST_BYTES)
+        # An admin may have kept the sender out while the body arrived.
+        identity = self._identity(request)
         try:
             decoded = self._hub.requests.decoded(body)
             if isinstance(decoded, requests.Hello | requests.Watch):
@@ -225,7 +227,7 @@ class Api:
 
     def _key(self, request: Request, identity: Identity) -> str:
         """Return the key that the requests of one program have in common."""
-        session = identity.session if self._authenticator.requires_link else "programs"
+        session = identity.session if self._authenticator.requires_link else SHARED_SESSION
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:
