@@ -57,7 +57,7 @@ class PeopleRequests:
             self._note("kick", window, person, seconds=request.seconds)
             if request.seconds:
                 log.warning("%s disconnected %s for %g s.", by, name, request.seconds)
-                people.kick(person, request.seconds)
+                self._remove(person, request.seconds)
             else:
                 log.warning("%s let %s in again.", by, name)
                 people.let_in(person.session)
@@ -74,12 +74,17 @@ class PeopleRequests:
         if person.role is Role.ADMIN:
             raise LeaseError("Revoke the link of an admin with `katana450 access revoke`.")
         self._note("revoke", window, person)
-        people.kick(person, math.inf)
+        self._remove(person, math.inf)
         log.warning("%s revoked the link of %s.", by, name)
         people.write(
             lambda: links.revoke(person.session),
             lambda why: _report(window, f"The link of {name} works again after a restart. {why}"),
         )
+
+    def _remove(self, person: Identity, seconds: float) -> None:
+        """Disconnect ``person`` for ``seconds``, and end what runs on its behalf."""
+        self._people.kick(person, seconds)
+        self._hub.runner.removed(person.session)
 
     def _mute(self, window: Window, person: Identity, seconds: float) -> None:
         if person.role is Role.ADMIN:
