@@ -21,7 +21,7 @@ from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Window
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web.access_links import AccessFile
-from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator
+from katana450.server.web.authenticator import KICKED, LOOPBACK_NAMES, Address, Authenticator
 from katana450.server.web.http_api import Api
 from tests.gateway.client import HOUR
 from tests.gateway.test_hub import FakeArm
@@ -61,6 +61,13 @@ class House:
         self, body: bytes, token: str = "", meanwhile: Callable[[], object] = lambda: None
     ) -> int:
         """Send a request over HTTP; ``meanwhile`` is called before its body arrives."""
+        return (await self.api._do(self.request(body, token, meanwhile))).status_code
+
+    @staticmethod
+    def request(
+        body: bytes, token: str = "", meanwhile: Callable[[], object] = lambda: None
+    ) -> Request:
+        """Return a request of a program."""
 
         async def receive() -> dict[str, object]:
             meanwhile()
@@ -68,8 +75,9 @@ class House:
 
         headers = {"x-program": PROGRAM, "authorization": f"Bearer {token}"}
         raw = [(name.encode(), text.encode()) for name, text in headers.items()]
-        scope = {"type": "http", "method": "POST", "headers": raw, "client": ("127.0.0.1", 5)}
-        return (await self.api._do(Request(scope, receive))).status_code
+        address = ("127.0.0.1", 5)
+        scope = {"type": "http", "query_string": b"", "headers": raw, "client": address}
+        return Request(scope, receive)
 
 
 @pytest.fixture
@@ -128,5 +136,24 @@ def test_port_of_stop_finds_in_the_access_file_who_is_kept_out(house: House) -> 
         await interval(10.0)
         house.ask(requests.Kick(person=person, seconds=0.0))
         await interval(None)
+
+    asyncio.run(act())
+
+
+def test_http_programs_without_links_are_kept_out_together(
+    tmp_path: Path, session: Session
+) -> None:
+    house = House(tmp_path, session, free=True)
+
+    async def act() -> None:
+        assert await house.post(b'{"do": "acquire"}') == 200
+        number = house.number("programs")
+        house.ask(requests.Kick(person=number, seconds=60.0))
+        with pytest.raises(HTTPException, match=KICKED) as refused:
+            await house.post(b'{"do": "heartbeat"}')
+        assert refused.value.status_code == 403
+        assert (await house.api._stop(house.request(b""))).status_code == 204
+        house.ask(requests.Kick(person=number, seconds=0.0))
+        assert await house.post(b'{"do": "heartbeat"}') == 200
 
     asyncio.run(act())

@@ -141,7 +141,11 @@ class Authenticator:
         found = self.program("", authorization, cookies, stopping=True)
         if self._access is None:
             found = self.identity(cookies, stopping=True)
-        seconds = 0.0 if found is None else self._people.kept_out(found.session)
+        return None if found is None else self.kept_out(found.session)
+
+    def kept_out(self, session: str) -> str | None:
+        """Return why an admin keeps out the identity of ``session``; None if no admin does."""
+        seconds = self._people.kept_out(session)
         if not seconds:
             return None
         again = f" Come back in {math.ceil(seconds)} s." if seconds < math.inf else ""

@@ -202,6 +202,11 @@ class Api:
                 why=why or "No valid token.",
             )
             raise HTTPException(401, TOKEN_REQUIRED) if why is None else HTTPException(403, why)
+        if not self._authenticator.requires_link and not stopping:
+            # All these programs have one identity, without which nobody could keep one out.
+            why = self._authenticator.kept_out(SHARED_SESSION)
+            if why is not None and KEY in headers:
+                raise HTTPException(403, why)
         return replace(found, address=address_of(request))
 
     def _window(self, request: Request, identity: Identity) -> Window:
