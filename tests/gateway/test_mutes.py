@@ -17,6 +17,7 @@ from katana450.arm.control.stop_cause import pressed
 from katana450.errors import LeaseError
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api import requests
+from katana450.server.service import people as people_module
 from katana450.server.service.budget import Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
@@ -241,3 +242,37 @@ def test_people_are_shown_while_they_are_connected_muted_or_kept_out(room: Room)
     (number,) = (number for number in range(10) if people.identity(number) == VERA)
     with people.connected(Connection(ODA, ConnectionKind.PAGE, "127.0.0.1")):
         assert list(people.shown) == [number + 1]
+
+
+def test_connected_muted_and_absent_people_are_never_forgotten(
+    room: Room, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(people_module, "MAX_REMEMBERED", 3)
+    people = room.hub.people
+    kept = [Identity(name, name, Role.VIEWER) for name in ("present", "muted", "absent")]
+    connections = [Connection(each, ConnectionKind.PAGE, "127.0.0.1") for each in kept]
+    for connection in connections:
+        people.add(connection)
+    people.mutes.add("muted")
+    people.kick(kept[2], 60.0)
+    for connection in connections[1:]:
+        people.remove(connection)
+    for number in range(5):
+        session = f"visitor {number}"
+        visitor = Identity(session, "Visitor", Role.VIEWER)
+        with people.connected(Connection(visitor, ConnectionKind.PAGE, "127.0.0.1")):
+            people.refused(session)
+            # Also those that come late are counted.
+            assert people.refusals(session) == 1
+        assert list(people.shown.values()) == kept
+    assert people.refusals("visitor 0") == 0
+
+
+def test_mutes_and_absences_are_restored_with_their_people(room: Room) -> None:
+    people = room.hub.people
+    people.restore(VERA, 20.0, -5.0)
+    people.restore(ODA, None, 30.0)
+    people.restore(Identity("otto", "Otto", Role.VIEWER), None, 0.0)
+    assert list(people.shown.values()) == [VERA, ODA]
+    assert (people.mutes.interval("vera"), people.kept_out("vera")) == (20.0, 0.0)
+    assert (people.mutes.interval("oda"), people.kept_out("oda")) == (None, 30.0)

@@ -24,7 +24,8 @@ from katana450.server.service.mutes import STOP_INTERVAL, Mutes
 log = logging.getLogger(__name__)
 
 MAX_REMEMBERED = 1024
-"""Maximum number of identities whose numbers and refusals are remembered."""
+"""Number of identities whose numbers and refusals are remembered, beside those that are connected,
+muted or kept out."""
 
 
 class ConnectionKind(Enum):
@@ -129,8 +130,12 @@ class People:
             self._counted += 1
             number = self._counted
         self._known[identity.session] = number, identity
-        while len(self._known) > MAX_REMEMBERED:
-            del self._known[next(iter(self._known))]
+        if len(self._known) > MAX_REMEMBERED:
+            listed = self._listed
+            oldest = next((each for each in self._known if each not in listed), identity.session)
+            if oldest != identity.session:
+                del self._known[oldest]
+                self._refusals.pop(oldest, None)
 
     def identity(self, number: int) -> Identity | None:
         """Return the identity with ``number``; None if it is not remembered."""
@@ -139,20 +144,25 @@ class People:
     @property
     def shown(self) -> dict[int, Identity]:
         """The identities that are connected, muted or kept out, by their numbers."""
-        present = {each.identity.session for each in self._connections}
-        absent = {each for each in tuple(self._kept_out) if 0.0 < self.kept_out(each) < math.inf}
-        sessions = present | absent | set(self.mutes.sessions)
+        listed = self._listed
         return {
             number: identity
             for session, (number, identity) in self._known.items()
-            if session in sessions
+            if session in listed
         }
+
+    @property
+    def _listed(self) -> set[str]:
+        """The sessions that are connected, muted or kept out."""
+        present = {each.identity.session for each in self._connections}
+        absent = {each for each in tuple(self._kept_out) if 0.0 < self.kept_out(each) < math.inf}
+        return present | absent | set(self.mutes.sessions)
 
     # Refusals
 
     def refused(self, session: str) -> None:
-        """Count a refused request of ``session``."""
-        if session in self._refusals or len(self._refusals) < MAX_REMEMBERED:
+        """Count a refused request of ``session``, if it is remembered."""
+        if session in self._known:
             self._refusals[session] += 1
 
     def refusals(self, session: str) -> int:
@@ -174,6 +184,18 @@ class People:
         for each in closed:
             each.kicked.set()
         return len(closed)
+
+    def restore(self, identity: Identity, muted: float | None, kept_out: float) -> None:
+        """Mute ``identity`` and keep it out as before the server was started.
+
+        ``muted``: interval [s] of its mute; None for none. ``kept_out``: remaining time [s]; not
+        positive for none.
+        """
+        if muted is not None:
+            self.mutes.add(identity.session, muted)
+        self.kick(identity, max(kept_out, 0.0))
+        if identity.session in self._listed:
+            self._remember(identity)
 
     def let_in(self, session: str) -> None:
         """Let the identity of ``session`` in again before its time."""

@@ -131,7 +131,7 @@ class Authenticator:
         value = cookies.get(self._cookie, "")
         if self._access is not None:
             known = self._access.check_session(value, time.time())
-            found = None if known is None else _of_link(*known)
+            found = None if known is None else identity_of(*known)
         else:
             found = Identity(value, None, Role.ADMIN) if len(value) == SESSION_SIZE else None
         return self._admitted(found, stopping=stopping)
@@ -176,7 +176,7 @@ class Authenticator:
         scheme, _, token = authorization.partition(" ")
         if scheme.lower() == "bearer":
             known = self._access.check(token.strip(), time.time())
-            found = None if known is None else _of_link(*known)
+            found = None if known is None else identity_of(*known)
             found = self._admitted(found, stopping=stopping)
         else:
             found = self.identity(cookies or {}, stopping=stopping)
@@ -224,7 +224,7 @@ class Authenticator:
             known = self._access.check(token, time.time())
             if known is None:
                 return None
-            found = _of_link(*known)
+            found = identity_of(*known)
             max_age = int(known[1].expires - time.time())
             value = self._access.session(known[0])
         response.set_cookie(
@@ -233,7 +233,8 @@ class Authenticator:
         return found
 
 
-def _of_link(number: str, grant: Grant) -> Identity:
+def identity_of(number: str, grant: Grant) -> Identity:
+    """Return the identity of the link of ``number``."""
     muted = grant.muted
     if time.time() < grant.kept_out:
         muted = max(STOP_INTERVAL, muted or 0.0)
