@@ -1,7 +1,8 @@
 """Server of STOP alone, in a process that shares nothing with the web server.
 
 It accepts ``POST /stop`` of pages, ``POST /api/v1/stop`` of programs, and ``GET /health``. Each
-connection carries one request. STOP is decided from memory and passed to the arm's process at once.
+connection carries one request. STOP is passed to the arm's process at once. The only file that it
+needs is the access file: each STOP does a ``stat`` of it, and reads it after a change.
 """
 
 from __future__ import annotations
