@@ -13,6 +13,7 @@ from starlette.requests import Request
 
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
+from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.server.api import requests
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
@@ -20,6 +21,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Window
 from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.web import http_api
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import KICKED, LOOPBACK_NAMES, Address, Authenticator
 from katana450.server.web.http_api import Api
@@ -155,5 +157,34 @@ def test_http_programs_without_links_are_kept_out_together(
         assert (await house.api._stop(house.request(b""))).status_code == 204
         house.ask(requests.Kick(person=number, seconds=0.0))
         assert await house.post(b'{"do": "heartbeat"}') == 200
+
+    asyncio.run(act())
+
+
+def test_refused_queries_of_a_muted_person_cost_and_those_of_the_driver_count(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(http_api, "MAX_PAUSE", 0.0)
+    token = house.file.give("Oda", Role.OPERATOR, time.time() + HOUR)
+    (number,) = house.file.grants
+    house.people.mutes.add(number, 60.0)
+    house.arm.loop_timing = LoopTiming(0.01)
+    query = house.api._read("loop")
+
+    async def ask() -> int:
+        return (await query(house.request(b"", token))).status_code
+
+    async def act() -> None:
+        assert [await ask() for _ in range(2)] == [200, 429]
+        oda = house.join(number, "Oda", Role.OPERATOR)
+        house.hub.acquire(oda)
+        assert [await ask() for _ in range(3)] == 3 * [200]
+        house.hub.release_lease(oda)
+        budget = house.budgets.of(number)
+        for _ in range(10_000):
+            assert await ask() == 429
+            if budget.is_exhausted():
+                return
+        raise AssertionError("The refused queries cost nothing.")
 
     asyncio.run(act())

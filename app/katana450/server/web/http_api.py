@@ -125,9 +125,9 @@ class Api:
                 driver = driver_key(self._hub, window)
                 self._hub.heartbeat(window)
             try:
-                if not driver:
-                    self._hub.people.mutes.count_request(identity.session)
                 with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
+                    if identity.session not in self._hub.drivers:
+                        self._hub.people.mutes.count_request(identity.session)
                     return as_json(self._dispatcher.query(at))
             except (BusyError, MutedError) as error:
                 self._refused(request)
