@@ -75,7 +75,8 @@
     try {
       const answer = await fetch(url, { method: "POST", keepalive: true, credentials: "include" });
       if (sent !== press) return;
-      if (answer.status === 429) return notCounted(await answer.text());
+      // The port of STOP may count the next copy of the press.
+      if (answer.status === 429 && path === "") return notCounted(await answer.text());
       if (!answer.ok) return;
       const found = answer.status === 204 ? {} : await answer.json();
       if (found.stop === "confirmed" && status?.stop !== "confirmed") proven = found.why;
@@ -187,14 +188,14 @@
 
   let [drawnActs, drawnOrders] = ["", ""];
   function draw() {
+    // A press is complete when the arm's state shows the stop.
+    stopButton.classList.toggle("asked", !proven && (asking !== null || status?.stop === "requested"));
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : status.mood;
     text("headline", proven ? "Stopped" : status.headline);
     const at = status.stopped_at ? `${new Date(1000 * status.stopped_at).toLocaleTimeString()}:` : "";
     const cause = status.stopped ? [at, status.stopped] : [proven];
     text("why", [status.taken, status.why, ...cause, status.until].filter(Boolean).join(" "));
-    // A press is complete when the arm's state shows the stop.
-    stopButton.classList.toggle("asked", !proven && (asking !== null || status.stop === "requested"));
     byId("objects-button").hidden = status.role === "viewer";
     const clear = byId("clear-stop");
     clear.hidden = !status.stopped || !status.may_clear_stop;
@@ -370,7 +371,8 @@
     const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
     stopPort = answer.headers.get("X-Stop-Port") ?? stopPort;
     byId("gate").hidden = answer.ok;
-    // 403: an admin has disconnected this person.
+    // 403: an admin has disconnected this person, whose STOP still works.
+    byId("gate").classList.toggle("out", answer.status === 403);
     if (answer.status === 403 || (token && !answer.ok)) byId("gate-why").textContent = await answer.text();
     return answer.ok;
   }

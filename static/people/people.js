@@ -8,7 +8,7 @@ const CONTENT = `
     <option value="revoke">ever: revoke the link</option>
   </select></label></p>
   <ul id="people-list"></ul>
-  <p id="people-note">A muted person can still stop the arm, once in 10 s. A disconnected one can too, from a page that is open. STOP of the driver and of admins always counts.</p>
+  <p id="people-note">A muted person can still stop the arm, once per interval. A disconnected one can too, once in 10 s, from a page that is open. STOP of the driver, of the owner of the running program and of admins always counts.</p>
 `;
 /** @type {(id: string) => any} */
 const byId = (id) => document.getElementById(id);
@@ -56,12 +56,17 @@ export class People {
       clearInterval(this.timer);
       byId("help-button").focus();
     });
+    byId("kick-for").addEventListener("change", () => {
+      this.drawn = "";
+      this.look();
+    });
   }
 
   show() {
     this.drawn = "";
     this.dialog.show();
     this.look();
+    clearInterval(this.timer);
     this.timer = setInterval(() => this.look(), EVERY);
   }
 
@@ -77,16 +82,22 @@ export class People {
     made.setAttribute("aria-label", `${label} ${name}`);
     made.dataset.key = key;
     made.addEventListener("click", () => {
-      act();
+      act(made);
       this.look();
     });
     return made;
   }
 
-  kick(person) {
+  // The second click revokes a link, because nothing brings it back.
+  kick({ person, name }, button) {
     const { value } = byId("kick-for");
-    if (value === "revoke") this.say({ do: "kick", person, revoke: true });
-    else this.say({ do: "kick", person, seconds: Number(value) });
+    if (value !== "revoke") this.say({ do: "kick", person, seconds: Number(value) });
+    else if (button.dataset.sure) this.say({ do: "kick", person, revoke: true });
+    else {
+      button.dataset.sure = "asked";
+      button.textContent = "Revoke for ever?";
+      button.setAttribute("aria-label", `Revoke the link of ${name} for ever?`);
+    }
   }
 
   row(each) {
@@ -101,7 +112,7 @@ export class People {
     if (role !== "admin" && muted === null) add("mute", "Mute", () => this.say({ do: "mute", person }));
     if (muted !== null) add("mute", "Unmute", () => this.say({ do: "unmute", person }));
     if (out !== null) add("kick", "Let in", () => this.say({ do: "kick", person, seconds: 0 }));
-    else if (!you) add("kick", "Disconnect", () => this.kick(person));
+    else if (!you) add("kick", "Disconnect", (button) => this.kick(each, button));
     item.append(title, acts, line);
     return item;
   }

@@ -152,3 +152,72 @@ def test_page_of_a_muted_viewer_shows_that_a_stop_did_not_count(
         # The button shows no stop that is still being sent.
         other.locator("#stop:not(.asked)").wait_for()
         assert other.get_attribute("body", "data-mood") != "stopped"
+
+
+def test_disconnected_person_stops_the_arm_on_a_phone(
+    site: Site, browser: Browser, artefacts: Path
+) -> None:
+    url = site.server.url
+    boss, token = site.link("Ada", Role.ADMIN), site.link("Kai", Role.VIEWER)
+    with (
+        connect(url, "Guard", boss) as guard,
+        visiting(browser, f"{url}/#{token}") as phone,
+    ):
+        phone.set_viewport_size({"width": 390, "height": 844})
+        (kai,) = (each for each in guard.people() if each.name == "Kai")
+        guard.kick(kai.person, 600.0)
+        phone.get_by_text("Your STOP still works").wait_for(timeout=10_000)
+        for again in (False, True):
+            if again:
+                # The page knows no state of the arm.
+                phone.reload()
+                phone.get_by_text("Your STOP still works").wait_for(timeout=10_000)
+            phone.screenshot(path=artefacts / f"disconnected-phone-{again}.png")
+            phone.locator("#stop").click()
+            phone.locator("#stop:not(.asked)").wait_for()
+            assert guard.query(answers.State).stopped == "Kai pressed STOP."
+
+
+def test_link_is_revoked_by_the_second_click(site: Site, browser: Browser) -> None:
+    url = site.server.url
+    boss, token = site.link("Ada", Role.ADMIN), site.link("Rita", Role.VIEWER)
+    with visiting(browser, f"{url}/#{boss}") as page, connect(url, "Watch", token):
+        page.click("#help-button")
+        page.click("#people-button")
+        page.select_option("#kick-for", "revoke")
+        page.get_by_role("button", name="Disconnect Rita").click()
+        sure = page.get_by_role("button", name="Revoke the link of Rita for ever?")
+        assert sure.inner_text() == "Revoke for ever?"
+        # Another choice takes the question back.
+        page.select_option("#kick-for", "60")
+        page.get_by_role("button", name="Disconnect Rita").wait_for()
+        page.select_option("#kick-for", "revoke")
+        page.wait_for_timeout(500)
+        assert any(grant.name == "Rita" for grant in site.file.grants.values())
+        page.get_by_role("button", name="Disconnect Rita").click()
+        sure.click()
+        page.locator("#people-list li", has_text="Rita").wait_for(state="detached")
+        assert all(grant.name != "Rita" for grant in site.file.grants.values())
+
+
+def test_closed_list_of_people_is_not_queried(site: Site, browser: Browser) -> None:
+    with visiting(browser, f"{site.server.url}/#{site.link('Ada', Role.ADMIN)}") as page:
+        page.evaluate(COUNT_QUERIES)
+        for _ in range(2):
+            page.click("#help-button")
+            page.click("#people-button")
+            page.locator("#people-list li").wait_for()
+        page.keyboard.press("Escape")
+        before = page.evaluate("window.queries")
+        page.wait_for_timeout(2_500)
+        assert page.evaluate("window.queries") == before
+
+
+COUNT_QUERIES = """() => {
+  window.queries = 0;
+  const post = Worker.prototype.postMessage;
+  Worker.prototype.postMessage = function (message, ...more) {
+    if (message.say?.do === "list_people") window.queries += 1;
+    return post.call(this, message, ...more);
+  };
+}"""

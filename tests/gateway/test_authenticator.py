@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import stat
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,9 @@ from itsdangerous import URLSafeSerializer
 from starlette.responses import Response
 
 from katana450.arm.control.lease import Role
+from katana450.atomic import write_files
 from katana450.errors import ConfigurationError, InputError
+from katana450.server.web import access_links
 from katana450.server.web.access_links import SALT, AccessFile
 from katana450.server.web.authenticator import Address, Authenticator, public_origin
 from tests.gateway.client import HOUR
@@ -42,6 +45,44 @@ def test_revoked_link_is_invalid(file: AccessFile) -> None:
     assert file.check(tokens[1], 0.0) is not None
     with pytest.raises(InputError, match="no link"):
         file.revoke(known[0])
+
+
+def test_link_that_is_revoked_during_another_change_stays_revoked(
+    file: AccessFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept, revoked = (number_of(file, name) for name in ("Anna", "Bert"))
+    other = AccessFile.open(file.path)
+    revoking = threading.Thread(target=other.revoke, args=(revoked,))
+
+    def write(*args: Any, **more: Any) -> None:
+        monkeypatch.setattr(access_links, "write_files", write_files)
+        # Another process changes the file after this one has read it.
+        revoking.start()
+        revoking.join(0.3)
+        write_files(*args, **more)
+
+    monkeypatch.setattr(access_links, "write_files", write)
+    file.mute(kept, 10.0)
+    revoking.join()
+    assert {number: grant.muted for number, grant in file.grants.items()} == {kept: 10.0}
+
+
+def number_of(file: AccessFile, name: str) -> str:
+    """Return the number of a new link."""
+    found = file.check(file.give(name, Role.VIEWER, time.time() + HOUR), time.time())
+    assert found is not None
+    return found[0]
+
+
+def test_change_of_a_file_that_stays_locked_is_refused(
+    file: AccessFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(access_links, "LOCK_TIMEOUT", 0.1)
+    number = number_of(file, "Anna")
+    with file._locked(), pytest.raises(InputError, match="locked"):
+        AccessFile.open(file.path).revoke(number)
+    AccessFile.open(file.path).revoke(number)
+    assert file.grants == {}
 
 
 def test_access_link_needs_the_secret(file: AccessFile, tmp_path: Path) -> None:

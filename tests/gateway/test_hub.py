@@ -62,6 +62,7 @@ class FakeArm:
         self.holds = 0
         self.stops = 0
         self.beats = 0
+        self.drivers: tuple[str, ...] = ()
         self.stopped = False
         self.age = 0.0
         self.clear_refusal = ""
@@ -74,7 +75,7 @@ class FakeArm:
 
     @property
     def state(self) -> State:
-        stopped = ActiveStop(0.0, 0.0) if self.stopped else None
+        stopped = ActiveStop(0.0, 0.0) if self.stopped else self.rest.stopped
         findings = () if self.cause is None else (Finding(Reason.WAITING), self.cause)
         state = replace(self.rest, stopped=stopped, findings=findings)
         return replace(state, goal=state.setpoint + 0.1) if self.moves else state
@@ -92,8 +93,9 @@ class FakeArm:
     def busy(self) -> bool:
         return False
 
-    def heartbeat(self) -> None:
+    def heartbeat(self, drivers: tuple[str, ...]) -> None:
         self.beats += 1
+        self.drivers = drivers
 
     def choices(self) -> tuple[BranchOption, ...]:
         return ()

@@ -15,12 +15,12 @@ import pytest
 
 from katana450.arm.control.lease import Role
 from katana450.arm.control.stop_cause import StopCause, pressed
-from katana450.arm.runtime.stop_messages import StopPress, StopStatus
+from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.server.web import stop_server
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator
-from katana450.server.web.stop_server import BURST, NO_STATE, StopServer
+from katana450.server.web.stop_server import BURST, StopServer
 from tests.gateway.client import HOUR
 
 CLIENT = ("127.0.0.1", 5000)
@@ -52,6 +52,7 @@ class Port:
         self.vera, self.otto = (
             file.give(name, Role.VIEWER, time.time() + HOUR) for name in ("Vera", "Otto")
         )
+        self.file = file
         address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
         authenticator = Authenticator(file, 8080, address)
         self.link = FakeLink()
@@ -66,6 +67,17 @@ class Port:
             reply = await self.server.reply(request, CLIENT)
         stage: str = json.loads(reply.body)["stop"] if reply.status < 400 else ""
         return reply.status, stage
+
+    def number(self, token: str) -> str:
+        """Return the number of the link of ``token``."""
+        found = self.file.check(token, time.time())
+        assert found is not None
+        return found[0]
+
+    @property
+    def sent(self) -> list[str]:
+        """The presses that the arm got."""
+        return [each.cause.press for each in self.link.presses]
 
 
 @pytest.fixture
@@ -138,5 +150,75 @@ def test_number_of_counted_clients_is_bounded(port: Port, monkeypatch: pytest.Mo
         assert list(port.server._often) == [
             each.actor.key for each in port.link.presses if each.cause.by == "Otto, Program"
         ]
+
+    asyncio.run(act())
+
+
+def test_muted_person_does_not_prolong_a_stop(port: Port) -> None:
+    async def act() -> None:
+        port.file.mute(port.number(port.vera), 60.0)
+        port.link.status = STOPPED
+        for press in ("two", "three"):
+            assert await port.stop(port.vera, press) == (200, "confirmed")
+        assert port.sent == []
+        assert await port.stop(port.otto, "four") == (200, "confirmed")
+        assert port.sent == ["four"]
+        # It used up nothing.
+        port.link.status = RUNS
+        assert await port.stop(port.vera, "five") == (202, "requested")
+        assert await port.stop(port.vera, "six") == (429, "")
+        assert port.sent == ["four", "five"]
+
+    asyncio.run(act())
+
+
+def test_repetition_of_the_press_that_counted_is_sent_again(port: Port) -> None:
+    async def act() -> None:
+        port.file.mute(port.number(port.vera), 60.0)
+        for _ in range(3):
+            assert await port.stop(port.vera, "two") == (202, "requested")
+        assert await port.stop(port.vera, "three") == (429, "")
+        assert port.sent == ["two"] * 3
+
+    asyncio.run(act())
+
+
+def test_every_press_of_a_muted_driver_counts(port: Port) -> None:
+    async def act() -> None:
+        number = port.number(port.vera)
+        port.file.mute(number, 60.0)
+        port.link.status = StopStatus(None, (), ("other", number))
+        # The front end hangs, and the last drivers that it named stay.
+        port.link.age = 10.0 * NO_STATE
+        for press in ("two", "three"):
+            assert await port.stop(port.vera, press) == (202, "requested")
+        assert port.sent == ["two", "three"]
+
+    asyncio.run(act())
+
+
+def test_press_on_another_path_counts_here_too(port: Port) -> None:
+    async def act() -> None:
+        number = port.number(port.vera)
+        port.file.mute(number, 60.0)
+        port.link.status = StopStatus(pressed("Vera", f"{number}/page", "one", 1.0), ("one",))
+        port.server.follow()
+        port.link.status = RUNS
+        port.server.follow()
+        assert await port.stop(port.vera, "two") == (429, "")
+        assert await port.stop(port.otto, "three") == (202, "requested")
+
+    asyncio.run(act())
+
+
+def test_disconnected_person_stops_once_per_interval(port: Port) -> None:
+    async def act() -> None:
+        number = port.number(port.vera)
+        port.file.keep_out(number, time.time() + HOUR)
+        assert await port.stop(port.vera, "two") == (202, "requested")
+        assert await port.stop(port.vera, "three") == (429, "")
+        port.file.keep_out(number, 0.0)
+        assert await port.stop(port.vera, "four") == (202, "requested")
+        assert port.sent == ["two", "four"]
 
     asyncio.run(act())

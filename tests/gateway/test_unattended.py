@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from argparse import Namespace
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
 
@@ -16,12 +18,14 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.extension import OWNER_SILENCE
 from katana450.extensions.programs.requests import AllowUnattended, ProgramOrder, Steer
 from katana450.extensions.programs.server.program_runner import ProgramRunner
+from katana450.server.api import requests
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Window, actor_of
+from katana450.server.service.people import Connection, ConnectionKind
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import Staged
 
@@ -171,3 +175,31 @@ def test_a_running_program_does_not_become_unattended(table: Staged) -> None:
     for order in (ProgramOrder.RUN, ProgramOrder.RESUME, ProgramOrder.END):
         with pytest.raises(LeaseError, match="Only `run` and `step`"):
             table.programs.handle(owner, Steer(order=order, unattended=True))
+
+
+@pytest.mark.parametrize("revoke", [False, True])
+@pytest.mark.parametrize("present", [False, True])
+def test_unattended_program_of_a_disconnected_person_ends(
+    table: Staged, revoke: bool, present: bool
+) -> None:
+    people = table.hub.people
+    people.links = Mock()
+    oda = Identity("oda", "Oda", Role.OPERATOR, "oda", "Oda")
+    connection = Connection(oda, ConnectionKind.PAGE, "127.0.0.1")
+    people.add(connection)
+    owner = table.hub.join(oda, "page", lambda _: None)
+    admin = table.hub.join(Identity("ada", "Ada", Role.ADMIN), "page", lambda _: None)
+    run(table, owner)
+    if not present:
+        table.hub.leave(owner, for_good=True)
+        table.wait(1.0)
+    assert table.status == "running"
+    (number,) = people.shown
+    kick = requests.Kick(person=number, seconds=60.0, revoke=revoke)
+
+    async def act() -> None:
+        Dispatcher(table.hub).handle(admin, kick, Budgets(table.hub.clock).of("ada"))
+
+    asyncio.run(act())
+    assert table.status == "stopped"
+    assert table.hub.lease.holder is None

@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import queue
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 
@@ -45,13 +45,15 @@ def _next(pipes: Iterator[Connection]) -> Connection:
 
 
 @contextmanager
-def arm_end(arm: ArmModel, session: Session) -> Iterator[Connection]:
+def arm_end(
+    arm: ArmModel, session: Session, drivers: Callable[[], tuple[str, ...]] = tuple
+) -> Iterator[Connection]:
     """Run an arm; yield the far end of its pipe, which is cut afterwards."""
     mailbox = Mailbox(session.check)
     driver = SimulatedDriver(arm, session.ready, 0.0)
     loop = ControlLoop(session, driver, mailbox, MonotonicClock(), 100.0)
     ours, theirs = multiprocessing.Pipe()
-    end = StopEnd(ours, loop, mailbox)
+    end = StopEnd(ours, loop, mailbox, drivers)
     loop.start()
     end.start()
     yield theirs
@@ -116,6 +118,27 @@ def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
             link.press(press("one"))
             found = await link.executed(name, TIMEOUT if name == "one" else 0.3)
             assert (found is not None) == (name == "one")
+        pipe.close()
+
+    asyncio.run(act())
+
+
+def test_status_names_the_newest_drivers(arm: ArmModel, session: Session) -> None:
+    drivers: list[str] = []
+
+    async def act() -> None:
+        with arm_end(arm, session, lambda: tuple(drivers)) as pipe:
+            pipes = iter((pipe,))
+            link = StopLink(lambda: _next(pipes))
+
+            async def names(expected: tuple[str, ...]) -> None:
+                async with asyncio.timeout(TIMEOUT):
+                    while link.status is None or link.status.drivers != expected:
+                        await asyncio.sleep(0.01)
+
+            await names(())
+            drivers.append("oda")
+            await names(("oda",))
         pipe.close()
 
     asyncio.run(act())

@@ -38,7 +38,7 @@ from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
-from katana450.server.web.authenticator import Authenticator
+from katana450.server.web.authenticator import Authenticator, identity_of
 from katana450.server.web.channel import ARRIVAL
 from katana450.server.web.http_api import RouteProvider
 from katana450.server.web.program_socket import LineServer
@@ -115,9 +115,11 @@ class Gateway:
             )
             people = self.hub.people
             people.links = access
+            now = time.time()
             for number, grant in {} if access is None else access.grants.items():
-                if grant.muted is not None:
-                    people.mutes.add(number, grant.muted)
+                if now < grant.expires:
+                    left = grant.kept_out - now
+                    people.restore(identity_of(number, grant), grant.muted, left)
             authenticator = Authenticator(access, self.port, self.address, people)
             guard = Guard(self.viser)
             self.gestures = Gestures(self.viser, guard, self.hub)

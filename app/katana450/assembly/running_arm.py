@@ -98,8 +98,11 @@ class RunningArm:
         with self._attaching:
             if self._stop_end is not None:
                 self._stop_end.close()
-            self._stop_end = StopEnd(pipe, self._loop, self._mailbox)
+            self._stop_end = StopEnd(pipe, self._loop, self._mailbox, self._drivers)
             self._stop_end.start()
+
+    def _drivers(self) -> tuple[str, ...]:
+        return () if self._link is None else self._link.drivers
 
     @property
     def state_publisher(self) -> StatePublisher:

@@ -135,11 +135,11 @@ class FrontEnd:
             return time.monotonic() - self._heard
         return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
 
-    def heartbeat(self) -> None:
-        """Send a heartbeat, unless commands still wait to be sent."""
+    def heartbeat(self, drivers: tuple[str, ...] = ()) -> None:
+        """Send a heartbeat with the ``drivers``, unless commands still wait to be sent."""
         with self._sending:
             if self._flush() and self._connected:
-                self._send(Heartbeat())
+                self._send(Heartbeat(drivers))
 
     def close(self) -> None:
         """Cut the link; a thread that reads from the pipe ends with its process."""

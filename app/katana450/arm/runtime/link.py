@@ -70,7 +70,13 @@ class CommandMessage:
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """A message that proves that the front end is alive."""
+    """A message that proves that the front end is alive.
+
+    Attributes:
+        drivers: sessions of the driver, and of the owner of the program that drives.
+    """
+
+    drivers: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +132,8 @@ class ArmEnd:
         self._numbering = threading.Lock()
         self._heard = time.monotonic()
         self._names = PlanNames()
+        self.drivers: tuple[str, ...] = ()
+        """The drivers in the newest heartbeat, see ``Heartbeat``."""
         self.cut = threading.Event()
         """Set once the other end is closed."""
         self._threads = [
@@ -152,7 +160,9 @@ class ArmEnd:
             while not self.cut.is_set():
                 message = self._pipe.recv()
                 self._heard = time.monotonic()
-                if isinstance(message, CommandMessage) and not self.cut.is_set():
+                if isinstance(message, Heartbeat):
+                    self.drivers = message.drivers
+                elif isinstance(message, CommandMessage) and not self.cut.is_set():
                     self._put(message)
         except PIPE_ERRORS:
             self._lose()

@@ -27,8 +27,9 @@ class StopLink:
     def __init__(self, connect: Callable[[], Connection]) -> None:
         """Connect and read from now on.
 
-        ``connect``: returns a connection to the arm's process, also after one was cut; raises
-        EOFError if there will be no further one. Called in the thread.
+        Args:
+            connect: returns a connection to the arm's process, also after one was cut; raises
+                EOFError if there will be no further one. Called in the thread.
         """
         self._connect = connect
         self._pipe: Connection | None = None

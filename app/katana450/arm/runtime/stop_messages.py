@@ -14,6 +14,9 @@ from katana450.arm.control.stop_cause import StopCause
 STATUS_INTERVAL = 0.1
 """[s] Maximum time between two messages of the arm's process, as long as its control loop ticks."""
 
+NO_STATE = 0.3
+"""[s] Silence of the arm's process after which its state counts as unknown."""
+
 
 class StopPress(NamedTuple):
     """One press of STOP. ``cause``: with the name of the press. ``actor``: the presser."""
@@ -23,12 +26,14 @@ class StopPress(NamedTuple):
 
 
 class StopStatus(NamedTuple):
-    """The stop in a state of the arm.
+    """The stop in a state of the arm, and the drivers.
 
     Attributes:
         stopped: cause of the stop that holds the arm; None if it is not stopped.
         presses: names of the newest presses that the arm's process has executed.
+        drivers: the drivers in the newest heartbeat of the front end. If it hangs they stay.
     """
 
     stopped: StopCause | None
     presses: tuple[str, ...]
+    drivers: tuple[str, ...] = ()

@@ -21,8 +21,8 @@ class ListPeople(Request, frozen=True):
 class Kick(Request, frozen=True, kw_only=True):
     """Close all connections of a person, and keep the person out for a while. For admins only.
 
-    The person can still stop the arm over HTTP, once per 10 s. A running program of the person ends
-    as if its owner left.
+    The person can still stop the arm over HTTP, once per 10 s. A running program of the person
+    ends, also an unattended one.
 
     Attributes:
         person: Number of the person in ``people``.
@@ -41,7 +41,8 @@ class Kick(Request, frozen=True, kw_only=True):
 class Mute(Request, frozen=True, kw_only=True):
     """Let only one STOP and one request of a person count per interval. For admins only.
 
-    An admin cannot be muted, and the mute of the driver waits until somebody else drives.
+    An admin cannot be muted. The mute does not apply while the person drives, or owns the running
+    program.
 
     Attributes:
         person: Number of the person in ``people``.

@@ -167,9 +167,9 @@ class ArmHandle:
         """True while a path is being planned that the arm will then follow."""
         return self._planning_worker is not None and self._planning_worker.busy
 
-    def heartbeat(self) -> None:
-        """Send a heartbeat of the server to the arm's process."""
-        self._link.heartbeat()
+    def heartbeat(self, drivers: tuple[str, ...]) -> None:
+        """Send a heartbeat of the server, with its drivers, to the arm's process."""
+        self._link.heartbeat(drivers)
 
     @property
     def age(self) -> float:

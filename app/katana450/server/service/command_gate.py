@@ -20,6 +20,7 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.participants import is_same_person
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import ClearBy, StopRecord
 
@@ -188,7 +189,7 @@ class CommandGate:
         """Return whether ``person`` may clear the present stop, once that is possible."""
         if self._by_presser:
             assert self.stopped is not None
-            own = _session(person.key) == _session(self.stopped.cause.key)
+            own = is_same_person(person.key, self.stopped.cause.key)
             return own or person.role is Role.ADMIN
         return person.role.may_drive and self.lease.driver in (None, person)
 
@@ -391,10 +392,3 @@ class CommandGate:
         self.acquire(actor)
         log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
         return replace(actor, grounds=Grounds.FREE_LEASE)
-
-
-def _session(key: str) -> str:
-    """Return the part of ``key`` that the windows of one person, or of one browser, share."""
-    session = key.partition("/")[0]
-    # Programs without access links share that part.
-    return key if session == "programs" else session

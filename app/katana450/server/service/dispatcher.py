@@ -72,11 +72,11 @@ class Dispatcher:
         of a muted identity that does not count.
         """
         question, driver = request.traits.question, driver_key(self._hub, window)
-        self._check_muted(window, request)
         admin = request.traits.admin and window.person.role is Role.ADMIN
         free = request.traits.free or admin or (driver and not question)
         try:
             with nullcontext() if free else budget.charged(driver, question=question):
+                self._check_muted(window, request)
                 return msgspec.structs.replace(self._execute(window, request), id=request.id)
         except KatanaError as error:
             if not question or isinstance(error, BusyError):
@@ -86,9 +86,9 @@ class Dispatcher:
     def _check_muted(self, window: Window, request: requests.Request) -> None:
         """Raise MutedError if ``request`` does not count. ``Hub.stop`` counts the STOPs."""
         session = session_of(window.person.key)
-        if isinstance(request, requests.Stop | requests.Heartbeat) or self._hub.drives(session):
-            return
-        self._hub.people.mutes.count_request(session)
+        counted = not isinstance(request, requests.Stop | requests.Heartbeat)
+        if counted and session not in self._hub.drivers:
+            self._hub.people.mutes.count_request(session)
 
     def _execute(self, window: Window, request: requests.Request) -> answers.Answer:
         hub = self._hub

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from argparse import Namespace
 from collections.abc import Callable
-from contextlib import nullcontext, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -231,24 +230,29 @@ class Hub:
         A repeated ``press`` counts once: it changes nothing, and the ticket is 0. Raises MutedError
         for a muted identity whose STOP does not count. The driver's always counts.
         """
-        session, known = session_of(actor.key), self.gate.is_known(press)
-        if not self.drives(session) and self.people.is_muted(session):
-            # A press that changes nothing uses up nothing. A known one counted on another path.
-            if self.stopped is not None and not known:
-                return 0
-            with suppress(MutedError) if known else nullcontext():
-                self.people.count_stop(session)
-        if known:
+        if self.gate.is_known(press):
             return 0
+        session = session_of(actor.key)
+        interval = self.people.stop_interval(session)
+        if interval is not None and session not in self.drivers:
+            # A press that changes nothing uses up nothing.
+            if self.stopped is not None:
+                return 0
+            try:
+                self.people.mutes.count_stop(session, interval, press)
+            except MutedError as error:
+                self.recorder.refuse("stop", actor, error)
+                raise
         return self.gate.submit(cmd.Stop(pressed(actor.name, actor.key, press, 0.0)), actor)
 
-    def drives(self, session: str) -> bool:
-        """Return whether a window of ``session`` drives, or owns the program that drives."""
+    @property
+    def drivers(self) -> tuple[str, ...]:
+        """Sessions of the driver, and of the owner of the program that drives."""
         holder, program = self.lease.holder, self.gate.program
         if holder is None:
-            return False
-        owner = program.owner if program is not None and program.person == holder else ""
-        return session in (session_of(holder.key), session_of(owner))
+            return ()
+        owner = (program.owner,) if program is not None and program.person == holder else ()
+        return tuple(session_of(key) for key in (holder.key, *owner))
 
     def acquire(self, window: Window) -> None:
         """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
@@ -282,17 +286,13 @@ class Hub:
 
     def hand_over(self, window: Window, number: int) -> None:
         """Hand the lease to the window of ``number``; a running program of ``window`` ends."""
-        taker = self._numbered(number)
-        self.gate.change(
-            lambda lease, t: lease.hand_over(self.giver(window), taker.person, t), window.actor
-        )
+        giver, taker = self.giver(window), self._numbered(number).person
+        self.gate.change(lambda lease, t: lease.hand_over(giver, taker, t), window.actor)
 
     def decline(self, window: Window, number: int) -> None:
         """Decline the request of the window of ``number`` for the lease, and notify it."""
-        requester = self._numbered(number)
-        self.gate.change(
-            lambda lease, _: lease.decline(self.giver(window), requester.person), window.actor
-        )
+        giver, requester = self.giver(window), self._numbered(number)
+        self.gate.change(lambda lease, _: lease.decline(giver, requester.person), window.actor)
         requester.notify({"is": "refused", "why": f"{window.person.name} declined your request."})
 
     def giver(self, window: Window) -> Person:
@@ -328,8 +328,10 @@ class Hub:
         if arm is not None:
             # Without heartbeats of the server the arm stops by itself.
             if not silent:
-                arm.heartbeat()
+                arm.heartbeat(self.drivers)
             self._watch(arm)
+            stopped = arm.state.stopped
+            self.people.mutes.follow(None if stopped is None else stopped.cause)
             for entry in self.event_log.follow(arm.event_log):
                 self.recorder.finding(entry)
             self.gate.reconcile()
@@ -361,8 +363,7 @@ class Hub:
         silence = self.lease.silence(t)
         silent = silence >= self._hold_after
         if silent and self.stopped is None and self.gate.moves():
-            connected = holder.key in self._windows
-            self._driver_watch.brake(holder, silence, t, connected=connected)
+            self._driver_watch.brake(holder, silence, t, connected=holder.key in self._windows)
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
 
@@ -394,7 +395,6 @@ class Hub:
         self._numbers += 1
         number = self._numbers
         name = identity.name or f"Window {number}"
-        known = [person for person, _ in self._remembered.values()]
-        if any(person.name == name for person in known):
+        if any(person.name == name for person, _ in self._remembered.values()):
             name = f"{name} ({number})"
         return identity.person(key, name), number

@@ -99,8 +99,8 @@ class ArmInterface(Protocol):
     def age(self) -> float:
         """Time since the arm's process last proved that its control loop runs [s]."""
 
-    def heartbeat(self) -> None:
-        """Send a heartbeat of the server to the arm's process."""
+    def heartbeat(self, drivers: tuple[str, ...]) -> None:
+        """Send a heartbeat of the server, with its drivers, to the arm's process."""
 
     def deliver(self, command: cmd.Command, actor: Actor) -> int:
         """Send ``command`` of ``actor``; return its ticket. Raises InputError if refused."""

@@ -11,6 +11,9 @@ from katana450.arm.control.lease import Person
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 
+SHARED_SESSION = "programs"
+"""Session of all programs that send single requests over HTTP, on a server without links."""
+
 
 @dataclass(frozen=True, eq=False)
 class Window:
@@ -56,3 +59,8 @@ def key_of(identity: Identity, page: str) -> str:
 def session_of(key: str) -> str:
     """Return the session in the ``key`` of a window, or of an actor without a window."""
     return key.rpartition("/")[0] or key
+
+
+def is_same_person(key: str, other: str) -> bool:
+    """Return whether two keys belong to the windows of one person, or of one browser."""
+    return key == other or session_of(key) == session_of(other) != SHARED_SESSION

@@ -19,12 +19,13 @@ from typing import Protocol
 
 from katana450.errors import KatanaError
 from katana450.server.service.identity import Identity
-from katana450.server.service.mutes import Mutes
+from katana450.server.service.mutes import STOP_INTERVAL, Mutes
 
 log = logging.getLogger(__name__)
 
 MAX_REMEMBERED = 1024
-"""Maximum number of identities whose numbers and refusals are remembered."""
+"""Number of identities whose numbers and refusals are remembered, beside those that are connected,
+muted or kept out."""
 
 
 class ConnectionKind(Enum):
@@ -50,6 +51,9 @@ class LinkStore(Protocol):
 
     def mute(self, number: str, interval: float | None) -> None:
         """Store the interval of a mute [s], or its end. Raises KatanaError or OSError."""
+
+    def keep_out(self, number: str, until: float) -> None:
+        """Store until when a person is kept out [s since the epoch]; see ``mute``."""
 
 
 @dataclass(eq=False)
@@ -89,7 +93,6 @@ class People:
         self._counted = 0
         self._refusals: Counter[str] = Counter()
         self._kept_out: dict[str, float] = {}
-        self._away = Mutes(clock)
         self._writing = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -127,8 +130,12 @@ class People:
             self._counted += 1
             number = self._counted
         self._known[identity.session] = number, identity
-        while len(self._known) > MAX_REMEMBERED:
-            del self._known[next(iter(self._known))]
+        if len(self._known) > MAX_REMEMBERED:
+            listed = self._listed
+            oldest = next((each for each in self._known if each not in listed), identity.session)
+            if oldest != identity.session:
+                del self._known[oldest]
+                self._refusals.pop(oldest, None)
 
     def identity(self, number: int) -> Identity | None:
         """Return the identity with ``number``; None if it is not remembered."""
@@ -137,20 +144,25 @@ class People:
     @property
     def shown(self) -> dict[int, Identity]:
         """The identities that are connected, muted or kept out, by their numbers."""
-        present = {each.identity.session for each in self._connections}
-        absent = {each for each in tuple(self._kept_out) if 0.0 < self.kept_out(each) < math.inf}
-        sessions = present | absent | set(self.mutes.sessions)
+        listed = self._listed
         return {
             number: identity
             for session, (number, identity) in self._known.items()
-            if session in sessions
+            if session in listed
         }
+
+    @property
+    def _listed(self) -> set[str]:
+        """The sessions that are connected, muted or kept out."""
+        present = {each.identity.session for each in self._connections}
+        absent = {each for each in tuple(self._kept_out) if 0.0 < self.kept_out(each) < math.inf}
+        return present | absent | set(self.mutes.sessions)
 
     # Refusals
 
     def refused(self, session: str) -> None:
-        """Count a refused request of ``session``."""
-        if session in self._refusals or len(self._refusals) < MAX_REMEMBERED:
+        """Count a refused request of ``session``, if it is remembered."""
+        if session in self._known:
             self._refusals[session] += 1
 
     def refusals(self, session: str) -> int:
@@ -172,6 +184,18 @@ class People:
         for each in closed:
             each.kicked.set()
         return len(closed)
+
+    def restore(self, identity: Identity, muted: float | None, kept_out: float) -> None:
+        """Mute ``identity`` and keep it out as before the server was started.
+
+        ``muted``: interval [s] of its mute; None for none. ``kept_out``: remaining time [s]; not
+        positive for none.
+        """
+        if muted is not None:
+            self.mutes.add(identity.session, muted)
+        self.kick(identity, max(kept_out, 0.0))
+        if identity.session in self._listed:
+            self._remember(identity)
 
     def let_in(self, session: str) -> None:
         """Let the identity of ``session`` in again before its time."""
@@ -207,16 +231,10 @@ class People:
 
     # STOP
 
-    def is_muted(self, session: str) -> bool:
-        """Return whether ``session`` is muted or kept out, so that not every STOP counts."""
-        return self.mutes.interval(session) is not None or self.kept_out(session) > 0.0
-
-    def count_stop(self, session: str) -> None:
-        """Count a STOP of ``session``. Raises MutedError if it is muted and does not count.
+    def stop_interval(self, session: str) -> float | None:
+        """Return the interval [s] in which one STOP of ``session`` counts; None if each does.
 
         An identity that is kept out counts as muted. It can still stop the arm over HTTP.
         """
-        if self.kept_out(session):
-            self._away.add(session)
-            self._away.count_stop(session)
-        self.mutes.count_stop(session)
+        interval = self.mutes.interval(session)
+        return max(STOP_INTERVAL, interval or 0.0) if self.kept_out(session) else interval

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import time
 from datetime import UTC, datetime
 
 from katana450.arm.control.lease import Role
@@ -49,29 +50,41 @@ class PeopleRequests:
 
     def _kick(self, window: Window, person: Identity, request: requests.Kick) -> None:
         by, name, people = window.person.name, self._name(person), self._people
+        links = people.links
         if person.session == session_of(window.person.key):
             raise InputError("You cannot disconnect yourself. Close your windows instead.")
         if not request.revoke:
             self._note("kick", window, person, seconds=request.seconds)
             if request.seconds:
                 log.warning("%s disconnected %s for %g s.", by, name, request.seconds)
-                people.kick(person, request.seconds)
+                self._remove(person, request.seconds)
             else:
                 log.warning("%s let %s in again.", by, name)
                 people.let_in(person.session)
+            if links is not None:
+                # The process of STOP finds it there.
+                until = time.time() + request.seconds if request.seconds else 0.0
+                people.write(
+                    lambda: links.keep_out(person.session, until),
+                    lambda why: _report(window, f"The port of STOP does not know this. {why}"),
+                )
             return
-        links = people.links
         if links is None:
             raise InputError("This server has no links that could be revoked.")
         if person.role is Role.ADMIN:
             raise LeaseError("Revoke the link of an admin with `katana450 access revoke`.")
         self._note("revoke", window, person)
-        people.kick(person, math.inf)
+        self._remove(person, math.inf)
         log.warning("%s revoked the link of %s.", by, name)
         people.write(
             lambda: links.revoke(person.session),
             lambda why: _report(window, f"The link of {name} works again after a restart. {why}"),
         )
+
+    def _remove(self, person: Identity, seconds: float) -> None:
+        """Disconnect ``person`` for ``seconds``, and end what runs on its behalf."""
+        self._people.kick(person, seconds)
+        self._hub.runner.removed(person.session)
 
     def _mute(self, window: Window, person: Identity, seconds: float) -> None:
         if person.role is Role.ADMIN:
@@ -126,7 +139,7 @@ class PeopleRequests:
             role=identity.role.value,
             link=None if people.links is None else session,
             you=you,
-            drives=hub.drives(session),
+            drives=session in hub.drivers,
             asks=any(session_of(each.key) == session for each in hub.lease.waiting),
             program=program.person.name if program is not None and owns else None,
             refused=people.refusals(session),

@@ -72,6 +72,9 @@ class Runner:
     def leave(self, window: Window) -> None:
         """Note that ``window`` is closed and will not return."""
 
+    def removed(self, session: str) -> None:
+        """Note that an admin has disconnected the person of ``session``. End what it runs."""
+
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last run; the state includes it."""
 

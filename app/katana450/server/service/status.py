@@ -6,12 +6,10 @@ from typing import Any
 
 from katana450.arm.control.messages import headline, mood, sentence
 from katana450.arm.control.state import Status
+from katana450.arm.runtime.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Window
 from katana450.server.service.runner import StatusLine
-
-NO_STATE = 0.3
-"""Silence of the arm's process [s] after which its state counts as unknown."""
 
 FIRST = (Status.FAULT, Status.STOPPED, Status.BLOCKED)
 """States of the arm that have priority over the status of a runner."""

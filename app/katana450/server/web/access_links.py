@@ -8,7 +8,11 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import secrets
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,7 +22,7 @@ from itsdangerous import BadSignature, URLSafeSerializer
 from katana450.arm.control.lease import Role
 from katana450.atomic import write_files, writer_of
 from katana450.errors import ConfigurationError, InputError
-from katana450.platform_support import readable_by_others
+from katana450.platform_support import claim_file, open_bytes, readable_by_others
 
 log = logging.getLogger(__name__)
 
@@ -27,6 +31,10 @@ SALT, SESSION_SALT = "katana450 access link", "katana450 session of a browser"
 
 MAX_NAME_LENGTH = 40
 MAX_TOKEN_LENGTH = 400
+
+LOCK_TIMEOUT, LOCK_INTERVAL = 5.0, 0.02
+"""[s] Timeout of a change of the file while another process changes it, and interval of the
+attempts."""
 
 
 class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -37,12 +45,14 @@ class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
         role: Role of the person.
         expires: End of the validity [s since the epoch].
         muted: Interval [s] in which one STOP counts; None unless an admin has muted the person.
+        kept_out: End of the time [s since the epoch] for which an admin keeps the person out.
     """
 
     name: str
     role: Role
     expires: float
     muted: float | None = None
+    kept_out: float = 0.0
 
 
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -59,8 +69,10 @@ class AccessFile:
 
     path: Path
     _failure: str | None = field(default=None, repr=False)
-    _read_at: tuple[int, int, int] | None = field(default=None, repr=False)
-    _content: _Content = field(default_factory=lambda: _Content("", {}), repr=False)
+    # Assigned together, because several threads read the file.
+    _known: tuple[tuple[int, int, int] | None, _Content] = field(
+        default=(None, _Content("", {})), repr=False
+    )
 
     @classmethod
     def open(cls, path: Path) -> AccessFile:
@@ -72,15 +84,16 @@ class AccessFile:
     @classmethod
     def create(cls, path: Path) -> AccessFile:
         """Open a file; create it with a new secret if it does not exist."""
-        if not path.exists():
-            cls(path)._write(_Content(secrets.token_urlsafe(32), {}))
+        file = cls(path)
+        with file._locked():
+            if not path.exists():
+                file._write(_Content(secrets.token_urlsafe(32), {}))
         return cls.open(path)
 
     @property
     def grants(self) -> dict[str, Grant]:
         """Grants by number, including expired ones."""
-        self._refresh()
-        return dict(self._content.grants)
+        return dict(self._refresh().grants)
 
     def give(self, name: str, role: Role, expires: float) -> str:
         """Return a token for a new link, valid until ``expires`` [s since the epoch].
@@ -89,10 +102,9 @@ class AccessFile:
         """
         if not (name.isprintable() and 0 < len(name) <= MAX_NAME_LENGTH):
             raise InputError(f"A name needs 1 to {MAX_NAME_LENGTH} printable characters.")
-        self._refresh()
         number = secrets.token_hex(8)
-        grants = self._content.grants | {number: Grant(name, role, expires)}
-        self._write(_Content(self._content.secret, grants))
+        with self._changing() as grants:
+            grants[number] = Grant(name, role, expires)
         return str(self._signer().dumps([number, expires]))
 
     def session(self, number: str) -> str:
@@ -104,23 +116,27 @@ class AccessFile:
 
     def revoke(self, number: str) -> Grant:
         """Delete the link of ``number``; return its grant. Raises InputError if there is none."""
-        grants = self.grants
-        if number not in grants:
+        with self._changing() as grants:
+            if number in grants:
+                return grants.pop(number)
             raise InputError(f"There is no link {number!r}; `katana450 access list` shows them.")
-        grant = grants.pop(number)
-        self._write(_Content(self._content.secret, grants))
-        return grant
 
     def mute(self, number: str, interval: float | None) -> None:
         """Store the mute of the link of ``number``; see ``Grant``. Raises InputError if unknown.
 
         So it lasts when the server is started again, and each process that admits STOP knows it.
         """
-        grants = self.grants
-        if number not in grants:
-            raise InputError(f"There is no link {number!r}.")
-        grants[number] = msgspec.structs.replace(grants[number], muted=interval)
-        self._write(_Content(self._content.secret, grants))
+        self._update(number, muted=interval)
+
+    def keep_out(self, number: str, until: float) -> None:
+        """Store until when [s since the epoch] the person is kept out, as ``mute`` does."""
+        self._update(number, kept_out=until)
+
+    def _update(self, number: str, **changes: float | None) -> None:
+        with self._changing() as grants:
+            if number not in grants:
+                raise InputError(f"There is no link {number!r}.")
+            grants[number] = msgspec.structs.replace(grants[number], **changes)
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
         """Return number and grant of a token valid at ``now`` [s since the epoch], or None."""
@@ -150,13 +166,13 @@ class AccessFile:
     def _granted(
         self, number: str, now: float, expires: float = math.inf
     ) -> tuple[str, Grant] | None:
-        grant = self._content.grants.get(number)
+        grant = self._known[1].grants.get(number)
         if grant is None or not now < min(expires, grant.expires):
             return None
         return number, grant
 
     def _signer(self, salt: str = SALT) -> URLSafeSerializer:
-        return URLSafeSerializer(self._content.secret, salt=salt)
+        return URLSafeSerializer(self._known[1].secret, salt=salt)
 
     def _refresh_or_keep(self) -> None:
         """Read the file again. If that fails, log it once; the last links read stay valid."""
@@ -169,7 +185,8 @@ class AccessFile:
         else:
             self._failure = None
 
-    def _refresh(self) -> None:
+    def _refresh(self) -> _Content:
+        """Return the present content. Raises ConfigurationError."""
         try:
             status = self.path.stat()
         except OSError as error:
@@ -178,20 +195,63 @@ class AccessFile:
                 "`katana450 access give --file PATH` makes one."
             ) from error
         read_at = (status.st_mtime_ns, status.st_size, status.st_ino)
-        if read_at == self._read_at:
-            return
+        known_at, content = self._known
+        if read_at == known_at:
+            return content
         if readable_by_others(status):
             raise ConfigurationError(
                 f"Other users can read the access file {self.path}. Run `chmod 600 {self.path}`. "
                 "If it may have been read, delete it and give new links."
             )
         try:
-            self._content = msgspec.json.decode(self.path.read_bytes(), type=_Content)
+            content = msgspec.json.decode(self.path.read_bytes(), type=_Content)
         except (OSError, msgspec.MsgspecError) as error:
             raise ConfigurationError(f"{self.path} is not an access file: {error}") from error
-        self._read_at = read_at
+        self._known = read_at, content
+        return content
+
+    @contextmanager
+    def _changing(self) -> Iterator[dict[str, Grant]]:
+        """Yield the grants, and write them after the ``with`` block. Raises InputError.
+
+        No other process and no other thread changes the file meanwhile.
+        """
+        with self._locked():
+            content = self._refresh()
+            grants = dict(content.grants)
+            yield grants
+            self._write(_Content(content.secret, grants))
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Hold the lock file beside the file inside the ``with`` block. Raises InputError."""
+        path = self.path.with_name(f".{self.path.name}.lock")
+        try:
+            descriptor = open_bytes(path, os.O_RDWR | os.O_CREAT, 0o600)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
+        try:
+            _claim(descriptor, path)
+            yield
+        finally:
+            os.close(descriptor)
 
     def _write(self, content: _Content) -> None:
         data = msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n"
         write_files({self.path: writer_of(data)}, mode=0o600)
         self._refresh()
+
+
+def _claim(descriptor: int, path: Path) -> None:
+    """Wait for the lock. Raises InputError after ``LOCK_TIMEOUT``."""
+    end = time.monotonic() + LOCK_TIMEOUT
+    while True:
+        try:
+            claim_file(descriptor)
+        except OSError as error:
+            if time.monotonic() > end:
+                why = f"Another process keeps {path} locked. End it, or try again."
+                raise InputError(why) from error
+        else:
+            return
+        time.sleep(LOCK_INTERVAL)

@@ -60,7 +60,7 @@ def reserved(hub: Hub, authenticator: Authenticator, client: Identity, places: i
     Without links everybody is an admin, so only the driver has places reserved.
     """
     admin = authenticator.requires_link and client.role is Role.ADMIN
-    return places if admin or hub.drives(client.session) else 0
+    return places if admin or client.session in hub.drivers else 0
 
 
 def address_of(connection: HTTPConnection) -> str:

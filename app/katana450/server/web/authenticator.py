@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
+from katana450.server.service.mutes import STOP_INTERVAL
 from katana450.server.service.people import Connection, People
 from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile, Grant
 
@@ -130,7 +131,7 @@ class Authenticator:
         value = cookies.get(self._cookie, "")
         if self._access is not None:
             known = self._access.check_session(value, time.time())
-            found = None if known is None else _of_link(*known)
+            found = None if known is None else identity_of(*known)
         else:
             found = Identity(value, None, Role.ADMIN) if len(value) == SESSION_SIZE else None
         return self._admitted(found, stopping=stopping)
@@ -140,7 +141,11 @@ class Authenticator:
         found = self.program("", authorization, cookies, stopping=True)
         if self._access is None:
             found = self.identity(cookies, stopping=True)
-        seconds = 0.0 if found is None else self._people.kept_out(found.session)
+        return None if found is None else self.kept_out(found.session)
+
+    def kept_out(self, session: str) -> str | None:
+        """Return why an admin keeps out the identity of ``session``; None if no admin does."""
+        seconds = self._people.kept_out(session)
         if not seconds:
             return None
         again = f" Come back in {math.ceil(seconds)} s." if seconds < math.inf else ""
@@ -171,7 +176,7 @@ class Authenticator:
         scheme, _, token = authorization.partition(" ")
         if scheme.lower() == "bearer":
             known = self._access.check(token.strip(), time.time())
-            found = None if known is None else _of_link(*known)
+            found = None if known is None else identity_of(*known)
             found = self._admitted(found, stopping=stopping)
         else:
             found = self.identity(cookies or {}, stopping=stopping)
@@ -219,7 +224,7 @@ class Authenticator:
             known = self._access.check(token, time.time())
             if known is None:
                 return None
-            found = _of_link(*known)
+            found = identity_of(*known)
             max_age = int(known[1].expires - time.time())
             value = self._access.session(known[0])
         response.set_cookie(
@@ -228,5 +233,9 @@ class Authenticator:
         return found
 
 
-def _of_link(number: str, grant: Grant) -> Identity:
-    return Identity(number, grant.name, grant.role, number, grant.name, grant.muted)
+def identity_of(number: str, grant: Grant) -> Identity:
+    """Return the identity of the link of ``number``."""
+    muted = grant.muted
+    if time.time() < grant.kept_out:
+        muted = max(STOP_INTERVAL, muted or 0.0)
+    return Identity(number, grant.name, grant.role, number, grant.name, muted)

@@ -26,7 +26,7 @@ from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import MutedError
-from katana450.server.service.participants import Window, actor_of
+from katana450.server.service.participants import SHARED_SESSION, Window, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
@@ -125,9 +125,9 @@ class Api:
                 driver = driver_key(self._hub, window)
                 self._hub.heartbeat(window)
             try:
-                if not driver:
-                    self._hub.people.mutes.count_request(identity.session)
                 with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
+                    if identity.session not in self._hub.drivers:
+                        self._hub.people.mutes.count_request(identity.session)
                     return as_json(self._dispatcher.query(at))
             except (BusyError, MutedError) as error:
                 self._refused(request)
@@ -154,6 +154,8 @@ class Api:
             )
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.MAX_REQUEST_BYTES)
+        # An admin may have kept the sender out while the body arrived.
+        identity = self._identity(request)
         try:
             decoded = self._hub.requests.decoded(body)
             if isinstance(decoded, requests.Hello | requests.Watch):
@@ -200,6 +202,11 @@ class Api:
                 why=why or "No valid token.",
             )
             raise HTTPException(401, TOKEN_REQUIRED) if why is None else HTTPException(403, why)
+        if not self._authenticator.requires_link and not stopping:
+            # All these programs have one identity, without which nobody could keep one out.
+            why = self._authenticator.kept_out(SHARED_SESSION)
+            if why is not None and KEY in headers:
+                raise HTTPException(403, why)
         return replace(found, address=address_of(request))
 
     def _window(self, request: Request, identity: Identity) -> Window:
@@ -225,7 +232,7 @@ class Api:
 
     def _key(self, request: Request, identity: Identity) -> str:
         """Return the key that the requests of one program have in common."""
-        session = identity.session if self._authenticator.requires_link else "programs"
+        session = identity.session if self._authenticator.requires_link else SHARED_SESSION
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:

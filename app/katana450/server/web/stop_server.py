@@ -1,7 +1,8 @@
 """Server of STOP alone, in a process that shares nothing with the web server.
 
 It accepts ``POST /stop`` of pages, ``POST /api/v1/stop`` of programs, and ``GET /health``. Each
-connection carries one request. STOP is decided from memory and passed to the arm's process at once.
+connection carries one request. STOP is passed to the arm's process at once. The only file that it
+needs is the access file: each STOP does a ``stat`` of it, and reads it after a change.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ import h11
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Person
 from katana450.arm.control.stop_cause import StopCause, pressed
-from katana450.arm.runtime.stop_messages import StopPress, StopStatus
+from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.service.identity import PAGE, Identity
-from katana450.server.service.mutes import MutedError
+from katana450.server.service.mutes import MutedError, Mutes
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.token_bucket import TokenBucket
@@ -35,9 +36,6 @@ log = logging.getLogger(__name__)
 
 CONFIRM_TIMEOUT = 0.5
 """[s] Timeout for a state of the arm that confirms the stop."""
-
-NO_STATE = 0.3
-"""[s] Silence of the arm's process after which its state counts as unknown."""
 
 RATE, BURST = 10.0, 20.0
 """Requests of one client per second, and in a burst, beyond which answers are delayed: refusals,
@@ -110,8 +108,13 @@ class StopServer:
         self._main_port = main_port
         self._acceptor = acceptor
         self._often: dict[str, TokenBucket] = {}
-        self._pressed: dict[str, float] = {}
+        self._mutes = Mutes(time.monotonic)
         self._kept = 0
+
+    def follow(self) -> None:
+        """Count the presses that came on other paths. Call this often."""
+        if self._link.status is not None:
+            self._mutes.follow(self._link.status.stopped)
 
     def protocol(self) -> asyncio.Protocol:
         """Return the protocol of a new connection."""
@@ -217,11 +220,16 @@ class StopServer:
         if stopped is not None and not self._takes(who):
             await asyncio.sleep(DELAY)
             return _stop_reply(stopped)
-        # A press that another path has executed counts here too; any other press while the arm is
-        # stopped changes nothing, and uses up nothing.
-        refusal = self._muted(identity) if stopped is None or executed else None
-        if stopped is None and refusal is not None:
-            return refusal
+        drives = link.status is not None and identity.session in link.status.drivers
+        if identity.muted is not None and not drives and not executed:
+            if stopped is not None:
+                # Sent, it would put off the time at which the stop can be cleared.
+                return _stop_reply(stopped)
+            try:
+                self._mutes.count_stop(identity.session, identity.muted, press)
+            except MutedError as error:
+                retry = ("retry-after", str(math.ceil(error.retry)))
+                return Reply(HTTPStatus.TOO_MANY_REQUESTS, str(error).encode(), headers=(retry,))
         # Sent even if the arm is stopped, so that late copies of this press are recognised.
         link.press(StopPress(cause, actor))
         if stopped is None:
@@ -234,19 +242,6 @@ class StopServer:
             finally:
                 self._kept -= kept
         return _stop_reply(stopped)
-
-    def _muted(self, identity: Identity) -> Reply | None:
-        """Count a STOP of ``identity``; return the refusal of a muted one that does not count."""
-        now, before = time.monotonic(), self._pressed.pop(identity.session, -math.inf)
-        wait = 0.0 if identity.muted is None else before + identity.muted - now
-        self._pressed[identity.session] = before if wait > 0.0 else now
-        while len(self._pressed) > MAX_CLIENTS:
-            del self._pressed[next(iter(self._pressed))]
-        if wait <= 0.0:
-            return None
-        error = MutedError("STOP", wait)
-        retry = ("retry-after", str(math.ceil(error.retry)))
-        return Reply(HTTPStatus.TOO_MANY_REQUESTS, str(error).encode(), headers=(retry,))
 
     def _health(self) -> Reply:
         link = self._link

@@ -31,7 +31,7 @@ from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Window, session_of
 from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
@@ -106,8 +106,7 @@ class ProgramRunner(Runner):
         """Take a part of a script; after the last part, plan it from the present state of the arm.
 
         The last plan is kept if it is of the same script and nothing has changed since. Raises
-        LeaseError while another program runs or is planned, and InputError for a script that is too
-        long.
+        LeaseError while another program runs or is planned, and InputError for too long a script.
         """
         key = window.person.key
         text = self._parts.pop(key, "") + text
@@ -122,8 +121,9 @@ class ProgramRunner(Runner):
         if arm.state.moving:
             raise LeaseError("The arm is moving. Plan the program when it is at rest.")
         check_may_drive(window.person)
-        self._supersede(window)
         before = self._planning
+        if before is not None and before.busy:
+            before.cancel(self._owner.superseded_by(window))
         if before is not None and before.fits(text, speed, arm.state):
             before.refused, before.note = None, ""
             self._own(window)
@@ -219,6 +219,13 @@ class ProgramRunner(Runner):
         if self.running and not self._owner.unattended:
             self._end(f"{window.person.name} left.")
 
+    def removed(self, session: str) -> None:
+        """End the program of the person of ``session``, even if it runs unattended."""
+        owner = self._owner.window
+        if owner is not None and session_of(owner.person.key) == session:
+            self._owner.unattended = False
+            self.leave(owner)
+
     def tick(self) -> None:
         """Advance the running program by one step, or end it if owner, lease or stop demand it."""
         hub, t = self.hub, self.hub.clock()
@@ -296,8 +303,7 @@ class ProgramRunner(Runner):
         """Carry out the order that waits for the end of the planning."""
         then, self._then = self._then, None
         owner = self._owner.window
-        if then is None or owner is None:
-            # The order was cancelled meanwhile.
+        if then is None or owner is None:  # It was cancelled meanwhile.
             return
         try:
             self.steer(owner, then, unattended=self._owner.unattended)
@@ -392,9 +398,3 @@ class ProgramRunner(Runner):
         self.hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
         self.hub.recorder.note("program", joined.actor, {"ended": phase.value}, why=why)
-
-    def _supersede(self, window: Window) -> None:
-        """Cancel the planning of another program. Raises LeaseError if ``window`` may not."""
-        planning = self._planning
-        if planning is not None and planning.busy:
-            planning.cancel(self._owner.superseded_by(window))
