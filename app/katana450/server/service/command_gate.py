@@ -86,6 +86,8 @@ class CommandGate:
                     granted, ticket = self._clear_stop(actor)
                 else:
                     granted = self._checked(command, actor)
+                    # What follows from the command later is void after a revocation.
+                    granted = replace(granted, seen=self.revocations)
                     ticket = self.present().deliver(command, granted)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
