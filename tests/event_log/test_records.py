@@ -194,6 +194,14 @@ def test_first_stop_is_recorded_whatever_came_before() -> None:
     assert found[-1]["kind"] == "more"
 
 
+def test_only_a_clear_that_follows_a_stop_is_recorded_whatever_came_before() -> None:
+    flood = [command(1.0, cmd.ClearStop()) for _ in range(1000)]
+    stop = Note(1.0, "stop", BERT, {"stop": "pressed"}, always=True)
+    found = made(*flood, stop, *flood[:2])
+    assert [each["kind"] for each in found[-3:]] == ["stop", "clear", "more"]
+    assert sum(each["kind"] == "clear" for each in found) == LIMITS["stop"].burst + 1
+
+
 def test_notes_that_nobody_reads_do_not_pile_up() -> None:
     recorder = Recorder()
     recorder.command(cmd.Home(), ANNA, 1)
@@ -202,6 +210,10 @@ def test_notes_that_nobody_reads_do_not_pile_up() -> None:
     for _ in range(MAX_WAITING + 10):
         recorder.command(cmd.Home(), ANNA, 1)
     assert (recorder.notes.qsize(), recorder.lost) == (MAX_WAITING, 10)
+    # Among them no repeated stop, but the first one.
+    recorder.stop("Bert pressed STOP.", BERT, first=False)
+    recorder.stop("Anna pressed STOP.", ANNA, first=True)
+    assert (recorder.notes.qsize(), recorder.lost) == (MAX_WAITING + 1, 11)
 
 
 @pytest.mark.long

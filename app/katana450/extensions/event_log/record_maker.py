@@ -66,6 +66,7 @@ class RecordMaker:
         self._early: OrderedDict[int, Outcome] = OrderedDict()
         self._limits = RecordLimits()
         self._made: list[Record] = []
+        self._stopped = False
         self._epoch = 0.0
 
     def made(self, notes: list[Note], t: float, *, closing: bool = False) -> list[Record]:
@@ -107,14 +108,17 @@ class RecordMaker:
             case _:
                 if note.kind in ("stop", "leave"):
                     self._end_all()
+                self._stopped |= note.kind == "stop"
                 self._add(note, _content(note.what))
 
     def _command(self, note: Note, command: BaseCommand) -> None:
         key = _stream_key(note, command)
         if key is None:
             self._end_all()
-            kind = "clear" if isinstance(command, cmd.ClearStop) else note.kind
-            self._add(note._replace(kind=kind, always=kind == "clear"), _content(command))
+            if isinstance(command, cmd.ClearStop):
+                note = note._replace(kind="clear", always=self._stopped)
+                self._stopped = False
+            self._add(note, _content(command))
             self._expect(note, note)
             return
         stream = self._streams.get(key)
