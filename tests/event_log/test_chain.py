@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 import stat
 import sys
 from pathlib import Path
@@ -82,6 +83,29 @@ def test_size_of_the_log_is_limited(tmp_path: Path) -> None:
     # Rotation deletes the oldest file; the head shows that nobody else has.
     files[0].unlink()
     assert "missing before it" in verified(tmp_path).faults[0]
+
+
+def test_kill_at_the_deletion_of_the_oldest_file_is_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unlink, copies = Path.unlink, list[Path]()
+    write(tmp_path / "log", [])
+
+    def copying(path: Path, missing_ok: bool = False) -> None:
+        for delete in (lambda: None, lambda: unlink(path, missing_ok)):
+            delete()
+            copies.append(tmp_path / f"copy{len(copies)}")
+            shutil.copytree(path.parent, copies[-1])
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", copying)
+        write(tmp_path / "log", numbered(40), max_file_bytes=1500, max_files=3)
+    assert len(copies) >= 4
+    for folder in copies:
+        assert verified(folder).faults == []
+        # The next start takes the oldest record from the head.
+        write(folder, numbered(2), max_files=3)
+        assert verified(folder).faults == []
 
 
 def test_flipped_byte_is_found_with_its_line(
