@@ -133,6 +133,15 @@ def test_outcomes_of_a_stream_are_counted() -> None:
     assert (end["what"]["limited"], end["what"]["refused"], end["why"]) == (5, 5, "No.")
 
 
+@pytest.mark.parametrize("last", [cmd.EndDrag(), cmd.Jog(np.zeros(5))])
+def test_outcome_after_the_end_of_its_stream_is_recorded(last: BaseCommand) -> None:
+    jogs = [command(n / 50, cmd.Jog(np.array([0.1, 0, 0, 0, 0])), n + 1) for n in range(5)]
+    found = made(*jogs, command(0.1, last, 6), Note(0.11, "outcome", None, LIMITED, ticket=5))
+    (outcome,) = (each for each in found if each["kind"] == "outcome")
+    assert outcome["what"] == {"command": "Jog", "ticket": 5}
+    assert (outcome["who"]["name"], outcome["outcome"]) == ("Anna", "limited")
+
+
 def test_participant_is_described_without_its_key() -> None:
     (found,) = made(command(1.0, cmd.Home()))
     assert found["who"] == {

@@ -36,7 +36,10 @@ MAX_TICKETS = 1024
 
 @dataclass
 class CommandStream:
-    """Commands of one kind from one participant, in quick succession."""
+    """Commands of one kind from one participant, in quick succession.
+
+    ``ended``: its last record is made, so a later outcome needs one of its own.
+    """
 
     first: Note
     last: Note
@@ -44,6 +47,7 @@ class CommandStream:
     limited: int = 0
     refused: int = 0
     why: str = ""
+    ended: bool = False
 
     def add(self, note: Note) -> None:
         """Add the next command."""
@@ -162,9 +166,9 @@ class RecordMaker:
             known.limited += limited
             known.refused += not limited
             known.why = why
-            if known.count > 1:
+            if known.count > 1 and not known.ended:
                 return
-            known = known.first
+            known = known.last
         name = type(known.what).__name__
         note = Note(t, "outcome", known.actor, None, outcome.verdict.value, why)
         self._add(note, {"command": name, "ticket": ticket})
@@ -213,6 +217,7 @@ class RecordMaker:
         stream = self._streams.pop(key, None)
         if stream is None or stream.count == 1:
             return
+        stream.ended = True
         first, last = _content(stream.first.what), _content(stream.last.what)
         what = {
             "command": first.pop("command"),
