@@ -300,12 +300,12 @@ def _source(actor: Actor | None) -> str:
 
 def _transfer(change: LeaseChange, by: Actor) -> tuple[dict[str, Any], str]:
     """Return the name of a change of holder, and its grounds."""
-    old, new = change.before.holder, change.after.holder
+    new = change.after.holder
     if new is None:
         if by is SERVER:
             return {"lease": "expired"}, "the holder was silent"
         return {"lease": "released"}, "holds the lease"
-    if old is None:
+    if change.before.driver is None:
         return {"lease": "acquired"}, "the lease was free"
     if new == by.person:
         return {"lease": "taken"}, "an admin may take the lease"
