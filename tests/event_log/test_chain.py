@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from katana450.cli.main import main
+from katana450.extensions.event_log.disk_log import DiskLog
 from katana450.extensions.event_log.folder import log_files
 from katana450.extensions.event_log.records import FIRST_HASH, MAX_LINE_BYTES, hash_of, record
 from katana450.extensions.event_log.verification import verified
@@ -250,6 +251,40 @@ def test_show_filters_by_time_participant_and_kind(
     assert shown("--kind", "stop", "--kind", "lease") == ["2", "3", "4"]
     assert shown("--who", "anna", "--since", "10m") == ["3"]
     assert shown("--who", "10.0.0.7", "--since", "2025-12-31") == ["2", "3"]
+
+
+@pytest.mark.parametrize(
+    ("since", "shown"),
+    [
+        ("2026-01-31T11:59:59", True),
+        ("2026-01-31 12:00:01", False),
+        ("2026-01-31T13:59:59+02:00", True),
+        ("2026-01-31T14:00:01+02:00", False),
+        ("2026-01-31T09:00:01-03:00", False),
+        ("2026-01-31T12:00:00Z", True),
+        ("2026-01-31", True),
+    ],
+)
+def test_show_takes_a_time_of_any_zone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], since: str, shown: bool
+) -> None:
+    write(tmp_path, [{"time": "2026-01-31T12:00:00.000Z", "kind": "stop"}])
+    assert main(["log", "show", str(tmp_path), "--since", since, "--kind", "stop"]) == 0
+    assert bool(capsys.readouterr().out) == shown
+
+
+def test_show_refuses_a_time_that_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    for since in ("noon", "0001-01-01T00:00+02:00"):
+        with pytest.raises(SystemExit):
+            main(["log", "show", "--since", since])
+        assert "a time such as 30m, 12h, 7d" in capsys.readouterr().err
+
+
+def test_end_that_nobody_requested_is_recorded_as_a_failure(tmp_path: Path) -> None:
+    for requested in (True, False):
+        DiskLog(tmp_path, 8080).close(requested=requested)
+    causes = [each["what"]["cause"] for each in records(tmp_path) if each["kind"] == "end"]
+    assert causes == ["requested", "the server could not start, or failed"]
 
 
 def test_show_names_broken_lines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
