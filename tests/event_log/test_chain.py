@@ -93,8 +93,9 @@ def test_kill_at_the_deletion_of_the_oldest_file_is_no_fault(
     write(tmp_path / "log", [])
 
     def copying(path: Path, missing_ok: bool = False) -> None:
-        for delete in (lambda: None, lambda: unlink(path, missing_ok)):
-            delete()
+        for deletes in (False, True):
+            if deletes:
+                unlink(path, missing_ok)
             copies.append(tmp_path / f"copy{len(copies)}")
             shutil.copytree(path.parent, copies[-1])
 
