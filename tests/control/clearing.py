@@ -12,9 +12,13 @@ TICK = 0.01
 
 def cleared(session: Session, state: State) -> State:
     """Return the state after ticks without commands until the stop may be cleared, and its end."""
-    while clear_refusal(state, state.t):
+    for _ in range(1000):
+        if not clear_refusal(state, state.t):
+            break
         state = session.step(state, [], state.t + TICK)
         state = session.observe(state, state.setpoint, state.gripper_setpoint)
+    else:
+        raise AssertionError(clear_refusal(state, state.t))
     state = session.step(state, [cmd.ClearStop()], state.t + TICK)
     assert state.stopped is None
     return state

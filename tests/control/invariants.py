@@ -184,8 +184,12 @@ class JointRules(RuleBasedStateMachine):
 
     def wait_and_clear(self, ticks: int, *then: cmd.Command) -> None:
         """Clear the stop, if any, as soon as possible; execute ``then`` in the same tick."""
-        while not self.may_clear:
+        for _ in range(1000):
+            if self.may_clear:
+                break
             self.tick(())
+        else:
+            raise AssertionError(clear_refusal(self.state, self.state.t + DT))
         self.run([cmd.ClearStop(), *then], ticks)
 
     def run(self, commands: Iterable[cmd.Command], ticks: int) -> None:

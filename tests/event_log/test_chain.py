@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 import stat
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from katana450.cli.main import main
+from katana450.extensions.event_log.disk_log import DiskLog
 from katana450.extensions.event_log.folder import log_files
 from katana450.extensions.event_log.records import FIRST_HASH, MAX_LINE_BYTES, hash_of, record
 from katana450.extensions.event_log.verification import verified
@@ -82,6 +84,30 @@ def test_size_of_the_log_is_limited(tmp_path: Path) -> None:
     # Rotation deletes the oldest file; the head shows that nobody else has.
     files[0].unlink()
     assert "missing before it" in verified(tmp_path).faults[0]
+
+
+def test_kill_at_the_deletion_of_the_oldest_file_is_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unlink, copies = Path.unlink, list[Path]()
+    write(tmp_path / "log", [])
+
+    def copying(path: Path, missing_ok: bool = False) -> None:
+        for deletes in (False, True):
+            if deletes:
+                unlink(path, missing_ok)
+            copies.append(tmp_path / f"copy{len(copies)}")
+            shutil.copytree(path.parent, copies[-1])
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", copying)
+        write(tmp_path / "log", numbered(40), max_file_bytes=1500, max_files=3)
+    assert len(copies) >= 4
+    for folder in copies:
+        assert verified(folder).faults == []
+        # The next start takes the oldest record from the head.
+        write(folder, numbered(2), max_files=3)
+        assert verified(folder).faults == []
 
 
 def test_flipped_byte_is_found_with_its_line(
@@ -226,6 +252,40 @@ def test_show_filters_by_time_participant_and_kind(
     assert shown("--kind", "stop", "--kind", "lease") == ["2", "3", "4"]
     assert shown("--who", "anna", "--since", "10m") == ["3"]
     assert shown("--who", "10.0.0.7", "--since", "2025-12-31") == ["2", "3"]
+
+
+@pytest.mark.parametrize(
+    ("since", "shown"),
+    [
+        ("2026-01-31T11:59:59", True),
+        ("2026-01-31 12:00:01", False),
+        ("2026-01-31T13:59:59+02:00", True),
+        ("2026-01-31T14:00:01+02:00", False),
+        ("2026-01-31T09:00:01-03:00", False),
+        ("2026-01-31T12:00:00Z", True),
+        ("2026-01-31", True),
+    ],
+)
+def test_show_takes_a_time_of_any_zone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], since: str, shown: bool
+) -> None:
+    write(tmp_path, [{"time": "2026-01-31T12:00:00.000Z", "kind": "stop"}])
+    assert main(["log", "show", str(tmp_path), "--since", since, "--kind", "stop"]) == 0
+    assert bool(capsys.readouterr().out) == shown
+
+
+def test_show_refuses_a_time_that_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    for since in ("noon", "0001-01-01T00:00+02:00"):
+        with pytest.raises(SystemExit):
+            main(["log", "show", "--since", since])
+        assert "a time such as 30m, 12h, 7d" in capsys.readouterr().err
+
+
+def test_end_that_nobody_requested_is_recorded_as_a_failure(tmp_path: Path) -> None:
+    for requested in (True, False):
+        DiskLog(tmp_path, 8080).close(requested=requested)
+    causes = [each["what"]["cause"] for each in records(tmp_path) if each["kind"] == "end"]
+    assert causes == ["requested", "the server could not start, or failed"]
 
 
 def test_show_names_broken_lines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,12 +12,13 @@ from pathlib import Path
 import pytest
 
 from katana450.client import connect
-from katana450.extensions.event_log.records import record
+from katana450.extensions.event_log.folder import LogFolder
+from katana450.extensions.event_log.records import Record, record
 from katana450.extensions.event_log.verification import verified
 from katana450.extensions.event_log.writer import MAX_KEPT, LogWriter
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
-from tests.event_log.logs import CLOSING, numbered, records
+from tests.event_log.logs import CLOSING, newest, numbered, records, write
 
 FIRST = "events-000000000001.jsonl"
 
@@ -60,6 +61,51 @@ def test_writer_continues_when_a_full_disk_has_room_again(
     assert (lost["kind"], lost["what"]["count"], end["kind"]) == ("lost", 50, "end")
     assert "No space left" in lost["why"]
     assert verified(folder).faults == []
+
+
+def test_lost_records_stand_between_those_before_and_after_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    written, room = LogFolder.append, [0]
+
+    def append(folder: LogFolder, content: Record) -> None:
+        if not room[0]:
+            raise OSError(28, "No space left on device")
+        room[0] -= 1
+        written(folder, content)
+
+    monkeypatch.setattr(LogFolder, "append", append)
+    writer = LogWriter(tmp_path)
+    *early, late = numbered(MAX_KEPT + 6)
+    for content in early:
+        writer.put(content)
+    wait(lambda: caplog.records)
+    time.sleep(0.2)
+    room[0] = 100
+    wait(lambda: not room[0])
+    writer.put(late)
+    time.sleep(0.2)
+    room[0] = MAX_KEPT
+    wait(lambda: writer.head.seq == MAX_KEPT + 1)
+    writer.close(record("end"), CLOSING)
+    *kept, lost, end = records(tmp_path)
+    assert [each["what"]["value"] for each in kept] == list(range(MAX_KEPT))
+    assert (lost["kind"], lost["what"]["count"], end["kind"]) == ("lost", 6, "end")
+
+
+def test_record_that_cannot_be_written_is_counted(tmp_path: Path) -> None:
+    write(tmp_path, [])
+    with newest(tmp_path).open("ab") as file:
+        file.write(b'{"torn')
+    writer = LogWriter(tmp_path)
+    writer.put(record("command", object()))
+    time.sleep(0.2)
+    writer.put(record("start"))
+    writer.close(record("end"), CLOSING)
+    *_, lost, start, end = records(tmp_path)
+    assert "torn" in lost["what"]["after"]
+    assert (lost["what"]["count"], start["kind"], end["kind"]) == (1, "start", "end")
+    assert verified(tmp_path).faults == []
 
 
 def test_deleted_log_begins_again_and_states_it(tmp_path: Path) -> None:

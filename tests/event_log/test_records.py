@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import replace
+from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.outcome import refused
 from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
 from katana450.arm.control.traits import BaseCommand
@@ -18,9 +21,10 @@ from katana450.client import connect
 from katana450.extensions.event_log.compact import MAX_TEXT, compact_command, compact_request
 from katana450.extensions.event_log.record_limits import LIMITS
 from katana450.extensions.event_log.record_maker import STREAM_GAP, RecordMaker
+from katana450.extensions.event_log.record_sender import RecordSender
 from katana450.extensions.event_log.records import MAX_LINE_BYTES, Record, encoded
 from katana450.server.api import requests
-from katana450.server.service.recorder import MAX_WAITING, Note, Recorder
+from katana450.server.service.recorder import MAX_WAITING, LeaseChange, Note, Recorder
 from tests.browser.server import APP, AppServer
 from tests.event_log.logs import records
 
@@ -133,6 +137,15 @@ def test_outcomes_of_a_stream_are_counted() -> None:
     assert (end["what"]["limited"], end["what"]["refused"], end["why"]) == (5, 5, "No.")
 
 
+@pytest.mark.parametrize("last", [cmd.EndDrag(), cmd.Jog(np.zeros(5))])
+def test_outcome_after_the_end_of_its_stream_is_recorded(last: BaseCommand) -> None:
+    jogs = [command(n / 50, cmd.Jog(np.array([0.1, 0, 0, 0, 0])), n + 1) for n in range(5)]
+    found = made(*jogs, command(0.1, last, 6), Note(0.11, "outcome", None, LIMITED, ticket=5))
+    (outcome,) = (each for each in found if each["kind"] == "outcome")
+    assert outcome["what"] == {"command": "Jog", "ticket": 5}
+    assert (outcome["who"]["name"], outcome["outcome"]) == ("Anna", "limited")
+
+
 def test_participant_is_described_without_its_key() -> None:
     (found,) = made(command(1.0, cmd.Home()))
     assert found["who"] == {
@@ -194,6 +207,14 @@ def test_first_stop_is_recorded_whatever_came_before() -> None:
     assert found[-1]["kind"] == "more"
 
 
+def test_only_a_clear_that_follows_a_stop_is_recorded_whatever_came_before() -> None:
+    flood = [command(1.0, cmd.ClearStop()) for _ in range(1000)]
+    stop = Note(1.0, "stop", BERT, {"stop": "pressed"}, always=True)
+    found = made(*flood, stop, *flood[:2])
+    assert [each["kind"] for each in found[-3:]] == ["stop", "clear", "more"]
+    assert sum(each["kind"] == "clear" for each in found) == LIMITS["stop"].burst + 1
+
+
 def test_notes_that_nobody_reads_do_not_pile_up() -> None:
     recorder = Recorder()
     recorder.command(cmd.Home(), ANNA, 1)
@@ -202,6 +223,34 @@ def test_notes_that_nobody_reads_do_not_pile_up() -> None:
     for _ in range(MAX_WAITING + 10):
         recorder.command(cmd.Home(), ANNA, 1)
     assert (recorder.notes.qsize(), recorder.lost) == (MAX_WAITING, 10)
+    # Among them no repeated stop, but the first one.
+    recorder.stop("Bert pressed STOP.", BERT, first=False)
+    recorder.stop("Anna pressed STOP.", ANNA, first=True)
+    assert (recorder.notes.qsize(), recorder.lost) == (MAX_WAITING + 1, 11)
+
+
+def test_problem_of_the_writer_is_known_without_another_note() -> None:
+    recorder, (pipe, writer) = Recorder(), Pipe()
+    sender = RecordSender(recorder, pipe)
+    for problem in ("The event log cannot be written: No space left on device.", ""):
+        writer.send(problem)
+        end = time.monotonic() + 20.0
+        while recorder.problem != problem:
+            assert time.monotonic() < end
+            time.sleep(0.02)
+    sender.close()
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_lease_of_a_driver_who_left_is_recorded_as_free(closed: bool) -> None:
+    held = Lease(BERT.person, left=0.5 if closed else math.inf)
+    after = Lease(ANNA.person)
+    by = replace(ANNA, grounds=None)
+    (found,) = made(Note(1.0, "lease", by, LeaseChange(held, after)))
+    assert (found["what"]["lease"], found["grounds"]) == (
+        ("acquired", "the lease was free") if closed else ("taken", "an admin may take the lease")
+    )
+    assert (found["what"]["from"], found["what"]["to"]) == ("Bert", "Anna")
 
 
 @pytest.mark.long

@@ -97,6 +97,13 @@ async def act(server: AppServer, tokens: dict[str, str], numbers: dict[str, str]
         await asyncio.sleep(PAUSE)
         await otto.say("clear_stop")
         await otto.wait(stopped=None)
+        url, bearer = f"{server.stop_url}/api/v1/stop", f"Bearer {tokens['Vera']}"
+        pressed = asyncio.to_thread(ask, url, data=b"", Authorization=bearer, X_Name="Phone")
+        assert (await pressed)[0] == 200
+        await otto.wait(stop="confirmed")
+        await asyncio.sleep(PAUSE)
+        await otto.say("clear_stop")
+        await otto.wait(stopped=None)
         await ada.say("take")
         await ada.wait(mine=True)
         await ada.say("release_lease")
@@ -169,6 +176,8 @@ command | Otto | page | SetJoint 1 0.1 | holds the lease | accepted
 refusal | Vera | page | Home | - | refused
 stop | Vera | page | pressed | anybody may stop the arm | accepted
 refusal | Vera | page | ClearStop | - | refused
+clear | Otto | page | ClearStop | holds the lease | accepted
+stop | Vera, Phone | HTTP | pressed | anybody may stop the arm | accepted
 clear | Otto | page | ClearStop | holds the lease | accepted
 lease | Ada | page | taken Ada | an admin may take the lease | -
 lease | Ada | page | released | holds the lease | -
@@ -261,6 +270,14 @@ def test_participants_are_named_by_role_link_and_address(
         who = each.get("who", {})
         if who.get("name", "").startswith("Otto"):
             assert (who["role"], who["link"], who["address"]) == ("operator", number, "127.0.0.1")
+    # The presser on the port of STOP too.
+    stops = [each["who"] for each in records(session[0]) if each["kind"] == "stop"]
+    assert [(who.get("role"), who["channel"]) for who in stops] == [
+        ("viewer", "page"),
+        ("viewer", "HTTP"),
+        (None, "server"),
+    ]
+    assert stops[0]["link"] == stops[1]["link"]
 
 
 def test_no_secret_is_in_the_log(session: tuple[Path, dict[str, str], str]) -> None:

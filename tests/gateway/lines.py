@@ -52,7 +52,9 @@ class Lines:
 
     def clear_stop(self) -> dict[str, Any]:
         """Clear the stop once that is possible, and return the answer."""
+        end = time.monotonic() + 20.0
         while not self.answer(do="query")["clearable"]:
+            assert time.monotonic() < end
             time.sleep(0.02)
         return self.answer(do="clear_stop")
 

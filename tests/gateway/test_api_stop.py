@@ -25,7 +25,9 @@ def test_any_window_can_stop_a_program(server: AppServer, program: Client) -> No
     assert program.query(answers.State).stopped == "bystander pressed STOP."
     with pytest.raises(RefusedError, match="clear the stop first"):
         program.joints(READY)
+    end = time.monotonic() + 20.0
     while (rest := program.query(answers.State)).moving:
+        assert time.monotonic() < end
         time.sleep(0.02)
     program.clear_stop()
     time.sleep(0.3)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.actor import Actor, Grounds
-from katana450.arm.control.lease import Role
+from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import ActiveStop, State
 from katana450.arm.control.stop_cause import StopCause, pressed
@@ -18,7 +18,8 @@ from katana450.errors import LeaseError
 from katana450.server.service import status
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Window, key_of
+from katana450.server.service.participants import Window, key_of, presser_of
+from katana450.server.service.recorder import Note
 from katana450.server.service.stop_state import ClearBy
 from tests.gateway.test_hub import PAGES, FakeArm, Table
 
@@ -103,6 +104,66 @@ def test_stop_on_another_path_is_adopted_with_its_cause(table: ClearingTable) ->
     table.wait(TICK, driver)
     assert table.hub.stop(other.actor, "one") == 0
     assert (table.hub.stopped, table.arm.stops) == (None, 1)
+
+
+def stops(table: ClearingTable) -> list[Note]:
+    """Return the stops that were noted for the event log."""
+    recorder = table.hub.recorder
+    notes = [recorder.notes.get_nowait() for _ in range(recorder.notes.qsize())]
+    return [each for each in notes if each is not None and each.kind == "stop"]
+
+
+@pytest.mark.parametrize("copy_first", [False, True])
+def test_stop_on_another_path_is_noted_once_with_its_presser(
+    table: ClearingTable, copy_first: bool
+) -> None:
+    other = table.person("Vera", Role.VIEWER)
+    table.hub.recorder.enabled = True
+    table.stoppable.stop_elsewhere(pressed("Vera", other.person.key, "one", 5.0))
+    if copy_first:
+        table.hub.stop(other.actor, "one")
+    table.wait(TICK)
+    table.hub.stop(other.actor, "one")
+    table.wait(TICK)
+    (note,) = stops(table)
+    assert note.actor == replace(other.actor, grounds=Grounds.SAFETY)
+    assert (note.what, note.why, note.always) == ({"stop": "pressed"}, "Vera pressed STOP.", True)
+
+
+@pytest.mark.parametrize("copy_first", [False, True])
+def test_press_that_the_gate_learns_after_its_own_stop_is_noted_once(
+    table: ClearingTable, copy_first: bool
+) -> None:
+    other = table.person("Vera", Role.VIEWER)
+    table.hub.recorder.enabled = True
+    table.stoppable.stop_elsewhere(pressed("Vera", other.person.key, "one", 5.0))
+    table.hub.gate.protect("Window 1 fell silent while the arm moved.")
+    if copy_first:
+        table.hub.stop(other.actor, "one")
+    table.wait(TICK)
+    table.hub.stop(other.actor, "one")
+    table.wait(TICK)
+    protection, press = stops(table)
+    assert protection.actor == replace(SERVER, grounds=Grounds.SERVER)
+    assert press.actor == replace(other.actor, grounds=Grounds.SAFETY)
+    assert press.what == {"stop": "pressed", "repeated": True}
+
+
+def test_presser_without_a_window_has_the_role_and_the_number_of_its_link() -> None:
+    vera = Person("7/page", "Vera", Role.OPERATOR, "7", "10.0.0.7")
+    cause = pressed("Vera, curl", "7", "one", 5.0)
+    known, unknown = (presser_of(cause, each, links=True) for each in ([vera], []))
+    assert known == Actor(
+        Person("7", "Vera, curl", Role.OPERATOR), CommandChannel.HTTP, grounds=Grounds.SAFETY
+    )
+    assert known.person.link == "7"
+    assert unknown is not None
+    assert unknown.person.role is Role.VIEWER
+    # Without links everybody is an admin.
+    anybody = presser_of(cause, [], links=False)
+    assert anybody is not None
+    assert (anybody.person.role, anybody.person.link) == (Role.ADMIN, "")
+    assert presser_of(StopCause(), [vera], links=True) is None
 
 
 def test_clear_stop_names_the_newest_stop_that_the_gate_knows(table: ClearingTable) -> None:

@@ -35,8 +35,10 @@ def server() -> Iterator[AppServer]:
 def under_way(arm: Client) -> answers.State:
     """Start a motion to FAR; return the state once the arm moves."""
     arm.ask(requests.Joints(q=FAR.tolist()))
+    end = time.monotonic() + 20.0
     while (state := arm.query(answers.State)).q[0] < 0.2:
         assert state.stopped is None
+        assert time.monotonic() < end
         # A client that asks without pause is taken for a flood.
         time.sleep(0.01)
     return state

@@ -102,7 +102,9 @@ def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> N
                 await owner.send(json.dumps(request))
 
             await say(do="program", text=SCRIPT)
+            end = time.monotonic() + 20.0
             while (await asyncio.to_thread(state_of, server))["program"]["status"] != "ready":
+                assert time.monotonic() < end
                 await say(do="heartbeat")
                 await asyncio.sleep(0.05)
             await say(do="steer", order="run")

@@ -82,8 +82,9 @@ def test_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
     during = arm.query(answers.State)
     assert during.holder is not None
     assert during.holder.startswith("There and back")
-    lines = set()
+    lines, end = set(), time.monotonic() + 20.0
     while (program := arm.query(answers.State).program) is not None and program.status == "running":
+        assert time.monotonic() < end
         lines.add(program.line)
         time.sleep(0.02)
     assert program is not None

@@ -110,6 +110,7 @@ def strike(server: AppServer, process: str, number: signal.Signals, delay: float
         struck = time.monotonic()
         # An arm that does not answer is reported; a front end that is lost disconnects its clients.
         while process == "front" or healthy(server):
+            assert time.monotonic() < struck + 20.0
             arm.query(answers.State)
     shown = time.monotonic() - struck
     until(lambda: healthy(server), PATIENT)

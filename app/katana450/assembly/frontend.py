@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from functools import partial
 from threading import Event
 
+from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
@@ -66,9 +68,8 @@ def build_frontend(
     view = _view(gateway, config, found, link, ViewOptions(layers, meshes))
     if config.options is not None:
         _add_folders(view, gateway, config.options, robot, link)
-    detours = DetourPlanner(
-        session, link.state_publisher, planning_worker, go_on_release=settings.go_on_release
-    )
+    go = partial(gateway.hub.gate.submit, cmd.Go()) if settings.go_on_release else None
+    detours = DetourPlanner(session, link.state_publisher, planning_worker, go)
     planning_worker.notify = gateway.announce
     planning_worker.redirected = guarded(gateway.hub.runner.redirected)
     link.start()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Callable
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.plans import detour_from
 from katana450.arm.control.session import Session
@@ -35,21 +37,21 @@ class DetourPlanner:
         session: Session,
         state_publisher: StatePublisher,
         arm: PlanningWorker,
-        *,
-        go_on_release: bool = False,
+        go: Callable[[Actor], object] | None = None,
     ) -> None:
         """Prepare the thread.
 
         Args:
             session: the rules of the arm.
             state_publisher: the source of states.
-            arm: the sink of commands.
-            go_on_release: whether the detour of a drag that has ended is followed at once.
+            arm: the sink of the offers.
+            go: called with the actor of a drag that has ended, to follow its detour at once; may
+                raise KatanaError. None where detours are only offered.
         """
         self._session = session
         self._state_publisher = state_publisher
         self._arm = arm
-        self._go_on_release = go_on_release
+        self._go = go
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="detours", daemon=True)
 
@@ -65,8 +67,12 @@ class DetourPlanner:
     def _run(self) -> None:
         seen = self._state_publisher.snapshot
         while not self._stopping.is_set():
-            if self._go_on_release and _may_go(seen.state):
-                self._deliver(cmd.Go())
+            actor = self._arm.newest_actor
+            if self._go is not None and actor is not None and _may_go(seen.state):
+                try:
+                    self._go(actor)
+                except KatanaError as error:
+                    log.debug("No detour: %s", error)
                 seen = self._changed(seen)
                 continue
             wanted = _wants_detour(seen.state)
@@ -99,19 +105,11 @@ class DetourPlanner:
                 world = self._session.world_at(state)
                 plan = detour_from(self._session.require_arm(), world, state)
                 check()
+            self._arm.deliver(cmd.OfferDetour(plan), self._arm.newest_actor)
         except KatanaError as error:
             log.debug("No detour: %s", error)
         except Exception:
             log.exception("The planning of a detour failed.")
-        else:
-            self._deliver(cmd.OfferDetour(plan))
-
-    def _deliver(self, command: cmd.Command) -> None:
-        """Send ``command`` in the name of the actor of the drag; the session may refuse it."""
-        try:
-            self._arm.deliver(command, self._arm.newest_actor)
-        except KatanaError as error:
-            log.debug("No detour: %s", error)
 
 
 def _wants_detour(state: State) -> bool:

@@ -28,7 +28,8 @@ class Submission(NamedTuple):
 class CommandSink(Protocol):
     """Receiver of commands, in this process or at the other end of a pipe.
 
-    In the front end only ``CommandGate.submit`` delivers commands to one.
+    In the front end only ``CommandGate`` delivers commands. Behind it the planning threads add
+    the paths of its commands, and offers, which move nothing.
     """
 
     @property

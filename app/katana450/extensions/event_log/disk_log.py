@@ -46,7 +46,7 @@ class DiskLog(ServerLog):
 
     def close(self, *, requested: bool) -> None:
         """Record the end of the server, and write what waits. ``requested``: by a signal."""
-        what = {"cause": "requested" if requested else "the control loop ended"}
+        what = {"cause": "requested" if requested else "the server could not start, or failed"}
         self._writer.close(_by_server("end", what), CLOSE_TIMEOUT)
 
 

@@ -186,10 +186,14 @@ class LogFolder:
             os.fsync(self._file)
             os.close(self._file)
         self._file, self._size = new, os.fstat(new).st_size
-        kept = log_files(self.folder)
-        while len(kept) > self._max_files:
-            kept.pop(0).unlink()
+        files = log_files(self.folder)
+        old, kept = files[: -self._max_files], files[-self._max_files :]
+        if old:
             self.head = self.head._replace(oldest=first_seq(kept[0]))
+            # First: after a kill in between, no file is missing that the head still names.
+            self.commit()
+        for path in old:
+            path.unlink()
 
     def _write(self, line: bytes) -> None:
         """Write all of ``line`` or nothing."""

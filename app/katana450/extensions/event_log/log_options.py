@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import time
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 from katana450.settings import Settings
@@ -33,7 +33,7 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
         type=_since,
         default="",
         metavar="TIME",
-        help="only records since then: 30m, 12h, 7d, or 2026-01-31T12:00 (UTC)",
+        help="only records since then: 30m, 12h, 7d, or 2026-01-31T12:00, in UTC without an offset",
     )
     show.add_argument(
         "--who", metavar="TEXT", help="only records with this text in name, role, link or address"
@@ -54,9 +54,11 @@ def _since(text: str) -> str:
         ago = int(found[1]) * SECONDS[found[2]]
         return time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(max(time.time() - ago, 0)))
     try:
-        datetime.fromisoformat(text)
-    except ValueError:
+        since = datetime.fromisoformat(text)
+        if since.tzinfo is not None:
+            since = since.astimezone(UTC).replace(tzinfo=None)
+    except (ValueError, OverflowError):
         raise argparse.ArgumentTypeError(
             f"a time such as 30m, 12h, 7d or 2026-01-31T12:00, not {text!r}"
         ) from None
-    return text.replace(" ", "T")
+    return since.isoformat()

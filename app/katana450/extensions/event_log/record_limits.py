@@ -1,6 +1,6 @@
 """Limits of the records that one participant can cause: more of them are counted, not written.
 
-So nobody can fill the log, or displace older records by new ones.
+So nobody can quickly fill the log, or displace older records by new ones.
 """
 
 from __future__ import annotations

@@ -36,7 +36,10 @@ MAX_TICKETS = 1024
 
 @dataclass
 class CommandStream:
-    """Commands of one kind from one participant, in quick succession."""
+    """Commands of one kind from one participant, in quick succession.
+
+    ``ended``: its last record is made, so a later outcome needs one of its own.
+    """
 
     first: Note
     last: Note
@@ -44,6 +47,7 @@ class CommandStream:
     limited: int = 0
     refused: int = 0
     why: str = ""
+    ended: bool = False
 
     def add(self, note: Note) -> None:
         """Add the next command."""
@@ -66,6 +70,7 @@ class RecordMaker:
         self._early: OrderedDict[int, Outcome] = OrderedDict()
         self._limits = RecordLimits()
         self._made: list[Record] = []
+        self._stopped = False
         self._epoch = 0.0
 
     def made(self, notes: list[Note], t: float, *, closing: bool = False) -> list[Record]:
@@ -107,14 +112,17 @@ class RecordMaker:
             case _:
                 if note.kind in ("stop", "leave"):
                     self._end_all()
+                self._stopped |= note.kind == "stop"
                 self._add(note, _content(note.what))
 
     def _command(self, note: Note, command: BaseCommand) -> None:
         key = _stream_key(note, command)
         if key is None:
             self._end_all()
-            kind = "clear" if isinstance(command, cmd.ClearStop) else note.kind
-            self._add(note._replace(kind=kind, always=kind == "clear"), _content(command))
+            if isinstance(command, cmd.ClearStop):
+                note = note._replace(kind="clear", always=self._stopped)
+                self._stopped = False
+            self._add(note, _content(command))
             self._expect(note, note)
             return
         stream = self._streams.get(key)
@@ -158,9 +166,9 @@ class RecordMaker:
             known.limited += limited
             known.refused += not limited
             known.why = why
-            if known.count > 1:
+            if known.count > 1 and not known.ended:
                 return
-            known = known.first
+            known = known.last
         name = type(known.what).__name__
         note = Note(t, "outcome", known.actor, None, outcome.verdict.value, why)
         self._add(note, {"command": name, "ticket": ticket})
@@ -209,6 +217,7 @@ class RecordMaker:
         stream = self._streams.pop(key, None)
         if stream is None or stream.count == 1:
             return
+        stream.ended = True
         first, last = _content(stream.first.what), _content(stream.last.what)
         what = {
             "command": first.pop("command"),
@@ -291,12 +300,12 @@ def _source(actor: Actor | None) -> str:
 
 def _transfer(change: LeaseChange, by: Actor) -> tuple[dict[str, Any], str]:
     """Return the name of a change of holder, and its grounds."""
-    old, new = change.before.holder, change.after.holder
+    new = change.after.holder
     if new is None:
         if by is SERVER:
             return {"lease": "expired"}, "the holder was silent"
         return {"lease": "released"}, "holds the lease"
-    if old is None:
+    if change.before.driver is None:
         return {"lease": "acquired"}, "the lease was free"
     if new == by.person:
         return {"lease": "taken"}, "an admin may take the lease"

@@ -22,6 +22,9 @@ COLLECTING = 0.02
 TURN = 0.25
 """[s] Maximum time between two turns while a stream or a summary is open."""
 
+IDLE_TURN = 1.0
+"""[s] Maximum time between two turns otherwise, after which a problem of the writer is known."""
+
 CLOSE_TIMEOUT = 1.0
 """[s] Time for the last records at the end of the process."""
 
@@ -51,7 +54,7 @@ class RecordSender:
             while not closing:
                 notes: list[Note | None] = []
                 with suppress(Empty):
-                    notes.append(waiting.get(timeout=None if self._maker.is_idle else TURN))
+                    notes.append(waiting.get(timeout=IDLE_TURN if self._maker.is_idle else TURN))
                     while True:
                         notes.append(waiting.get_nowait())
                 closing = None in notes

@@ -135,7 +135,10 @@ class LogWriter:
 
     def _write(self, batch: list[Record], *, closing: bool) -> None:
         dropped, self._dropped = self._dropped, 0
-        free = max(MAX_KEPT - len(self._kept), 0) if self._failing is not None else len(batch)
+        free = len(batch)
+        if self._failing is not None:
+            # After a lost record every later one is lost until that is written: the order holds.
+            free = 0 if self._lost else max(MAX_KEPT - len(self._kept), 0)
         self._kept += batch[:free]
         self._lost += dropped + len(batch) - len(batch[:free])
         now = time.monotonic()
@@ -150,7 +153,10 @@ class LogWriter:
             self._fail(error)
         except Exception:
             log.exception("The event log met an error; it continues with the next record.")
-            self._kept.clear()
+            lost = record("lost", {"count": len(self._kept)}, why="The event log met an error.")
+            self._kept = deque([lost])
+            # The next record states again what was found when the log was opened.
+            self._folder.close()
         else:
             self._note_success(now)
 

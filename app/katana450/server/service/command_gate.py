@@ -63,8 +63,8 @@ class CommandGate:
         """Callback at each stop, before the arm gets it."""
         self.recorder = Recorder()
         """Notes commands, stops and changes of the lease for the event log."""
-        self.name_of: Callable[[StopCause], str | None] = lambda cause: cause.by
-        """Function that returns the display name of the participant that pressed STOP."""
+        self.presser_of: Callable[[StopCause], Actor | None] = lambda _: None
+        """Function that returns the participant that pressed STOP; None for another cause."""
         self._clear_by = clear_by
         self._presses = Presses()
         self._cleared = 0
@@ -87,6 +87,8 @@ class CommandGate:
                     granted, ticket = self._clear_stop(actor)
                 else:
                     granted = self._checked(command, actor)
+                    # What follows from the command later is void after a revocation.
+                    granted = replace(granted, seen=self.revocations)
                     ticket = self.present().deliver(command, granted)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
@@ -262,6 +264,8 @@ class CommandGate:
             self._note_pause()
             snapshot = arm.snapshot
             stopped = snapshot.state.stopped
+            if self.stopped is not None and stopped is not None:
+                self._note_other(stopped.cause)
             if snapshot.state.presses:
                 self._presses.counts(cmd.Stop(others=snapshot.state.presses))
             if self.stopped is not None:
@@ -272,9 +276,8 @@ class CommandGate:
                 if stopped is None and (sent is None or snapshot.ticket >= sent):
                     # The arm started after the stop, or an error undid the stop.
                     again = cmd.Stop(replace(self.stopped.cause, press=""))
-                    self.stopped = self._requested(
-                        self.stopped, again, arm, replace(SERVER, grounds=Grounds.SERVER)
-                    )
+                    ticket = arm.deliver(again, replace(SERVER, grounds=Grounds.SERVER))
+                    self.stopped = self.stopped.requested(ticket)
             elif stopped is not None and snapshot.ticket >= self._cleared:
                 # By the process of STOP, or by the arm's process itself.
                 self._adopt(stopped.cause, arm)
@@ -295,7 +298,7 @@ class CommandGate:
         cause = pressed(actor.name, actor.key, stop.cause.press, time.time())
         # A press that came by another path is in the state, even if its stop was cleared since.
         known = () if self.arm is None else self.arm.state.presses
-        if not self._presses.counts(stop) or cause.press in known:
+        if cause.press in known or not self._presses.counts(stop):
             return 0
         return self._stop(cause, actor)
 
@@ -309,38 +312,38 @@ class CommandGate:
             log.warning("Stopped: %s", cause.why)
         if self.arm is None:
             return 0
-        self.stopped = self._requested(self.stopped, cmd.Stop(cause), self.arm, actor)
+        self.stopped = self.stopped.requested(self.arm.deliver(cmd.Stop(cause), actor))
         return self.stopped.ticket or 0
 
     def _adopt(self, cause: StopCause, arm: ArmInterface) -> None:
         """Record a stop that the arm has executed and this gate has not sent."""
         self._revoke()
         self.on_stop()
-        record = StopRecord(self._named(cause))
-        log.warning("Stopped: %s", record.why)
-        actor = replace(SERVER, grounds=Grounds.SERVER)
-        self.recorder.stop(record.why, actor, first=True)
+        named, actor = self._named(cause)
+        log.warning("Stopped: %s", named.why)
+        self.recorder.stop(named.why, actor, first=True)
         # Sent too, because it ends what this process plans. The arm knows the press already.
-        self.stopped = self._requested(record, cmd.Stop(cause), arm, actor)
+        self.stopped = StopRecord(named).requested(arm.deliver(cmd.Stop(cause), actor))
+
+    def _note_other(self, cause: StopCause) -> None:
+        """Note for the event log a press that stopped the arm and did not pass this gate."""
+        if cause.press and not self._presses.is_known(cause.press):
+            named, actor = self._named(cause)
+            self.recorder.stop(named.why, actor, first=False)
 
     def _credit(self, cause: StopCause) -> None:
-        """Record the person whose STOP was the first that reached the arm, on another path."""
+        """Name the person whose STOP was the first that reached the arm, on another path."""
         assert self.stopped is not None
         if cause.by is not None and cause.press != self.stopped.cause.press:
-            self.stopped = replace(self.stopped, cause=self._named(cause))
+            self.stopped = replace(self.stopped, cause=self._named(cause)[0])
             log.warning("Stopped already: %s", self.stopped.why)
 
-    def _named(self, cause: StopCause) -> StopCause:
-        """Return ``cause`` with the display name of its presser."""
-        name = self.name_of(cause)
-        known = name is None or name == cause.by
-        return cause if known else pressed(str(name), cause.key, cause.press, cause.at)
-
-    @staticmethod
-    def _requested(
-        stopped: StopRecord, stop: cmd.Stop, arm: ArmInterface, actor: Actor
-    ) -> StopRecord:
-        return stopped.requested(arm.deliver(stop, actor))
+    def _named(self, cause: StopCause) -> tuple[StopCause, Actor]:
+        """Return ``cause`` with the display name of its presser, and the presser or the server."""
+        presser = self.presser_of(cause)
+        if presser is None:
+            return cause, replace(SERVER, grounds=Grounds.SERVER)
+        return pressed(presser.name, cause.key, cause.press, cause.at), presser
 
     def _clear_stop(self, actor: Actor) -> tuple[Actor, int]:
         """Clear the stop for ``actor``; return it with its grounds, and the ticket.

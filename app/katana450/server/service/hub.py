@@ -27,7 +27,7 @@ from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
 from katana450.server.service.mutes import MutedError
-from katana450.server.service.participants import Takeover, Window, key_of, session_of
+from katana450.server.service.participants import Takeover, Window, key_of, presser_of, session_of
 from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import Runner, guarded
@@ -63,7 +63,7 @@ class Hub:
         self.clock = clock
         self._hold_after = hold_after
         self.gate = CommandGate(clock, clear_by)
-        self.gate.name_of = self._name_of
+        self.gate.presser_of = self._presser_of
         self.stop_path = StopPath()
         self.event_log = EventLog()
         self.people = People(clock)
@@ -376,10 +376,14 @@ class Hub:
         """Return the person at ``page``, whether or not its control socket is open now."""
         return self._known(key_of(identity, page), identity)[0]
 
-    def _name_of(self, cause: StopCause) -> str | None:
-        """Return the display name of the page that pressed STOP on the port of STOP."""
-        known = self._remembered.get(cause.key)
-        return cause.by if known is None else known[0].name
+    def _presser_of(self, cause: StopCause) -> Actor | None:
+        """Return the participant that pressed STOP on the port of STOP; None for a watchdog."""
+        return presser_of(cause, self._known_people, links=self.people.links is not None)
+
+    @property
+    def _known_people(self) -> list[Person]:
+        # A copy: other threads add people.
+        return [person for person, _ in list(self._remembered.values())]
 
     def _known(self, key: str, identity: Identity) -> tuple[Person, int]:
         """Return person and number of the page of ``key``; a new page gets new ones."""
@@ -395,6 +399,6 @@ class Hub:
         self._numbers += 1
         number = self._numbers
         name = identity.name or f"Window {number}"
-        if any(person.name == name for person, _ in self._remembered.values()):
+        if any(person.name == name for person in self._known_people):
             name = f"{name} ({number})"
         return identity.person(key, name), number

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.lease import Person
+from katana450.arm.control.actor import Actor, CommandChannel, Grounds
+from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.stop_cause import StopCause
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 
@@ -49,6 +50,27 @@ class Takeover(NamedTuple):
 def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
     """Return ``identity`` as the actor of a command, without a window."""
     return Actor(identity.person(identity.session, identity.name or "Somebody"), channel)
+
+
+def presser_of(cause: StopCause, known: Iterable[Person], *, links: bool) -> Actor | None:
+    """Return the participant that pressed STOP on the port of STOP; None for a watchdog.
+
+    ``known``: participants of the main port, for what ``cause`` does not name. ``links``: whether
+    the server requires access links; the role of an unknown bearer is the least one.
+    """
+    if cause.by is None:
+        return None
+    session = session_of(cause.key)
+    channel = CommandChannel.HTTP if session == cause.key else CommandChannel.PAGE
+    role, link = (Role.VIEWER, session) if links else (Role.ADMIN, "")
+    person = Person(cause.key, cause.by, role, link)
+    for each in known:
+        if each.key == cause.key:
+            person = each
+            break
+        if session_of(each.key) == session:
+            person = replace(person, role=each.role)
+    return Actor(person, channel, grounds=Grounds.SAFETY)
 
 
 def key_of(identity: Identity, page: str) -> str:

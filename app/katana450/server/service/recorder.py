@@ -20,7 +20,8 @@ from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.errors import KatanaError
 
 MAX_WAITING = 4096
-"""Maximum number of notes that wait for their reader; more are counted and dropped."""
+"""Maximum number of notes that wait for their reader; more are counted and dropped, except those
+that are always kept."""
 
 REFUSED, ACCEPTED = Verdict.REFUSED.value, Verdict.ACCEPTED.value
 
@@ -36,7 +37,7 @@ class Note(NamedTuple):
         outcome: ``accepted`` or ``refused``, if known.
         why: reason in words.
         ticket: ticket of a command; 0 without one.
-        always: whether the record is written whatever the limits.
+        always: whether the note is kept and its record written, whatever the limits.
     """
 
     t: float
@@ -74,10 +75,10 @@ class Recorder:
         self._now = MonotonicClock().now
 
     def note(self, kind: str, actor: Actor | None, what: Any = None, **more: Any) -> None:
-        """Note an event of ``kind``. ``more``: further fields of ``Note``."""
+        """Note an event of ``kind``, or count it as lost. ``more``: further fields of ``Note``."""
         if not self.enabled:
             return
-        if self.notes.qsize() < MAX_WAITING:
+        if more.get("always") or self.notes.qsize() < MAX_WAITING:
             self.notes.put(Note(self._now(), kind, actor, what, **more))
         else:
             self.lost += 1
