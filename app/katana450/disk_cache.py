@@ -15,7 +15,6 @@ import hashlib
 import io
 import os
 import pickle
-import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
@@ -27,7 +26,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from katana450.platform_support import cache_folder
+from katana450.platform_support import cache_folder, only_this_user_writes
 
 T = TypeVar("T")
 
@@ -98,15 +97,10 @@ def _folder() -> Path | None:
     folder = cache_folder() / "katana450"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = folder.stat()
+        # Loading a file may run code, so the files must come from this user alone.
+        return folder if only_this_user_writes(folder) else None
     except OSError:
         return None
-    # Loading a file may run code, so the files must come from this user alone.
-    if sys.platform != "win32" and (
-        found.st_uid != os.getuid() or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    ):
-        return None
-    return folder
 
 
 def _loaded(data: bytes) -> Any:

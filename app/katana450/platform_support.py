@@ -205,6 +205,19 @@ def cache_folder() -> Path:
         return Path(named) if Path(named).is_absolute() else Path.home() / ".cache"
 
 
+def only_this_user_writes(folder: Path) -> bool:
+    """Return whether ``folder`` is this user's and nobody else may write to it.
+
+    On Windows the folders of a user are protected by inheritance, and the answer is always true.
+    Raises OSError if it is missing.
+    """
+    found = folder.stat()
+    if sys.platform == "win32":
+        return True
+    others = stat.S_IWGRP | stat.S_IWOTH
+    return found.st_uid == os.getuid() and not found.st_mode & others
+
+
 def _set_priority_class(priority: int) -> None:
     if sys.platform == "win32":
         kernel = ctypes.windll.kernel32

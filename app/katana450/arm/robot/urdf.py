@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.arm.robot.visual import GREY, Color, Primitive, Visual, mesh_file
+from katana450.arm.robot.visual import GREY, Color, PrimitiveShape, Visual, mesh_file
 from katana450.disk_cache import kept
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
@@ -183,16 +183,16 @@ def _visual(
 ) -> Visual | None:
     """Return the shape of a visual or collision; None for a missing file, added to ``missing``."""
     geometry, scale = shape.geometry, np.ones(3)
-    source: Path | Primitive
+    source: Path | PrimitiveShape
     if geometry.box is not None:
-        source = Primitive("box", {"extents": geometry.box.size})
+        source = PrimitiveShape("box", {"extents": geometry.box.size})
     elif geometry.cylinder is not None:
-        source = Primitive(
+        source = PrimitiveShape(
             "cylinder",
             {"radius": geometry.cylinder.radius, "height": geometry.cylinder.length},
         )
     elif geometry.sphere is not None:
-        source = Primitive("icosphere", {"subdivisions": 3, "radius": geometry.sphere.radius})
+        source = PrimitiveShape("icosphere", {"subdivisions": 3, "radius": geometry.sphere.radius})
     else:
         source = mesh_file(geometry.mesh.filename, folder)
         if not source.is_file():

@@ -35,7 +35,7 @@ SINGLE_FILES = (".glb", ".ply", ".stl")
 
 
 @dataclass(frozen=True, eq=False)
-class Primitive:
+class PrimitiveShape:
     """A shape that is made on demand, because most robots are read only for their joints.
 
     Attributes:
@@ -66,7 +66,7 @@ class Visual:
 
     T_body_visual: FloatArray
     scale: FloatArray
-    source: Path | Primitive | Callable[[], Any]
+    source: Path | PrimitiveShape | Callable[[], Any]
     colour: Color = GREY
 
     @property
@@ -89,7 +89,7 @@ class Visual:
                 mesh = trimesh.load_scene(self.source).to_mesh()
             except Exception as error:
                 raise unreadable_mesh(self.source) from error
-        elif isinstance(self.source, Primitive):
+        elif isinstance(self.source, PrimitiveShape):
             mesh = self.source.mesh()
         else:
             mesh = self.source()
@@ -127,7 +127,7 @@ def rods(ends: Sequence[FloatArray]) -> tuple[Visual, ...]:
         Visual(
             frozen(np.eye(4)),
             frozen(np.ones(3)),
-            Primitive("cylinder", {"radius": ROD_RADIUS, "segment": [np.zeros(3), end]}),
+            PrimitiveShape("cylinder", {"radius": ROD_RADIUS, "segment": [np.zeros(3), end]}),
         )
         for end in ends
         if float(np.linalg.norm(end)) > ROD_LENGTH
