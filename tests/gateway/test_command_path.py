@@ -55,6 +55,16 @@ def placed(heard: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [m for m in heard if m["type"] == "SetPositionMessage" and m["name"] == HANDLE]
 
 
+async def noted(watcher: AsyncClient, reason: str, who: str, command: str) -> Any:
+    """Return the event of these values; the list is read at intervals, so it may come late."""
+    async with asyncio.timeout(10.0):
+        while True:
+            for line in (await watcher.query(answers.EventLog)).lines:
+                if (line.finding.reason, line.who, line.command) == (reason, who, command):
+                    return line
+            await asyncio.sleep(0.05)
+
+
 async def at_rest(watcher: AsyncClient, after: int = 0) -> answers.State:
     """Return the state once the arm rests and more than ``after`` commands were given."""
     async with asyncio.timeout(20.0):
@@ -192,18 +202,14 @@ def test_first_control_used_acquires_the_free_lease_and_is_logged(
             await control.wait(mine=True)
             name = control.status["name"]
             await at_rest(watcher)
-            log = await watcher.query(answers.EventLog)
-            line = next(each for each in log.lines[::-1] if each.finding.reason == "out of reach")
-            assert (line.who, line.command) == (name, "MoveTool")
+            line = await noted(watcher, "out of reach", name, "MoveTool")
             assert line.grounds == "took the free lease"
             assert f"{name} (scene, took the free lease), MoveTool: " in server.output
             await end(peer)
             await peer.set("Axis 1", value=12.5)
             await control.say("stop")
             await control.wait(stop="confirmed")
-            log = await watcher.query(answers.EventLog)
-            line = next(each for each in log.lines[::-1] if each.finding.reason == "stopped")
-            assert (line.who, line.command) == (name, "Stop")
+            line = await noted(watcher, "stopped", name, "Stop")
             assert line.grounds == "anybody may stop the arm"
             await control.clear_stop()
             await control.say("release_lease")

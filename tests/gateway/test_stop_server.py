@@ -119,6 +119,35 @@ def test_press_that_finds_the_arm_running_is_never_delayed(port: Port) -> None:
     asyncio.run(act())
 
 
+def test_delayed_press_counts_once_the_stop_is_cleared(
+    port: Port, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_server, "RATE", 0.0)
+
+    async def act() -> None:
+        port.link.status = STOPPED
+        await exhaust(port, port.vera)
+        monkeypatch.setattr(stop_server, "DELAY", 0.05)
+        sent = len(port.sent)
+        press = asyncio.create_task(port.stop(port.vera, "three"))
+        await asyncio.sleep(0.0)
+        port.link.status = RUNS
+        assert await press == (202, "requested")
+        assert port.sent[sent:] == ["three"]
+
+    asyncio.run(act())
+
+
+def test_repeated_press_whose_stop_was_cleared_is_not_requested_again(port: Port) -> None:
+    async def act() -> None:
+        port.link.status = StopStatus(None, ("two",))
+        assert await port.stop(port.vera, "two") == (200, "cleared")
+        assert port.sent == []
+        assert await port.stop(port.vera, "three") == (202, "requested")
+
+    asyncio.run(act())
+
+
 def test_old_status_confirms_nothing(port: Port) -> None:
     async def act() -> None:
         port.link.status, port.link.age = STOPPED, NO_STATE

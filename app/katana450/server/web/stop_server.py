@@ -212,14 +212,16 @@ class StopServer:
         channel = CommandChannel.PAGE if from_page else CommandChannel.HTTP
         actor = Actor(Person(key, name, identity.role), channel, None, Grounds.SAFETY)
         cause = pressed(name, key, press, time.time())
-        stopped, executed = None, False
-        if link.status is not None and link.age < NO_STATE:
-            stopped, executed = link.status.stopped, press in link.status.presses
-        known = self._authenticator.requires_link
-        who = identity.session if known else _address_of(client)
+        who = identity.session if self._authenticator.requires_link else _address_of(client)
+        stopped, executed = self._present(press)
         if stopped is not None and not self._takes(who):
             await asyncio.sleep(DELAY)
-            return _stop_reply(stopped)
+            stopped, executed = self._present(press)
+            # If the stop was cleared meanwhile, this press counts.
+            if stopped is not None:
+                return _stop_reply(stopped)
+        if stopped is None and executed:
+            return _answer("cleared", "This press stopped the arm; that stop was cleared since.")
         drives = link.status is not None and identity.session in link.status.drivers
         if identity.muted is not None and not drives and not executed:
             if stopped is not None:
@@ -243,6 +245,16 @@ class StopServer:
                 self._kept -= kept
         return _stop_reply(stopped)
 
+    def _present(self, press: str) -> tuple[StopCause | None, bool]:
+        """Return the present stop, and whether the arm has executed ``press``.
+
+        (None, False) while the arm's process does not answer.
+        """
+        status = self._link.status
+        if status is None or self._link.age >= NO_STATE:
+            return None, False
+        return status.stopped, press in status.presses
+
     def _health(self) -> Reply:
         link = self._link
         if link.status is None:
@@ -256,12 +268,14 @@ class StopServer:
 
 def _stop_reply(stopped: StopCause | None) -> Reply:
     """Return the answer to a STOP: confirmed by a stop of the arm, or only requested."""
-    answer = {
-        "stop": "requested" if stopped is None else "confirmed",
-        "why": "" if stopped is None else stopped.why,
-    }
-    status = HTTPStatus.ACCEPTED if stopped is None else HTTPStatus.OK
-    return Reply(status, json.dumps(answer).encode() + b"\n", "application/json")
+    return _answer("requested", "") if stopped is None else _answer("confirmed", stopped.why)
+
+
+def _answer(stage: str, why: str) -> Reply:
+    status = HTTPStatus.ACCEPTED if stage == "requested" else HTTPStatus.OK
+    return Reply(
+        status, json.dumps({"stop": stage, "why": why}).encode() + b"\n", "application/json"
+    )
 
 
 def _address_of(client: tuple[str, int] | None) -> str:
