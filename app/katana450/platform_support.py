@@ -214,8 +214,9 @@ def only_this_user_writes(folder: Path) -> bool:
     found = folder.stat()
     if sys.platform == "win32":
         return True
-    others = stat.S_IWGRP | stat.S_IWOTH
-    return found.st_uid == os.getuid() and not found.st_mode & others
+    else:  # noqa: RET505 - so that mypy follows either system
+        others = stat.S_IWGRP | stat.S_IWOTH
+        return found.st_uid == os.getuid() and not found.st_mode & others
 
 
 def _set_priority_class(priority: int) -> None:
