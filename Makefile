@@ -9,12 +9,12 @@ dev_ok  := $(VENV)/.dev-ready
 js_ok   := $(VENV)/.js-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
-servers := tests/gateway tests/event_log tests/extensions tests/cli/test_serve.py tests/robot/test_other_arms.py \
-           tests/docs tests/examples tests/library/test_run.py
-heavy   := tests/control tests/kinematics tests/robot_description tests/collision tests/planning tests/robot \
-           tests/water tests/motion tests/geometry tests/exchange tests/packaging
+servers := tests/gateway tests/event_log tests/extensions tests/cli/test_serve.py
+# Some of these run servers too; they follow the browser to make both rows equally long.
+commands := tests/robot/test_other_arms.py tests/docs tests/examples tests/library/test_run.py
 lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
-patient := nice -n 5 $(bin)/python -m pytest
+# Linux shares a processor among sessions first, so the priority is that of a session of its own.
+lowest  := $(shell command -v setsid) sh -c 'echo 19 2> /dev/null > /proc/self/autogroup; exec nice -n 19 "$$@"' sh
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 javascript := tests/javascript
@@ -54,19 +54,20 @@ octave: $(dev_ok)             ## find GNU Octave, or install it where that can b
 exchange: $(dev_ok)           ## find the programs that read our exports, or install them
 	$(bin)/python tests/exchange/tools.py
 
-# Two at once, as many as there are cores: those that drive a browser, and beside them those that run
-# servers; after each of them a share of those that only compute, which give way to the others. A
-# browser or server that was starved of time meanwhile is tried once more when nothing else runs.
+# Three at once: those that drive a browser, those that run servers, and at the lowest priority those that
+# only compute, in the time that the others leave. A test that fails, as it may be starved of time, is tried
+# once more when nothing else runs.
 tests: $(dev_ok)
 	@# Once, for the hundreds of processes that are started.
 	@$(bin)/python -m compileall -q app/katana450 robot_description
 	@rm -rf $(VENV)/again*
-	@( $(lane)-servers $(servers) > $(VENV)/servers.log 2>&1 || echo servers >> $(VENV)/again; \
-	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) \
-	      > $(VENV)/computed.log 2>&1 ) & beside=$$!; \
-	  $(lane)-browser $(browser) || echo browser >> $(VENV)/again; \
-	  $(patient) $(heavy) $(servers:%=--ignore=%); status=$$?; \
-	  wait $$beside || status=1; cat $(VENV)/servers.log $(VENV)/computed.log; \
+	@$(lane)-servers $(servers) > $(VENV)/servers.log 2>&1 & servers=$$!; \
+	  $(lowest) $(lane)-computed $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(commands:%=--ignore=%) \
+	    > $(VENV)/computed.log 2>&1 & computed=$$!; \
+	  trap 'kill $$servers $$computed 2> /dev/null' EXIT; trap 'exit 130' INT TERM; status=0; \
+	  $(lane)-browser $(browser) $(commands) || echo browser >> $(VENV)/again; \
+	  wait $$servers || echo servers >> $(VENV)/again; cat $(VENV)/servers.log; \
+	  wait $$computed || echo computed >> $(VENV)/again; cat $(VENV)/computed.log; \
 	  for which in $$(cat $(VENV)/again 2> $(VENV)/again-none); do \
 	    $(lane)-$$which --last-failed --last-failed-no-failures none || status=1; done; \
 	  exit $$status
