@@ -109,7 +109,7 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     status, _, body = ask(f"{server.url}/api/v1/branches")
     assert status == 409
     assert "Only its joints" in json.loads(body)["why"]
-    with pytest.raises(RefusedError, match=f"axis {robot.joint_group.n + 1}: this mechanism has"):
+    with pytest.raises(RefusedError, match=f"no axis {robot.joint_group.n + 1}: the robot has"):
         program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
     with pytest.raises(RefusedError, match="driven joints, but the command has 2"):
         program.ask(requests.Joints(q=[0.0, 0.0]))
