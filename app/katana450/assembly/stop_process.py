@@ -11,6 +11,7 @@ import gc
 import socket
 import time
 from dataclasses import dataclass
+from functools import partial
 
 from katana450.arm.runtime.arm_listener import STOP, ArmAddress, Greeting, connect_when_ready
 from katana450.arm.runtime.stop_link import StopLink
@@ -19,6 +20,7 @@ from katana450.assembly.supervised import READY, SupervisorLink
 from katana450.platform_support import raise_priority
 from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
 from katana450.server.web.authenticator import Authenticator
+from katana450.server.web.stop_connection import StopConnection
 from katana450.server.web.stop_server import StopServer
 from katana450.settings import Settings
 
@@ -62,7 +64,7 @@ async def _serve(config: StopConfig, supervisor: SupervisorLink) -> None:
     acceptor = Acceptor(listening)
     authenticator = Authenticator(access, config.main_port, address)
     server = StopServer(link, authenticator, address, config.main_port, acceptor)
-    acceptor.start(server.protocol, tls)
+    acceptor.start(partial(StopConnection, server), tls)
     # Exempt all present objects from garbage collection, which would delay STOP.
     gc.collect()
     gc.freeze()

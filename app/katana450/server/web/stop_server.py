@@ -1,8 +1,9 @@
 """Server of STOP alone, in a process that shares nothing with the web server.
 
-It accepts ``POST /stop`` of pages, ``POST /api/v1/stop`` of programs, and ``GET /health``. Each
-connection carries one request. STOP is passed to the arm's process at once. The only file that it
-needs is the access file: each STOP does a ``stat`` of it, and reads it after a change.
+It accepts ``POST /stop`` of pages, ``POST /api/v1/stop`` of programs, ``hello`` and ``stop`` as two
+JSON lines, and ``GET /health``. Each connection carries one request. STOP is passed to the arm's
+process at once. The only file that it needs is the access file: each STOP does a ``stat`` of it,
+and reads it after a change.
 """
 
 from __future__ import annotations
@@ -13,23 +14,26 @@ import logging
 import math
 import secrets
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from http import HTTPStatus
-from typing import NamedTuple, Protocol, cast
+from typing import NamedTuple, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 import h11
+import msgspec
 
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Person
 from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
+from katana450.errors import InputError
 from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
+from katana450.server.api.requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.mutes import MutedError, Mutes
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.authenticator import Address, Authenticator
+from katana450.server.web.authenticator import TOKEN_REQUIRED, Address, Authenticator
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -51,18 +55,7 @@ DELAY = 0.2
 MAX_KEPT = 32
 """Maximum number of connections that wait for a confirmation and are not closed for others."""
 
-MAX_HEAD_BYTES = 8192
-"""Maximum size of a request without its body [bytes]."""
-
-LINGER = 0.5
-"""[s] Time in which the body of an answered request is received, and dropped."""
-
-HEADERS = (
-    ("cache-control", "no-store"),
-    ("connection", "close"),
-    ("referrer-policy", "no-referrer"),
-    ("x-content-type-options", "nosniff"),
-)
+LINES_HELP = 'Send {"do": "hello", "name": "..."} and {"do": "stop"}, each on a line of its own.'
 
 
 class Link(Protocol):
@@ -116,10 +109,6 @@ class StopServer:
         if self._link.status is not None:
             self._mutes.follow(self._link.status.stopped)
 
-    def protocol(self) -> asyncio.Protocol:
-        """Return the protocol of a new connection."""
-        return _StopConnection(self)
-
     async def reply(self, request: h11.Request, client: tuple[str, int] | None) -> Reply:
         """Execute ``request`` of ``client`` and return its response."""
         headers = {name.decode("latin-1"): text.decode("latin-1") for name, text in request.headers}
@@ -135,8 +124,28 @@ class StopServer:
             refused = Reply(HTTPStatus.UNAUTHORIZED, b"Sign in at the start page, or send a token.")
             return await self.delayed(_readable_by(origin, refused), client)
         asked = {name: values[0] for name, values in parse_qs(query).items()}
-        reply = await self._stop(path, identity, asked, client)
-        return _readable_by(origin, reply)
+        press = asked.get("press", "")[:MAX_PRESS_LENGTH]
+        page = asked.get("page", "") if path == STOP_PATHS[0] else ""
+        channel = CommandChannel.PAGE if path == STOP_PATHS[0] else CommandChannel.HTTP
+        return _readable_by(origin, await self._stop(identity, channel, press, client, page))
+
+    async def reply_to_lines(self, lines: Sequence[bytes], client: tuple[str, int] | None) -> Reply:
+        """Execute a ``hello`` and a ``stop``, the two ``lines`` of ``client``."""
+        try:
+            if len(lines) < 2:
+                raise InputError("one of them is too long")
+            hello = msgspec.json.decode(lines[0], type=Hello)
+            stop = msgspec.json.decode(lines[1], type=Stop)
+        except (InputError, msgspec.DecodeError, UnicodeDecodeError) as error:
+            why = f"The two lines cannot be read: {str(error).rstrip('.')}. {LINES_HELP}"
+            return await self.delayed(_refused_line(why), client)
+        token = f"Bearer {hello.token}"
+        identity = self._authenticator.program(hello.name, token, {}, stopping=True)
+        if identity is None:
+            return await self.delayed(_refused_line(TOKEN_REQUIRED), client)
+        reply = await self._stop(identity, CommandChannel.TCP, stop.press or "", client)
+        # A refusal over HTTP is plain text.
+        return reply if reply.body.startswith(b"{") else _refused_line(reply.body.decode())
 
     async def delayed(self, reply: Reply, client: tuple[str, int] | None) -> Reply:
         """Return the refusal ``reply``, after ``DELAY`` if ``client`` gets too many."""
@@ -196,20 +205,20 @@ class StopServer:
 
     async def _stop(
         self,
-        path: str,
         identity: Identity,
-        asked: Mapping[str, str],
+        channel: CommandChannel,
+        press: str,
         client: tuple[str, int] | None,
+        page: str = "",
     ) -> Reply:
-        """Send STOP to the arm, and return whether a state has confirmed it."""
+        """Send STOP to the arm, and return whether a state has confirmed it.
+
+        ``press``: empty for a new press. ``page``: the page that sends it; empty for a program.
+        """
         link = self._link
-        key, page = identity.session, asked.get("page", "")
-        from_page = path == STOP_PATHS[0]
-        if from_page and PAGE.fullmatch(page):
-            key = f"{key}/{page}"
+        key = f"{identity.session}/{page}" if PAGE.fullmatch(page) else identity.session
         name = identity.name or "Somebody"
-        press = asked.get("press", "")[:MAX_PRESS_LENGTH] or secrets.token_urlsafe(16)
-        channel = CommandChannel.PAGE if from_page else CommandChannel.HTTP
+        press = press or secrets.token_urlsafe(16)
         actor = Actor(Person(key, name, identity.role), channel, None, Grounds.SAFETY)
         cause = pressed(name, key, press, time.time())
         who = identity.session if self._authenticator.requires_link else _address_of(client)
@@ -278,6 +287,11 @@ def _answer(stage: str, why: str) -> Reply:
     )
 
 
+def _refused_line(why: str) -> Reply:
+    body = json.dumps({"stop": "refused", "why": why}).encode() + b"\n"
+    return Reply(HTTPStatus.BAD_REQUEST, body, "application/json")
+
+
 def _address_of(client: tuple[str, int] | None) -> str:
     return "" if client is None else client[0]
 
@@ -292,68 +306,3 @@ def _readable_by(origin: str | None, reply: Reply) -> Reply:
         ("vary", "Origin"),
     )
     return reply._replace(headers=(*reply.headers, *more))
-
-
-class _StopConnection(asyncio.Protocol):
-    """One connection, which is closed after the answer to its first request."""
-
-    def __init__(self, server: StopServer) -> None:
-        self._server = server
-        self._http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEAD_BYTES)
-        self._task: asyncio.Task[None] | None = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.Transport, transport)
-
-    def data_received(self, data: bytes) -> None:
-        if self._task is not None:
-            return
-        try:
-            self._http.receive_data(data)
-            event = self._http.next_event()
-        except h11.RemoteProtocolError:
-            refused = Reply(HTTPStatus.BAD_REQUEST, b"This is no valid HTTP request.")
-            self._task = asyncio.create_task(self._refuse(refused))
-            return
-        if isinstance(event, h11.Request):
-            self._task = asyncio.create_task(self._handle(event))
-
-    @property
-    def _client(self) -> tuple[str, int] | None:
-        """Address and port of the sender; None once the connection is closed."""
-        peer = self._transport.get_extra_info("peername")
-        return None if peer is None else (peer[0], peer[1])
-
-    async def _refuse(self, reply: Reply) -> None:
-        self._send(await self._server.delayed(reply, self._client))
-        self._transport.close()
-
-    async def _handle(self, request: h11.Request) -> None:
-        try:
-            reply = await self._server.reply(request, self._client)
-        except Exception:
-            log.exception("A request on the port of STOP met an error.")
-            reply = Reply(HTTPStatus.INTERNAL_SERVER_ERROR, b"See the log of the server.")
-        self._send(reply)
-        lengths = {text for name, text in request.headers if name == b"content-length"}
-        if lengths <= {b"0"} and not any(
-            name == b"transfer-encoding" for name, _ in request.headers
-        ):
-            self._transport.close()
-        else:
-            # Closed at once, the unread body would reset the connection before the answer is read.
-            asyncio.get_running_loop().call_later(LINGER, self._transport.close)
-
-    def _send(self, reply: Reply) -> None:
-        # A STOP counts even if its sender is gone before the answer.
-        if self._transport.is_closing():
-            return
-        length = ("content-length", str(len(reply.body)))
-        headers = (*HEADERS, ("content-type", reply.media_type), length, *reply.headers)
-        response = h11.Response(
-            status_code=reply.status,
-            reason=HTTPStatus(reply.status).phrase,
-            headers=[(name, value) for name, value in headers],
-        )
-        for event in (response, h11.Data(data=reply.body), h11.EndOfMessage()):
-            self._transport.write(self._http.send(event) or b"")

@@ -1,0 +1,90 @@
+"""Test STOP as two JSON lines on the port of STOP, with a real server."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from katana450.arm.control.lease import Role
+from katana450.client import connect
+from katana450.server.api import answers, requests
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.stop_connection import MAX_HEAD_BYTES
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import HOUR
+from tests.gateway.test_isolation import under_way
+
+HELLO = b'{"do": "hello", "name": "Cell"}\n'
+STOP = b'{"do": "stop"}\n'
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+def answer(server: AppServer, *parts: bytes) -> dict[str, str]:
+    """Send ``parts`` one after the other; return the answer before the connection is closed."""
+    host, port = server.stop_url.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port)), timeout=10.0) as line:
+        for part in parts:
+            line.sendall(part)
+            time.sleep(0.05)
+        with line.makefile("rb") as stream:
+            found: dict[str, str] = json.loads(stream.readline())
+            assert stream.read() == b""
+    return found
+
+
+def test_two_lines_stop_a_moving_arm(server: AppServer) -> None:
+    with connect(server.url, "Driver") as program:
+        under_way(program)
+        confirmed = {"stop": "confirmed", "why": "Cell pressed STOP."}
+        # Cut anywhere, as TCP may do.
+        assert answer(server, HELLO[:9], HELLO[9:] + STOP[:3], STOP[3:]) == confirmed
+        assert program.query(answers.State).stopped == "Cell pressed STOP."
+        lines = program.query(answers.EventLog).lines
+        assert any((line.who, line.command) == ("Cell", "Stop") for line in lines)
+        program.clear_stop()
+        program.ask(requests.ReleaseLease())
+
+
+@pytest.mark.parametrize(
+    ("lines", "why"),
+    [
+        (HELLO + HELLO, "hello"),
+        (STOP + HELLO, "stop"),
+        (b'{"do": "hello"}\n' + STOP, "name"),
+        (b"{\n{\n", "truncated"),
+        (b'{"do": "hello", "name": "\xff"}\n' + STOP, "utf-8"),
+        (HELLO + b'{"do": "stop", "press": 1}\n', "press"),
+        (b"{" + MAX_HEAD_BYTES * b" ", "too long"),
+    ],
+)
+def test_other_lines_are_refused_and_stop_nothing(
+    server: AppServer, lines: bytes, why: str
+) -> None:
+    refused = answer(server, lines)
+    assert refused["stop"] == "refused"
+    assert why in refused["why"]
+    assert '{"do": "stop"}' in refused["why"]
+    with connect(server.url, "Watcher") as program:
+        assert program.query(answers.State).stopped is None
+
+
+def test_lines_need_a_token_where_pages_need_one(tmp_path: Path) -> None:
+    path = tmp_path / "access.json"
+    token = AccessFile.create(path).give("Vera", Role.VIEWER, time.time() + HOUR)
+    with AppServer((*APP, "--access", str(path))) as server:
+        assert answer(server, HELLO, STOP) == {
+            "stop": "refused",
+            "why": "A token is required. `katana450 access give` makes one.",
+        }
+        hello = json.dumps({"do": "hello", "name": "Cell", "token": token}).encode()
+        assert answer(server, hello + b"\n", STOP)["stop"] == "confirmed"
