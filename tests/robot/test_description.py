@@ -24,8 +24,12 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ('xyz="0.05 0.0 0.15"', 'xyz="${a} 0 0"', r"line \d+: this is xacro, .* xacro arm.urdf >"),
-        ('<link name="base"/>', '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/>', "is xacro"),
+        ('xyz="0.05 0.0 0.15"', 'xyz="${a} 0 0"', r"line \d+: .* 'a' is not defined"),
+        (
+            '<link name="base"/>',
+            '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/>',
+            "unknown macro name",
+        ),
         (
             'xyz="0.05 0.0 0.15"',
             'xyz="0.05 0.0"',
