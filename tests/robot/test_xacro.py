@@ -140,6 +140,14 @@ def test_a_file_without_the_suffix_is_expanded_too(tmp_path: Path) -> None:
     assert load(path).require_arm().chain.n == 5
 
 
+def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
+    (tmp_path / "width.xacro").write_text(OPEN + '<property name="far" value="0.2"/></robot>')
+    path = templated(tmp_path, '<include filename="width.xacro"/>')
+    text = path.read_text().replace('xyz="0.05 0.0 0.15"', 'xyz="${far / 4} 0 0.15"')
+    path.write_text(text)
+    assert load(path).require_arm().chain.n == 5
+
+
 @pytest.mark.parametrize(
     ("line", "expected"),
     [

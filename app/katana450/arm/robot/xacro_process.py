@@ -26,6 +26,10 @@ from katana450.platform_support import limit_resources
 HIDDEN = ("type", "vars")
 """Functions of the namespace ``python`` that lead from a value to other code."""
 
+LEGACY = ("include", "macro", "property")
+"""Elements of xacro that older files have at their top without its prefix; a URDF has none there.
+"""
+
 ENDLESS = "its macros, properties or includes contain themselves"
 
 
@@ -45,6 +49,8 @@ class Expansion:
         """Text in the line at fault."""
         for name in HIDDEN:
             dict.pop(xacro._global_symbols["python"], name)
+        self._parse = xacro.parse
+        xacro.parse = self._parsed
         xacro.safe_eval = self._value
         # Without this entry `eval` in that module is Python's.
         vars(substitution_args)["eval"] = self._value
@@ -63,6 +69,14 @@ class Expansion:
         if len(urdf) > MAX_BYTES:
             return self._fault(_FaultError(f"the result has more than {MAX_BYTES:,} characters"))
         return {"urdf": urdf}
+
+    def _parsed(self, source: object, name: str | None = None) -> Any:
+        """Return the document of a file, with the prefix of xacro where older files omit it."""
+        document = self._parse(source, name)
+        for node in document.documentElement.childNodes:
+            if node.nodeName in LEGACY:
+                node.tagName = node.nodeName = f"xacro:{node.nodeName}"
+        return document
 
     def _value(
         self, text: str, symbols: dict[str, Any], names: Mapping[str, Any] | None = None
