@@ -10,7 +10,7 @@ from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import RobotDescriptionError
 from katana450.settings import Settings
-from tests.robot.public_arms import PX150, urdf, written
+from tests.robot.public_arms import PX150, J, urdf, written
 
 
 def edited(tmp_path: Path, old: str, new: str) -> Path:
@@ -97,3 +97,12 @@ def test_a_fault_that_only_the_reader_finds_is_reported_plainly(
     ) as raised:
         load(path)
     assert "list.remove" not in str(raised.value)
+
+
+def test_a_ring_of_followers_names_the_joint_that_is_followed(tmp_path: Path) -> None:
+    jaws = [
+        J(name, "prismatic", "base", f"{name}_link", mimic=(other, 1.0))
+        for name, other in (("left", "right"), ("right", "left"))
+    ]
+    (fault, _) = load(written(tmp_path, "arm", [*PX150, *jaws])).faults
+    assert fault.startswith("Joint 'left' of arm.urdf mimics 'right', which follows no driven")
