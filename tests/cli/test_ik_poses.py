@@ -83,8 +83,8 @@ BAD = [
     ({"p": [0.3, 0.0, 0.1], "pitch": None, "roll": 0.0}, "pitch is null"),
     ({"p": [0.3, 0.0], "rpy": [0, 0, 0]}, "p "),
     ({"p": [0.3, 0.0, True], "rpy": [0, 0, 0]}, "p[2] is true"),
-    ({"p": [0.3, 0.0, 0.1], "wxyz": [2, 0, 0, 0]}, "length 2"),
-    ({"p": [0.3, 0.0, 0.1], "wxyz": [0, 0, 0, 0]}, "length"),
+    ({"p": [0.3, 0.0, 0.1], "wxyz": [2, 0, 0, 0]}, "the length 2,"),
+    ({"p": [0.3, 0.0, 0.1], "wxyz": [0, 0, 0, 0]}, "the length 0,"),
     ({"T": np.eye(4).tolist(), "p": [0, 0, 0]}, "A pose is T, or p with one orientation"),
 ]
 

@@ -349,8 +349,8 @@ NO_MESH = MESH.format("no.stl")
     ("text", "said"),
     [
         ("", "is not a robot description"),
-        ("<robot/>", "not a named robot"),
-        ('<other name="x"/>', "not a named robot"),
+        ("<robot/>", "its <robot> has no name"),
+        ('<other name="x"/>', "is <other>, not <robot>"),
         (f'<robot name="x"><link name="a">{NO_MESH}</link></robot>', "no mesh at .*no.stl"),
     ],
 )

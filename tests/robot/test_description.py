@@ -10,7 +10,7 @@ from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import RobotDescriptionError
 from katana450.settings import Settings
-from tests.robot.public_arms import PX150, urdf, written
+from tests.robot.public_arms import PX150, J, urdf, written
 
 
 def edited(tmp_path: Path, old: str, new: str) -> Path:
@@ -24,8 +24,12 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ('xyz="0.05 0.0 0.15"', 'xyz="${a} 0 0"', r"line \d+: this is xacro, .* xacro arm.urdf >"),
-        ('<link name="base"/>', '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/>', "is xacro"),
+        ('xyz="0.05 0.0 0.15"', 'xyz="${a} 0 0"', r"line \d+: .* 'a' is not defined"),
+        (
+            '<link name="base"/>',
+            '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/>',
+            "unknown macro name",
+        ),
         (
             'xyz="0.05 0.0 0.15"',
             'xyz="0.05 0.0"',
@@ -93,3 +97,12 @@ def test_a_fault_that_only_the_reader_finds_is_reported_plainly(
     ) as raised:
         load(path)
     assert "list.remove" not in str(raised.value)
+
+
+def test_a_ring_of_followers_names_the_joint_that_is_followed(tmp_path: Path) -> None:
+    jaws = [
+        J(name, "prismatic", "base", f"{name}_link", mimic=(other, 1.0))
+        for name, other in (("left", "right"), ("right", "left"))
+    ]
+    (fault, _) = load(written(tmp_path, "arm", [*PX150, *jaws])).faults
+    assert fault.startswith("Joint 'left' of arm.urdf mimics 'right', which follows no driven")

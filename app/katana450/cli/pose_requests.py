@@ -82,10 +82,11 @@ def _rotation(request: Mapping[str, Any], key: str) -> tuple[FloatArray, float]:
         roll, pitch, yaw = finite_array(numbers(request, key, 1), (3,), key).tolist()
         return so3.from_rpy(roll, pitch, yaw), 0.0
     q = finite_array(numbers(request, key, 1), (4,), key)
-    misfit = abs(math.hypot(*q.tolist()) - 1.0)
+    length = math.hypot(*q.tolist())
+    misfit = abs(length - 1.0)
     if misfit > MAX_QUATERNION_MISFIT:
         raise InputError(
-            f"{key} has the length {1.0 + misfit:.3g} or its inverse, but a rotation has the "
-            f"length 1 (allowed: {MAX_QUATERNION_MISFIT:g} off)."
+            f"{key} has the length {length:.4g}, but a rotation has the length 1 "
+            f"(allowed: {MAX_QUATERNION_MISFIT:g} off)."
         )
     return so3.from_quaternion(q[list(QUATERNIONS[key])]), misfit

@@ -10,10 +10,14 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
+from katana450.arm.robot.xacro_file import expanded
 from katana450.errors import RobotDescriptionError
 
-XACRO = re.compile(r"^https?://(www\.)?ros\.org/(wiki/)?xacro")
+XACRO = re.compile(r"^https?://(www\.|wiki\.)?ros\.org/(wiki/)?xacro")
 """Namespaces of xacro, the macro language in which most URDF files are written."""
+
+SUFFIX = ".xacro"
+"""Suffix of the files that are always expanded."""
 
 UNEXPANDED = re.compile(r"\$[({]")
 """Beginning of an expression of xacro."""
@@ -61,7 +65,7 @@ JOINTS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
 def checked(path: Path) -> bytes:
-    """Check the URDF file at ``path`` and return its contents.
+    """Check the URDF file at ``path`` and return its contents, expanded if it is xacro.
 
     Raises RobotDescriptionError that names the file, the line and what to do.
     """
@@ -71,7 +75,15 @@ def checked(path: Path) -> bytes:
         data = path.read_bytes()
     except OSError as error:
         raise RobotDescriptionError(f"{path} cannot be opened: {error.strerror}.") from error
-    _Checks(path).run(data)
+    checks = _Checks(str(path))
+    root = checks.parsed(data)
+    if path.suffix == SUFFIX or _template(root) is not None:
+        data = expanded(path)
+        checks = _Checks(
+            f"{path} (expanded)", "; if it only defines macros, name the file that includes it"
+        )
+        root = checks.parsed(data)
+    checks.check(root)
     return data
 
 
@@ -89,38 +101,44 @@ def explained(path: Path) -> Iterator[None]:
         ) from error
 
 
-class _Checks:
-    """Checks of one file, with the line of each element."""
+def _template(root: Element) -> Element | None:
+    """Return the first element that xacro has to replace or to fill in, if there is one."""
+    for element in root.iter():
+        if XACRO.match(element.tag):
+            return element
+    for part in root:
+        for element in part.iter() if part.tag in PARTS else ():
+            if any(UNEXPANDED.search(value) for value in element.attrib.values()):
+                return element
+    return None
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+
+class _Checks:
+    """Checks of one file, with the line of each element.
+
+    ``name`` is its name for messages; ``hint`` follows the message that it describes no robot.
+    """
+
+    def __init__(self, name: str, hint: str = "") -> None:
+        self._name = name
+        self._hint = hint
         self._line: dict[Element, int] = {}
 
-    def run(self, data: bytes) -> None:
-        """Raise RobotDescriptionError for the first fault in ``data``."""
-        root = self._parsed(data)
-        wrong = f"{self._path} is not a robot description:"
+    def check(self, root: Element) -> None:
+        """Raise RobotDescriptionError for the first fault in the file."""
+        wrong = f"{self._name} is not a robot description:"
         if root.tag != "robot":
             raise RobotDescriptionError(
                 f"{wrong} its outermost element is <{root.tag}>, not <robot>."
             )
-        trace = self._xacro(root)
-        try:
-            self._check_robot(root)
-        except RobotDescriptionError as error:
-            if trace is None:
-                raise
-            # An unexpanded template is reported before any other fault.
-            raise self._refuse(
-                trace,
-                "this is xacro, a template that has not been expanded. Expand it first, "
-                f"for instance with: xacro {self._path.name} > robot.urdf",
-            ) from error
-
-    def _check_robot(self, root: Element) -> None:
         if not root.get("name"):
-            raise RobotDescriptionError(
-                f"{self._path} is not a robot description: its <robot> has no name."
+            raise RobotDescriptionError(f"{wrong} its <robot> has no name{self._hint}.")
+        left = _template(root)
+        if left is not None:
+            raise self._refuse(
+                left,
+                "xacro leaves this unexpanded. Its elements must begin with 'xacro:', and its "
+                "expressions with one '$'.",
             )
         for part in root:
             if part.tag in PARTS:
@@ -131,8 +149,9 @@ class _Checks:
             self._check_joint(joint, links)
         self._refuse_loops(links, joints)
 
-    def _parsed(self, data: bytes) -> Element:
-        wrong = f"{self._path} is not a robot description:"
+    def parsed(self, data: bytes) -> Element:
+        """Return the root of the XML in ``data``. Raises RobotDescriptionError."""
+        wrong = f"{self._name} is not a robot description:"
         builder = TreeBuilder()
         parser = expat.ParserCreate(namespace_separator="}")
 
@@ -148,15 +167,7 @@ class _Checks:
             raise RobotDescriptionError(f"{wrong} its XML is broken, {error}.") from error
 
     def _refuse(self, element: Element, what: str) -> RobotDescriptionError:
-        return RobotDescriptionError(f"{self._path}, line {self._line[element]}: {what}")
-
-    def _xacro(self, root: Element) -> Element | None:
-        """Return the first element that xacro should have replaced, if any is left."""
-        for element in root.iter():
-            values = element.attrib.values()
-            if XACRO.match(element.tag) or any(UNEXPANDED.search(value) for value in values):
-                return element
-        return None
+        return RobotDescriptionError(f"{self._name}, line {self._line[element]}: {what}")
 
     def _check_elements(self, part: Element) -> None:
         where = f"<{part.tag}> {part.get('name', 'without a name')!r}"
@@ -167,8 +178,6 @@ class _Checks:
                 if not element.get(name):
                     raise self._refuse(element, f"the {inner}{where} has no {name!r}.")
             for name, value in element.attrib.items():
-                if UNEXPANDED.search(value):
-                    raise self._refuse(element, f"{name}={value!r} is an expression.")
                 counts = COUNTS.get((tag, name))
                 if counts is not None and not _numbers(tag, value, counts):
                     wanted = " or ".join(
@@ -251,11 +260,11 @@ class _Checks:
                     f"link {name!r} is its own ancestor, by joint {joint.get('name')!r}. {tree}",
                 )
         if not links:
-            raise RobotDescriptionError(f"{self._path} describes no link.")
+            raise RobotDescriptionError(f"{self._name} describes no link{self._hint}.")
         roots = [name for name in links if name not in parent]
         if len(roots) != 1:
             raise RobotDescriptionError(
-                f"{self._path} must have one link without a parent, not {len(roots)} "
+                f"{self._name} must have one link without a parent, not {len(roots)} "
                 f"({', '.join(roots)}): every other link must be the child of a joint."
             )
 

@@ -16,7 +16,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf, UrdfJoint, urdf_of
 from katana450.arm.robot.visual import rods
 from katana450.errors import RobotDescriptionError
-from katana450.maths.geometry.arrays import frozen
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.resources import URDF_PATH
 
 MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
@@ -71,17 +71,19 @@ def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]
             following[name] = _following(path, joint, joints)
         except RobotDescriptionError as error:
             faults.append(str(error))
+    below: dict[str, list[FloatArray]] = {name: [] for name in urdf.links}
+    for described in urdf.joints.values():
+        below[described.parent].append(described.origin[:3, 3])
     links = []
     for name in urdf.parents_first():
         link, parent_joint = urdf.links[name], above.get(name)
-        below = [joint.origin[:3, 3] for joint in urdf.joints.values() if joint.parent == name]
         links.append(
             Link(
                 name=name,
                 parent=None if parent_joint is None else parent_joint.parent,
                 T_parent_link=frozen(np.eye(4)) if parent_joint is None else parent_joint.origin,
                 joint=None if parent_joint is None else following.get(parent_joint.name),
-                visuals=link.visuals or rods(below),
+                visuals=link.visuals or rods(below[name]),
                 collisions=link.collisions,
                 mass=link.mass,
                 center=link.center,
@@ -94,7 +96,7 @@ def _joint(path: Path, joint: UrdfJoint) -> Joint:
     if joint.type not in MOVABLE:
         raise RobotDescriptionError(
             f"Joint {joint.name!r} of {path.name} is {joint.type}; "
-            f"joints that can be exported are fixed, {', '.join(MOVABLE)}."
+            f"supported are fixed, {', '.join(MOVABLE)}."
         )
     size = float(np.linalg.norm(joint.axis))
     if not 0.0 < size < math.inf:
@@ -125,12 +127,12 @@ def _joint(path: Path, joint: UrdfJoint) -> Joint:
 
 def _following(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> Joint:
     """Return ``joint`` with the driven joint at the end of its chain of leaders as its leader."""
-    passed = [joint.name]
+    passed, named = [joint.name], joint.leader
     while joint.leader != passed[-1]:
         above = joints.get(joint.leader)
         if above is None or above.name in passed:
             raise RobotDescriptionError(
-                f"Joint {joint.name!r} of {path.name} mimics {joint.leader!r}, "
+                f"Joint {joint.name!r} of {path.name} mimics {named!r}, "
                 "which follows no driven joint."
             )
         passed.append(above.name)

@@ -19,6 +19,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
+from katana450.arm.robot.description import checked
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual, mesh_file
 from katana450.errors import RobotDescriptionError
@@ -96,15 +97,10 @@ def package_files(
     Raises RobotDescriptionError if the file is not a URDF, or a mesh is missing or unreadable.
     """
     try:
-        tree = ET.parse(path, parser=ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
-    except (OSError, ET.ParseError) as error:
+        root = ET.XML(checked(path), ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
+    except ET.ParseError as error:
         raise RobotDescriptionError(f"{path} is not a robot description: {error}.") from error
-    root = tree.getroot()
-    robot = root.get("name", "")
-    if root.tag != "robot" or not robot:
-        raise RobotDescriptionError(
-            f"{path} is not a robot description: its root is not a named robot."
-        )
+    robot = root.attrib["name"]
     (plain,) = distinct([robot])
     package = f"{plain.lower()}_description"
     _weigh_frames(root)

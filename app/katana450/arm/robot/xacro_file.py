@@ -1,0 +1,70 @@
+"""Robot descriptions in xacro, the macro language of ROS, as plain URDF."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from katana450.errors import RobotDescriptionError
+
+SECONDS = 10.0
+"""[s] Timeout of expanding a file."""
+
+MAX_MEMORY_BYTES = 1 << 30
+"""[bytes] Maximum memory for expanding a file."""
+
+MAX_BYTES = 20_000_000
+"""[bytes] Maximum size of the expanded text."""
+
+PASSED_ON = ("AMENT_", "COLCON_", "CMAKE_PREFIX_PATH", "LANG", "LC_", "PATH", "PYTHON", "ROS_")
+"""Beginnings of the names of environment variables that a file can read."""
+
+
+def expanded(path: Path) -> bytes:
+    """Return the URDF that the xacro file at ``path`` describes.
+
+    A disposable subprocess with limits of time and, where the system supports it, memory expands
+    it, because a file can ask for endless work. Its expressions run no other code.
+
+    Raises RobotDescriptionError with the file and, if known, the line at fault.
+    """
+    system = {"SYSTEMROOT"} if sys.platform == "win32" else set()
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name.startswith(PASSED_ON) or name in system
+    }
+    command = [sys.executable, "-m", "katana450.arm.robot.xacro_process", str(path.absolute())]
+    try:
+        done = subprocess.run(
+            command,
+            # The parent folder of the package.
+            cwd=Path(__file__).resolve().parents[3],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise _too_large(path) from error
+    if done.returncode:
+        raise _too_large(path)
+    answer = json.loads(done.stdout)
+    if "urdf" in answer:
+        urdf: bytes = answer["urdf"].encode()
+        return urdf
+    where = str(path) if Path(answer["file"]) == path.absolute() else f"{path}: {answer['file']}"
+    line = "" if answer["line"] is None else f", line {answer['line']}"
+    raise RobotDescriptionError(f"{where}{line}: this cannot be expanded: {answer['what']}.")
+
+
+def _too_large(path: Path) -> RobotDescriptionError:
+    return RobotDescriptionError(
+        f"{path} cannot be expanded: xacro needs more than {SECONDS:g} s or "
+        f"{MAX_MEMORY_BYTES >> 20} MiB for it. Look for a macro, list or number without end in it."
+    )

@@ -1,0 +1,169 @@
+"""The subprocess that expands one xacro file.
+
+``expanded`` starts it as ``python -m katana450.arm.robot.xacro_process FILE``. It limits its memory
+and time before it reads the file, and writes JSON to standard output: {"urdf": text}, or the fault
+as {"what", "file", "line"}; the line is null where it is unknown.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.parsers.expat import ErrorString, ExpatError
+
+import xacro
+from xacro import substitution_args
+
+from katana450.arm.robot.ros_package import package_folder
+from katana450.arm.robot.xacro_expression import evaluated
+from katana450.arm.robot.xacro_file import MAX_BYTES, MAX_MEMORY_BYTES, SECONDS
+from katana450.platform_support import limit_resources
+
+HIDDEN = ("type", "vars")
+"""Functions of the namespace ``python`` that lead from a value to other code."""
+
+LEGACY = ("include", "macro", "property")
+"""Elements of xacro that older files have at their top without its prefix; a URDF has none there.
+"""
+
+ENDLESS = "its macros, properties or includes contain themselves"
+
+
+class _FaultError(Exception):
+    """A fault that this module found, as a clause."""
+
+
+class Expansion:
+    """The expansion of the file at ``path``.
+
+    It replaces the parts of xacro that evaluate expressions and that ask ROS or the environment.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._at_fault = ""
+        """Text in the line at fault."""
+        for name in HIDDEN:
+            dict.pop(xacro._global_symbols["python"], name)
+        self._parse = xacro.parse
+        xacro.parse = self._parsed
+        xacro.safe_eval = self._value
+        # Without this entry `eval` in that module is Python's.
+        vars(substitution_args)["eval"] = self._value
+        substitution_args._eval_dict.update(substitution_args._eval_dict["__builtins__"])
+        substitution_args._eval_dict.update(env=self._eval_env, find=self._eval_find)
+        for function in (self._eval_arg, self._eval_env, self._eval_find):
+            setattr(substitution_args, function.__name__, function)
+
+    def run(self) -> dict[str, object]:
+        """Return the answer."""
+        try:
+            document = xacro.process_file(str(self._path), mappings={}, verbosity=0)
+            urdf = document.documentElement.toxml()
+        except Exception as error:
+            return self._fault(error)
+        if len(urdf) > MAX_BYTES:
+            return self._fault(_FaultError(f"the result has more than {MAX_BYTES:,} characters"))
+        return {"urdf": urdf}
+
+    def _parsed(self, source: object, name: str | None = None) -> Any:
+        """Return the document of a file, with the prefix of xacro where older files omit it."""
+        document = self._parse(source, name)
+        for node in document.documentElement.childNodes:
+            if node.nodeName in LEGACY:
+                node.tagName = node.nodeName = f"xacro:{node.nodeName}"
+        return document
+
+    def _value(
+        self, text: str, symbols: dict[str, Any], names: Mapping[str, Any] | None = None
+    ) -> object:
+        try:
+            return evaluated(text, symbols, names)
+        except Exception:
+            # The innermost expression is at fault.
+            self._at_fault = self._at_fault or text
+            raise
+
+    def _eval_arg(self, name: str, args: Mapping[str, str]) -> str:
+        if name in args:
+            return args[name]
+        self._at_fault = f"arg {name}"
+        raise _FaultError(
+            f"the argument {name!r} has no value and no default. Expand the file with a value: "
+            f"xacro {self._path.name} {name}:=VALUE > robot.urdf"
+        )
+
+    def _eval_env(self, name: str) -> str:
+        if name in os.environ:
+            return os.environ[name]
+        self._at_fault = f"env {name}"
+        raise _FaultError(f"there is no environment variable {name!r} of ROS")
+
+    def _eval_find(self, package: str) -> str:
+        folder = package_folder(package, self._path.parent)
+        if folder is not None:
+            return str(folder)
+        self._at_fault = f"find {package}"
+        raise _FaultError(
+            f"there is no package {package!r}. Put its folder beside the file or beside a folder "
+            "above it, or add the folder that contains it to ROS_PACKAGE_PATH"
+        )
+
+    def _fault(self, error: Exception) -> dict[str, object]:
+        chain = [error]
+        while (cause := getattr(chain[-1], "exc", None)) is not None:
+            chain.append(cause)
+        cause, line = chain[-1], None
+        if isinstance(cause, ExpatError):
+            what, line = f"its XML is broken ({ErrorString(cause.code)})", cause.lineno
+        elif any(isinstance(each, RecursionError) for each in chain):
+            what = ENDLESS
+        elif isinstance(cause, _FaultError):
+            what = str(cause)
+        elif isinstance(cause, OSError):
+            self._at_fault = Path(str(cause.filename)).name
+            what = f"{cause.filename} cannot be opened ({cause.strerror})"
+        elif self._at_fault:
+            what = f"{_reason(cause)}, in the expression {self._at_fault!r}"
+        else:
+            what = str(cause).strip().rstrip(".")
+            self._at_fault = what.rpartition("xacro:")[2]
+        stack = [*xacro.filestack, *(macro.history[-1][-1] for macro in xacro.macrostack)]
+        file = Path(stack[-1])
+        if line is None and self._at_fault:
+            for each in (*reversed(stack), *xacro.all_includes):
+                line = _line(Path(each), self._at_fault)
+                if line is not None:
+                    file = Path(each)
+                    break
+        return {"what": what, "file": str(file), "line": line}
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, NameError):
+        return f"{error.name!r} is not defined" if error.name else str(error)
+    if isinstance(error, KeyError):
+        return f"there is no {error}"
+    if isinstance(error, SyntaxError):
+        return "the syntax is wrong"
+    return (str(error).strip() or type(error).__name__).splitlines()[0]
+
+
+def _line(file: Path, text: str) -> int | None:
+    """Return the number of the first line of ``file`` that contains ``text``, from 1."""
+    lines = file.read_text(errors="replace").splitlines() if file.is_file() else []
+    return next((number for number, line in enumerate(lines, start=1) if text in line), None)
+
+
+def main(path: Path) -> None:
+    """Expand the file at ``path``. The process fails only at the limits of memory and time."""
+    limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
+    print(json.dumps(Expansion(path).run()))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,277 @@
+"""A robot description in xacro is expanded without ROS, runs no code, and is refused by line."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.arm.robot import xacro_file
+from katana450.arm.robot.description import checked
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.xacro_expression import RefusedError, evaluated
+from katana450.cli.main import main
+from katana450.errors import RobotDescriptionError
+from tests.robot.public_arms import PX150, urdf
+
+PACKAGE = Path(__file__).parent / "xacro" / "printed_arm_description"
+FILE = PACKAGE / "urdf" / "printed_arm.urdf.xacro"
+
+OPEN = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+
+LEAKS = ("Traceback", "<class", "Exception", "NoneType", "object has no attribute")
+
+
+def templated(folder: Path, *lines: str, name: str = "arm.urdf.xacro") -> Path:
+    """Write a xacro file whose second line is the first of ``lines``, with the links of an arm."""
+    links = urdf("arm", PX150).partition("\n")[2]
+    path = folder / name
+    path.write_text(OPEN + "\n".join(lines) + "\n" + links, encoding="utf-8")
+    return path
+
+
+def refusal(path: Path) -> str:
+    """Return the message that refuses the file at ``path``."""
+    with pytest.raises(RobotDescriptionError) as raised:
+        load(path)
+    message = str(raised.value)
+    assert not any(word in message for word in LEAKS), message
+    return message
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A copy of the package, in a folder of another name."""
+    return shutil.copytree(PACKAGE, tmp_path / "clone")
+
+
+def test_a_package_is_expanded_as_it_is_published() -> None:
+    robot = load(FILE)
+    arm = robot.require_arm()
+    assert (robot.name, robot.notes, robot.faults) == ("printed_arm", (), ())
+    assert arm.chain.names == ("waist", "shoulder", "elbow", "wrist", "roll")
+    np.testing.assert_allclose(arm.chain.lower[[0, 4]], [math.radians(-170), -math.pi])
+    np.testing.assert_allclose(arm.chain.speed, [2.0, 2.0, 2.0, 3.0, 3.0])
+    reach = [0.05 + 0.16 + 0.065, 0.0, 0.15]
+    np.testing.assert_allclose(arm.chain.M[:3, 3], reach)
+    assert arm.gripper.slides
+    assert [visual.colour for visual in robot.links[1].visuals] == [(255, 128, 0), (150, 156, 163)]
+    assert len(robot.links[1].shapes) == 2
+
+
+def test_a_package_is_found_by_the_name_in_its_manifest(package: Path) -> None:
+    assert load(package / "urdf" / FILE.name).require_arm().chain.n == 5
+
+
+def test_a_package_of_a_ros_workspace_is_found(
+    tmp_path: Path, package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "alone").mkdir()
+    path = templated(
+        tmp_path / "alone",
+        '<xacro:include filename="$(find printed_arm_description)/urdf/materials.xacro"/>',
+    )
+    assert "there is no package 'printed_arm_description'" in refusal(path)
+    for variable, folder in (
+        ("ROS_PACKAGE_PATH", package),
+        ("AMENT_PREFIX_PATH", tmp_path / "install"),
+    ):
+        shutil.copytree(
+            package, tmp_path / "install/share/printed_arm_description", dirs_exist_ok=True
+        )
+        with monkeypatch.context() as patch:
+            patch.setenv(variable, str(folder))
+            assert b"orange" in checked(path)
+
+
+def test_the_expansion_agrees_with_the_program_xacro(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    words = (
+        "import sys, types; m = types.ModuleType('ament_index_python.packages'); "
+        f"m.get_package_share_directory = lambda _: {str(PACKAGE)!r}; "
+        "sys.modules[m.__name__] = m; sys.modules['ament_index_python'] = m; "
+        f"import xacro; print(xacro.process_file({str(FILE)!r}).documentElement.toxml())"
+    )
+    stock = subprocess.run(
+        [sys.executable, "-c", words], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert checked(FILE).decode() == stock.stdout.rstrip("\n")
+
+
+def test_every_command_takes_xacro(
+    tmp_path: Path, package: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(package / "urdf" / FILE.name)
+    assert katana450.load(path).n == 5
+    request = json.dumps({"q": [0.1, 0.2, 0.3, 0.4, 0.5]})
+    command = [sys.executable, "-m", "katana450", "fk", "--urdf", path]
+    done = subprocess.run(
+        command, input=request, capture_output=True, text=True, check=True, timeout=60
+    )
+    T = json.loads(done.stdout)["T"]
+    command[3] = "ik"
+    done = subprocess.run(
+        command, input=json.dumps({"T": T}), capture_output=True, text=True, check=True, timeout=60
+    )
+    found = [solution["q"] for solution in json.loads(done.stdout)["solutions"]]
+    assert np.abs(np.array(found) - [0.1, 0.2, 0.3, 0.4, 0.5]).max(axis=1).min() < 1e-9
+    assert main(["export", "urdf", "--urdf", path, "--out", str(tmp_path / "out")]) == 0
+    (made,) = (tmp_path / "out").glob("*.zip")
+    with zipfile.ZipFile(made) as archive:
+        (name,) = [each for each in archive.namelist() if each.endswith(".urdf")]
+        text = archive.read(name).decode()
+    assert "xacro" not in text
+    assert str(package) not in text
+    capsys.readouterr()
+
+
+def test_a_file_without_the_suffix_is_expanded_too(tmp_path: Path) -> None:
+    path = templated(tmp_path, '<xacro:property name="far" value="0.2"/>', name="arm.urdf")
+    text = path.read_text().replace('xyz="0.05 0.0 0.15"', 'xyz="${far / 4} 0 0.15"')
+    path.write_text(text)
+    assert load(path).require_arm().chain.n == 5
+
+
+def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
+    (tmp_path / "width.xacro").write_text(OPEN + '<property name="far" value="0.2"/></robot>')
+    path = templated(tmp_path, '<include filename="width.xacro"/>')
+    text = path.read_text().replace('xyz="0.05 0.0 0.15"', 'xyz="${far / 4} 0 0.15"')
+    path.write_text(text)
+    assert load(path).require_arm().chain.n == 5
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ('<link name="${1 +}"/>', "line 2: .*syntax.* '1 [+]'"),
+        ('<link name="${far}"/>', "line 2: .*'far' is not defined"),
+        ('<link name="${1 / 0}"/>', "line 2: .*division by zero.* '1 / 0'"),
+        ('<link name="${[1][3]}"/>', "line 2: .*out of range"),
+        ("<link name=\"${dict(a=1)['b']}\"/>", "line 2: .*there is no 'b'"),
+        ('<xacro:finger side="left"/>', "line 2: .*unknown macro name: xacro:finger"),
+        (
+            '<xacro:include filename="$(find no_such_arm)/a.xacro"/>',
+            "line 2: .*no package 'no_such_arm'. Put its folder .*ROS_PACKAGE_PATH",
+        ),
+        ('<xacro:include filename="$(find ../..)/a.xacro"/>', "line 2: .*no package"),
+        ('<xacro:include filename="lost.xacro"/>', r"line 2: .*lost\.xacro cannot be opened"),
+        (
+            '<link name="$(arg side)"/>',
+            "line 2: .*'side' has no value.* xacro arm.urdf.xacro side:=",
+        ),
+        ('<link name="$(env HOME)"/>', "line 2: .*no environment variable 'HOME' of ROS"),
+        ('<link name="$(eval 1 +)"/>', "line 2: .*syntax"),
+        ('<link name="$(magic x)"/>', "Unknown substitution command"),
+        ('<link name="a" ${broken}/>', "its XML is broken.*line 2"),
+        ('<xacro:property name="a b" value="1"/>', "valid python identifiers: a b"),
+        (
+            '<xacro:property name="a" value="${b}"/><xacro:property name="b" value="${a}"/>${a}',
+            "circular variable definition: (a -> b -> a|b -> a -> b)",
+        ),
+        (
+            '<xacro:macro name="m" params=""><xacro:m/></xacro:macro><xacro:m/>',
+            "contain themselves",
+        ),
+        ('<xacro:include filename="arm.urdf.xacro"/>', "contain themselves"),
+        ("<xacro:macro name='m' params='a'/><xacro:m/>", "Undefined parameters .a."),
+        ('<link name="${10 ** 10 ** 10}"/>', "more than .* s or .* MiB"),
+        ("<link name=\"${'x' * 10 ** 12}\"/>", "line 2: .*MemoryError"),
+        ("<link name=\"${'x' * 3 * 10 ** 7}\"/>", "more than 20,000,000 characters"),
+    ],
+)
+def test_every_fault_is_reported_with_its_cause(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, expected: str
+) -> None:
+    monkeypatch.setattr(xacro_file, "SECONDS", 5.0)
+    path = templated(tmp_path, line)
+    message = refusal(path)
+    assert message.startswith(str(path))
+    with pytest.raises(RobotDescriptionError, match=expected):
+        load(path)
+
+
+def test_the_fault_of_an_included_file_names_that_file(package: Path) -> None:
+    joints = package / "urdf" / "joints.xacro"
+    text = joints.read_text()
+    joints.write_text(text.replace("${limit.speed}", "${limit.sped}"))
+    message = refusal(package / "urdf" / FILE.name)
+    assert f"{joints}, line " in message
+    assert "'sped' is not allowed, or does not exist" in message
+    joints.write_text(text.replace("</link>", ""))
+    assert f"{joints}, line " in refusal(package / "urdf" / FILE.name)
+
+
+def test_a_file_of_macros_names_its_remedy() -> None:
+    message = refusal(PACKAGE / "urdf" / "joints.xacro")
+    assert "name the file that includes it" in message
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        "[x.__class__ for x in [1]]",
+        "[x.__class__.__base__.__subclasses__() for x in [1]]",
+        "(lambda x: x.__class__)(1)",
+        "'{0.__class__}'.format(1)",
+        "'{a.__class__}'.format_map(dict(a=1))",
+        "(x for x in [1]).gi_frame.f_builtins",
+        "str.mro()",
+        "__import__('os')",
+        "[__builtins__ for x in [1]]",
+        "open('/etc/passwd')",
+        "xacro.load_yaml.__globals__",
+        "python.type(1)",
+        "python.vars(str)",
+        "xacro.parent",
+        "[0 for python.x in [1]]",
+    ],
+)
+def test_an_expression_reaches_no_other_code(tmp_path: Path, expression: str) -> None:
+    escaped = expression.replace('"', "&quot;")
+    path = templated(tmp_path, f'<link name="${{{escaped}}}"/>')
+    assert "line 2" in refusal(path)
+
+
+def test_the_old_evaluation_has_no_builtins(tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    path = templated(
+        tmp_path,
+        f"<xacro:property name='code' value=\"open('{mark}', 'w')\"/>",
+        '<link name="$(eval ${code})"/>',
+    )
+    assert "'open' is not defined" in refusal(path)
+    assert not mark.exists()
+
+
+def test_the_environment_stays_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KATANA450_SECRET", "seen")
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    path = templated(
+        tmp_path, '<material name="$(optenv KATANA450_SECRET hidden) $(env ROS_DISTRO)"/>'
+    )
+    assert b"hidden jazzy" in checked(path)
+
+
+def test_plain_values_keep_their_methods() -> None:
+    symbols = {"text": "a_b", "settings": {"left": {"x": 2}}, "sum": sum}
+    assert evaluated("text.replace('_', '-').split('-')", dict(symbols)) == ["a", "b"]
+    assert evaluated("settings.left.x + len", symbols | {"len": 3}) == 5
+    assert evaluated("sum([x.real for x in [1, 2]])", dict(symbols)) == 3
+    with pytest.raises(RefusedError, match="'_mapping' is not allowed"):
+        evaluated("settings._mapping", dict(symbols))
+
+
+def test_a_plain_file_starts_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(subprocess, "run")
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf("arm", PX150).replace("<robot ", f"{OPEN[:7]}{OPEN[18:-2]} ", 1))
+    assert "xmlns:xacro" in path.read_text()
+    assert load(path).require_arm().chain.n == 5
