@@ -74,14 +74,14 @@ def toast(page: ViserPage) -> str:
 
 
 def test_typed_digits_are_sent_on_enter_only(page: ViserPage, truth: Truth) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     home, watch = first_joint(truth), Watch(page)
     type_slowly(page, box, "50")
     assert box.input_value() == "50"
     assert not marked(box)
     assert watch.sent == []
     assert first_joint(truth) == home
-    assert page.slider_value("Axis 1") == home
+    assert page.slider_value("1 base turn") == home
     box.press("Enter")
     assert watch.sent == [50]
     wait_for_joint(page, truth, 50.0)
@@ -90,7 +90,7 @@ def test_typed_digits_are_sent_on_enter_only(page: ViserPage, truth: Truth) -> N
 
 
 def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     home, watch = first_joint(truth), Watch(page)
     type_slowly(page, box, "500")
     assert marked(box)
@@ -112,18 +112,17 @@ def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth
 
 def test_leaving_the_box_sends_the_value(page: ViserPage) -> None:
     watch = Watch(page)
-    type_slowly(page, page.number_box("Axis 1"), "12.5")
+    type_slowly(page, page.number_box("1 base turn"), "12.5")
     page.page.keyboard.press("Tab")
     assert watch.sent == [12.5]
     # The typed value is sent before the effect of the next button.
-    type_slowly(page, page.number_box("Speed"), "60")
+    type_slowly(page, page.number_box("Gripper"), "60")
     page.click_button("Home")
     assert watch.sent == [12.5, 60, "Home"]
-    page.type_number("Speed", 100)
 
 
 def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Truth) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     home, watch = box.input_value(), Watch(page)
     type_slowly(page, box, "50")
     box.press("Escape")
@@ -138,7 +137,7 @@ def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Tru
 
 
 def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     watch = Watch(page)
     type_slowly(page, box, "20")
     for key in ("ArrowUp", "ArrowUp", "ArrowDown"):
@@ -162,7 +161,7 @@ def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
 
 def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
     """Assistive technology types as a person does, or sets the value without the focus."""
-    for label, index, text in (("Gripper", 0, "35"), ("Speed", 0, "70"), ("r, p, y", 2, "-12")):
+    for label, index, text in (("Gripper", 0, "35"), ("r, p, y", 2, "-12")):
         box = page.number_box(label, index=index)
         before = float(box.input_value())
         watch = Watch(page)
@@ -174,7 +173,7 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
         page.type_number(label, before, index=index)
     watch = Watch(page)
     page.frame.evaluate("() => document.activeElement.blur()")
-    page.number_box("Speed").evaluate(
+    page.number_box("Gripper").evaluate(
         """(box) => {
             const { prototype } = HTMLInputElement;
             Object.getOwnPropertyDescriptor(prototype, "value").set.call(box, "80");
@@ -183,4 +182,3 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
         }"""
     )
     assert watch.sent == [80]
-    page.type_number("Speed", 100)

@@ -1,4 +1,4 @@
-"""The panel of programs: choose, preview, run, step, pause and end a script; teach a new one."""
+"""The panel of programs: choose, preview, run, step and end a script; teach a new one."""
 
 from __future__ import annotations
 
@@ -35,7 +35,6 @@ MAX_TAUGHT_POSTURES = 200
 ORDERS = {
     "Run": ProgramOrder.RUN,
     "Step": ProgramOrder.STEP,
-    "Wait": ProgramOrder.PAUSE,
     "End": ProgramOrder.END,
 }
 """The order that each button gives."""
@@ -64,7 +63,7 @@ class Steering(Protocol):
 
 
 class ProgramsPanel:
-    """The folder of controls, and the preview in the scene."""
+    """The controls, and the preview in the scene."""
 
     def __init__(
         self,
@@ -75,7 +74,7 @@ class ProgramsPanel:
         gestures: GestureGate,
         state: Callable[[], State],
     ) -> None:
-        """Build the controls. ``state`` returns the newest state."""
+        """Add the controls to the open tab of ``server``. ``state`` returns the newest state."""
         self._steering = steering
         self._scripts = scripts
         self._gestures = gestures
@@ -90,45 +89,42 @@ class ProgramsPanel:
         self._with_ghosts = False
         self._preview = Preview(server, robot)
         gui = server.gui
-        with gui.add_folder("Programs", expand_by_default=False):
-            names = tuple(scripts.paths)
-            # The first script that this arm can run: the library has one for the bare flange too.
-            fitting = (name for name in names if _suits(scripts, name, robot))
-            self._choice = gui.add_dropdown(
-                "Script",
-                names,
-                initial_value=next(fitting, None),
-                hint="Scripts of the library and of --programs DIR",
-            )
-            self._choice.on_update(lambda _: self._draw(None))
-            self._orders = gui.add_button_group(
-                "Program",
-                ("Preview", *ORDERS),
-                hint="Preview: plan it and show the tool's path. Step: run to the end of a step. "
-                "Wait: pause until Run or Step. End: end the run, or the planning",
-            )
-            self._orders.on_click(self._guarded(self._order))
-            self._look = gui.add_slider(
-                "Look at",
-                min=0.0,
-                max=1.0,
-                step=FOLLOW_INTERVAL,
-                initial_value=0.0,
-                disabled=True,
-                hint="Time in the preview [s], at full speed: shows the arm at that time",
-            )
-            self._look.on_update(lambda _: self._preview.look(self._look.value))
-            self._status = gui.add_html("")
-            self._teach = gui.add_button_group(
-                "Teach",
-                ("Add pose", "Forget", "Save"),
-                hint="Add pose: add the present pose. Save: save a script through all poses in the "
-                "folder of --programs, or else as a download",
-            )
-            self._teach.on_click(self._guarded(self._on_teach))
-            self._name = gui.add_text(
-                "Name", "My script", hint="Name of the script that Save writes"
-            )
+        names = tuple(scripts.paths)
+        # The first script that this arm can run: the library has one for the bare flange too.
+        fitting = (name for name in names if _suits(scripts, name, robot))
+        self._choice = gui.add_dropdown(
+            "Script",
+            names,
+            initial_value=next(fitting, None),
+            hint="Scripts of the library and of --programs DIR",
+        )
+        self._choice.on_update(lambda _: self._draw(None))
+        self._orders = gui.add_button_group(
+            "Program",
+            ("Preview", *ORDERS),
+            hint="Preview: plan it and show the tool's path. Step: run to the end of a step. "
+            "End: end the run, or the planning",
+        )
+        self._orders.on_click(self._guarded(self._order))
+        self._look = gui.add_slider(
+            "Look at",
+            min=0.0,
+            max=1.0,
+            step=FOLLOW_INTERVAL,
+            initial_value=0.0,
+            disabled=True,
+            hint="Time in the preview [s], at full speed: shows the arm at that time",
+        )
+        self._look.on_update(lambda _: self._preview.look(self._look.value))
+        self._status = gui.add_html("")
+        self._teach = gui.add_button_group(
+            "Teach",
+            ("Add pose", "Forget", "Save"),
+            hint="Add pose: add the present pose. Save: save a script through all poses in the "
+            "folder of --programs, or else as a download",
+        )
+        self._teach.on_click(self._guarded(self._on_teach))
+        self._name = gui.add_text("Name", "My script", hint="Name of the script that Save writes")
 
     def follow(self) -> None:
         """Update the display of the program's progress."""
@@ -164,7 +160,7 @@ class ProgramsPanel:
         button = self._orders.value
         progress = self._steering.progress
         status = "" if progress is None else progress.status
-        if button in ("Wait", "End") or (button != "Preview" and status in RUNS):
+        if button == "End" or (button != "Preview" and status in RUNS):
             self._steering.steer(ORDERS[button], actor)
             return
         text = self._scripts.text(self._choice.value)
