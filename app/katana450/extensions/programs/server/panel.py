@@ -19,8 +19,10 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts, file_name
+from katana450.extensions.programs.server import step_list
 from katana450.extensions.programs.server.preview import Preview
 from katana450.extensions.programs.server.state_line import RUNS
+from katana450.extensions.programs.server.step_list import ListedStep
 from katana450.extensions.programs.teach import script_from_postures
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api.answers import Progress
@@ -81,6 +83,7 @@ class ProgramsPanel:
         self._state = state
         self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
+        self._steps: tuple[ListedStep, ...] = ()
         # The script that was last requested.
         self._text = ""
         # Held while an order is carried out: viser calls back in a thread of its own.
@@ -117,6 +120,7 @@ class ProgramsPanel:
         )
         self._look.on_update(lambda _: self._preview.look(self._look.value))
         self._status = gui.add_html("")
+        self._list = gui.add_html("", visible=False)
         self._teach = gui.add_button_group(
             "Teach",
             ("Add pose", "Forget", "Save"),
@@ -135,6 +139,7 @@ class ProgramsPanel:
         if self._order_lock.acquire(blocking=False):
             try:
                 self._follow_program()
+                self._follow_steps(progress)
             finally:
                 self._order_lock.release()
         if not self._look.disabled and progress is not None and progress.status in RUNS:
@@ -148,8 +153,16 @@ class ProgramsPanel:
             self._draw(program)
             self._with_ghosts = self._with_ghosts and program is None
 
+    def _follow_steps(self, progress: Progress | None) -> None:
+        look = 0.0 if self._look.disabled else self._look.value
+        current = step_list.current_step(self._steps, progress, look)
+        page = step_list.page(self._steps, current)
+        if page != self._list.content:
+            self._list.content, self._list.visible = page, bool(page)
+
     def _draw(self, program: Program | None) -> None:
-        """Show the preview of ``program``."""
+        """Show the preview and the steps of ``program``."""
+        self._steps = () if program is None else step_list.steps_of(program)
         span = self._preview.show(program, self._state().tool, ghosts=self._with_ghosts)
         self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
