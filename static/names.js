@@ -2,15 +2,18 @@
 "use strict";
 (() => {
   const EVERY = 300; // ms
+  const LIST = ", ";
   let waiting = false;
 
-  const nameless = (control) => !control.getAttribute("aria-label") && !control.labels?.length;
+  const nameless = (control) =>
+    !control.getAttribute("aria-label") && (!control.labels?.length || isList(control));
 
-  // A row of several boxes is named as a list, such as "x, y, z".
+  // A row of several boxes has one label that is a list, such as "x, y, z".
+  const isList = (control) => control.labels?.[0]?.textContent.includes(LIST);
+
   function nameOfInput(control) {
     const { label, index } = Viser.controlOf(control);
-    const parts = label.split(", ");
-    return parts.length > 1 ? parts[index] : label;
+    return label.includes(LIST) ? label.split(LIST)[index] : label;
   }
 
   function nameOfButton(button) {

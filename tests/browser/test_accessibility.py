@@ -29,7 +29,7 @@ CONTROLS = """() => {
     return {
         names: found(`[role=slider], button:not([aria-hidden]), ${boxes}, [type=checkbox]`)
             .map((each) => [each.outerHTML.slice(0, 200), name(each)]),
-        heights: inside(`button[data-variant=outline], button[data-variant=filled], ${boxes}`)
+        heights: inside(`button[data-variant=outline], button[data-block], ${boxes}`)
             .map((each) => [name(each), box(each).height]),
         thumbs: inside("[role=slider]").map((each) => [box(each).width, box(each).height]),
         text: inside(`label[for], button[data-variant=outline], ${boxes}, .k450`)

@@ -182,3 +182,31 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
         }"""
     )
     assert watch.sent == [80]
+
+
+def test_pose_form_converts_units_and_copies_the_present_pose(page: ViserPage) -> None:
+    def numbers(label: str) -> list[float]:
+        return [float(page.number_box(label, index=i).input_value()) for i in range(3)]
+
+    watch = Watch(page)
+    page.click_button("Copy current")
+    page.wait_until(lambda: numbers("x, y, z") == [478.5, 0.0, 7.6], "the pose in mm and {S}")
+    assert numbers("r, p, y") == [0.0, 25.0, 0.0]
+    page.choose("Units", "cm")
+    page.choose("Frame", "Base")
+    page.wait_until(lambda: numbers("x, y, z") == [47.85, 0.0, 28.21], "the pose in cm and base")
+    assert page.text_of("[data-now=z]") == "28.21"
+    # A value beyond the arm's reach in the chosen unit is not sent.
+    box = page.number_box("x, y, z")
+    type_slowly(page, box, "101")
+    assert marked(box)
+    page.choose("Frame", "Shoulder {S}")
+    page.choose("Units", "mm")
+    page.wait_until(lambda: numbers("x, y, z") == [478.5, 0.0, 7.6], "the pose in mm again")
+    assert len(watch.sent) == 5
+
+
+def test_gripper_is_closed_and_opened_by_buttons(page: ViserPage) -> None:
+    for label, percent in (("Close", 0.0), ("Open", 100.0)):
+        page.click_button(label)
+        page.wait_until(lambda p=percent: page.slider_value("Gripper") == p, label)  # type: ignore[misc]
