@@ -83,7 +83,7 @@ rest: $(dev_ok)
 
 # With what takes long: demos as commands, programs on live servers, exports read by other programs; and
 # more of what `make test` does a few times: 200 STOPs instead of 12, 10,000 drags instead of 2,500.
-test-long: $(dev_ok) browser exchange ## every test with all its cases
+test-long: $(dev_ok) $(js_ok) browser exchange ## every test with all its cases
 	KATANA450_LONG=1 $(bin)/python -m pytest $(ARGS)
 
 # Beside `make test`: measuring costs a quarter of the time of the tests (Python 3.11).

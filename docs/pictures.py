@@ -22,6 +22,7 @@ from tests.browser.camera import Camera, Drawing
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.session import AXES
 
 IMAGES = Path(__file__).with_name("images")
 WINDOW = (1440, 900)
@@ -31,7 +32,7 @@ MOVE = "/target/move"
 def at_rest(page: ViserPage) -> None:
     """Wait until the arm is at rest and the page is drawn."""
     page.page.mouse.move(60, 60)
-    page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
+    page.wait_until(lambda: "Moving" not in page.page.inner_text("#headline"), "the arm to arrive")
     page.page.wait_for_timeout(1500)
     page.wait_drawn()
 
@@ -44,14 +45,14 @@ def app(page: ViserPage) -> None:
 
 def out_of_reach(page: ViserPage) -> None:
     """Take a picture while the handle is dragged out of reach."""
-    page.drag_slider("Axis 1", -35.0)
+    page.drag_slider("1 base turn", -35.0)
     at_rest(page)
     with page.grip_arrow(MOVE, "z") as grip:
         grip.sweep(-0.16, 6)
     at_rest(page)
     with page.grip_arrow(MOVE, "x") as grip:
         grip.sweep(0.26, 8)
-        page.wait_until(lambda: "out of reach" in page.panel_text(), "the reason")
+        page.wait_until(lambda: "out of reach" in page.page.inner_text("#why"), "the reason")
         page.page.wait_for_timeout(2500)
         page.screenshot(IMAGES / "out-of-reach.png")
 
@@ -74,14 +75,16 @@ TILE = (880, 800)
 def gallery(page: ViserPage) -> None:
     """Make one picture per theme, with a row for each pose and a column for each camera."""
     page.page.set_viewport_size({"width": 1300, "height": 920})
-    page.frame.get_by_text("Show", exact=True).click()
     for theme in ("Light", "Dark"):
+        page.open_tab("Scene")
         page.click_button(theme)
         rows = []
         for pose in POSES.values():
-            for number, angle in enumerate(pose, start=1):
-                page.type_number(f"Axis {number}", angle)
+            page.open_tab("Drive")
+            for number, angle in enumerate(pose):
+                page.type_number(AXES[number], angle)
             at_rest(page)
+            page.open_tab("Scene")
             row = []
             for preset in Preset:
                 if preset is Preset.TOOL:

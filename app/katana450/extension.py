@@ -82,8 +82,8 @@ class ServeExtension:
             Called in the process of the view, of the first extension that has it.
         runner: Returns the class that drives the arm over time, with its requests. Called in the
             process of the view, of the first extension that has it.
-        folder: Returns a folder of the panel of an arm, or None. Called in the process of the view.
-            Raises KatanaError.
+        folder: Adds controls to a tab of the panel of an arm and returns them, or None. Called in
+            the process of the view. Raises KatanaError.
         server_log: Returns the event log of the server on a port, or None. Called in the process
             that starts the others, of the first extension that has it.
         send_records: Sends records of the notes of a recorder by a pipe to that event log, and

@@ -246,6 +246,14 @@ class ViserPage:
 
     # The panel
 
+    def tabs(self) -> list[str]:
+        """Return the labels of the panel's tabs."""
+        return self.frame.get_by_role("tab").all_inner_texts()
+
+    def open_tab(self, label: str) -> None:
+        """Open a tab of the panel; its controls can be used afterwards."""
+        self.frame.get_by_role("tab", name=label, exact=True).click()
+
     def _label(self, label: str) -> Locator:
         named = self.frame.locator("label").filter(has_text=re.compile(f"^{re.escape(label)}$"))
         return named.filter(visible=True).first

@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page
 
+from katana450.arm.control.messages import AXIS_NAMES
 from katana450.settings import Settings
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.gateway.client import ask, enter
 
 MOVE = "/target/move"
+AXES = tuple(f"{number} {name}" for number, name in enumerate(AXIS_NAMES, start=1))
+"""Labels of the joints' sliders."""
 READY = np.array(Settings().ready)
 THIN = 15_000.0
 """Rate of a slow connection [bytes/s], on which viser alone shows pictures half a minute old."""
@@ -63,7 +66,7 @@ def prepare(page: ViserPage, truth: Truth) -> None:
 
 def joints(page: ViserPage) -> Any:
     shown = page.slider_values()
-    return np.radians([shown[f"Axis {axis}"] for axis in range(1, 6)])
+    return np.radians([shown[label] for label in AXES])
 
 
 def take(page: ViserPage) -> None:
@@ -89,6 +92,19 @@ def go_home(page: ViserPage, truth: Truth) -> None:
     page.wait_until(lambda: np.allclose(joints(page), READY, atol=1e-6), "the sliders at home")
     truth.wait(20.0, mood="ok")
     page.page.wait_for_timeout(100)
+
+
+def set_speed(page: ViserPage, percent: float) -> None:
+    """Set the maximum speed by the slider of our page."""
+    page.page.evaluate(
+        """(percent) => {
+            const slider = document.querySelector("#speed input, input#speed");
+            slider.value = percent;
+            for (const kind of ["input", "change"])
+                slider.dispatchEvent(new Event(kind, { bubbles: true }));
+        }""",
+        percent,
+    )
 
 
 def camera(page: ViserPage) -> Any:

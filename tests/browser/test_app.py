@@ -19,8 +19,8 @@ from katana450.settings import Settings
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.session import AXES
 
-AXES = tuple(f"Axis {number}" for number in range(1, 6))
 READY = np.array(Settings().ready)
 FAINTEST = """() => {
     const canvas = document.querySelector("canvas[data-engine]");
@@ -101,7 +101,7 @@ class Robot:
 
     def text(self) -> str:
         """Return the status and its sentence."""
-        return self.page.text_of(".k450 .status")
+        return self.page.page.inner_text("#mode")
 
 
 @pytest.fixture(scope="module")
@@ -191,7 +191,7 @@ def test_the_roll_ring_turns_the_tool_about_itself(robot: Robot) -> None:
 
 
 def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artefacts: Path) -> None:
-    shown = robot.page.drag_slider("Axis 1", 60.0)
+    shown = robot.page.drag_slider("1 base turn", 60.0)
     assert shown == pytest.approx(60.0, abs=4.0)
     robot.settle()
     assert robot.q[0] == pytest.approx(math.radians(shown), abs=1e-9)
@@ -201,7 +201,7 @@ def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artef
 
 def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot) -> None:
     node, since = robot.path["pan_link"], time.time()
-    robot.page.drag_slider("Axis 1", 120.0)
+    robot.page.drag_slider("1 base turn", 120.0)
     robot.settle()
     turns = robot.page.messages("SetOrientationMessage", node=node, since=since)
     # q and -q are the same rotation.
@@ -278,7 +278,7 @@ def ghost_is_shown(robot: Robot) -> bool:
 def test_arm_stops_before_the_table_with_reason_and_warning_colour(
     robot: Robot, artefacts: Path
 ) -> None:
-    robot.page.drag_slider("Axis 2", 5.0)
+    robot.page.drag_slider("2 shoulder", 5.0)
     robot.page.wait_until(lambda: "mm apart" in robot.text(), "the reason", seconds=20.0)
     reason = robot.text()
     assert "finger and table" in reason
@@ -311,7 +311,7 @@ def test_browsers_show_the_same_arm_and_drive_it_in_turn(
     robot: Robot, server: AppServer, open_page: OpenPage
 ) -> None:
     other = Robot(open_page(server.url, nodes=("/arm", MOVE)))
-    robot.page.drag_slider("Axis 1", -50.0)
+    robot.page.drag_slider("1 base turn", -50.0)
     robot.settle()
     other.settle()
     assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
@@ -345,13 +345,13 @@ def come_back(robot: Robot, server: AppServer) -> None:
 def test_app_killed_during_a_drag_restarts_at_rest(open_page: OpenPage) -> None:
     with AppServer() as server:
         robot = Robot(open_page(server.url, nodes=("/arm", MOVE)))
-        robot.page.drag_slider("Axis 1", 70.0)
+        robot.page.drag_slider("1 base turn", 70.0)
         robot.settle()
         with robot.page.grip_arrow(MOVE, "z") as grip:
             grip.sweep(0.05, 4)
             server.kill()
             robot.page.wait_lost()
         come_back(robot, server)
-        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 2
+        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 1
         robot.page.drag_arrow(MOVE, "z", 0.05)
         robot.settle()

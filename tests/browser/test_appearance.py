@@ -18,6 +18,7 @@ from katana450.settings import Settings
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.session import bar
 
 READY = np.array(Settings().ready)
 MOVE = "/target/move"
@@ -53,6 +54,7 @@ def test_each_window_looks_from_where_its_person_asks(
     chain = arm.chain
     page, other = pair
     others = seen_from(other)
+    page.open_tab("Scene")
     for preset, look in CAMERA_POSES.items():
         page.click_button(preset.value)
         wait_for_look(page, np.array(look.position), np.array(look.target))
@@ -67,12 +69,14 @@ def test_each_window_looks_from_where_its_person_asks(
 
     page.wait_until(lambda: np.allclose(seen_from(page)[1], on_tool(READY), atol=1e-3), "it")
     page.keep(artefacts / "look-tool.png")
+    page.open_tab("Drive")
     page.click_button("Go to zero")
     page.wait_until(
         lambda: np.allclose(seen_from(page)[1], on_tool(np.zeros(5)), atol=1e-3),
         "the camera to ride along",
     )
     # The gizmo of the stretched arm would be cut off: same direction, from farther away.
+    page.open_tab("Scene")
     page.click_button(Preset.SIDE.value)
     side = np.array(CAMERA_POSES[Preset.SIDE].position)
 
@@ -83,8 +87,9 @@ def test_each_window_looks_from_where_its_person_asks(
 
     page.wait_until(from_the_side, "a camera at the side")
     fitted = np.stack(seen_from(page))
+    page.open_tab("Drive")
     page.click_button("Home")
-    page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
+    page.wait_until(lambda: "Moving" not in bar(page, "headline"), "the arm to arrive")
     assert np.allclose(np.stack(seen_from(page)), fitted, atol=1e-3)
     assert np.allclose(np.stack(seen_from(other)), np.stack(others), atol=1e-3)
     assert page.errors == other.errors == []
@@ -97,7 +102,7 @@ def test_a_theme_is_of_one_window(pair: tuple[ViserPage, ViserPage], artefacts: 
         patch = window.picture()[90:110, 500:540].reshape(-1, 3)
         return np.asarray(np.median(patch, axis=0), dtype=float)
 
-    page.frame.get_by_text("Show", exact=True).click()
+    page.open_tab("Scene")
     page.click_button("Dark")
     page.wait_until(lambda: sky(page).max() < max(DARK.floor) + 30, "the night", seconds=20.0)
     page.keep(artefacts / "look-dark.png")
@@ -119,8 +124,7 @@ def test_a_window_is_as_its_system_until_its_person_chooses(
             window.frame.evaluate("() => document.documentElement.dataset.mantineColorScheme"),
         )
 
-    if not chose.frame.get_by_role("button", name="Light", exact=True).is_visible():
-        chose.frame.get_by_text("Show", exact=True).click()
+    chose.open_tab("Scene")
     chose.click_button("Light")
     for window in pair:
         window.page.emulate_media(color_scheme="dark")

@@ -21,6 +21,7 @@ from katana450.settings import Settings
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer, ServerError
+from tests.browser.session import AXES, bar
 from tests.gateway.client import ask, enter
 
 READY = np.array(Settings().ready)
@@ -54,8 +55,7 @@ def test_branches_are_shown_and_one_is_taken(
     assert now("limit") == limit_text(axis, distances[axis])
     assert now("singular") == f"{singular_values(chain, READY)[-1]:.3f}"
 
-    for folder in ("Branches", "Show"):
-        page.frame.get_by_text(folder, exact=True).click()
+    page.open_tab("Scene")
     page.frame.get_by_text("Velocity ellipsoid", exact=True).click()
     page.wait_until(
         lambda: any(
@@ -69,8 +69,10 @@ def test_branches_are_shown_and_one_is_taken(
         (arm.T_base_shoulder @ forward(chain, READY))[:3, 3],
         atol=1e-5,
     )
+    page.open_tab("Drive")
+    page.frame.get_by_text("Branches", exact=True).click()
     # The view of the branches moved nothing.
-    assert [page.slider_value(f"Axis {i}") for i in range(1, 6)] == [
+    assert [page.slider_value(label) for label in AXES] == [
         round(math.degrees(angle), 6) for angle in READY
     ]
     assert "nothing" in page.text_of("[data-branch=front-up]")
@@ -78,7 +80,7 @@ def test_branches_are_shown_and_one_is_taken(
     page.frame.get_by_role("button", name="front-down", exact=True).scroll_into_view_if_needed()
     page.keep(artefacts / "app-branches.png")
     page.click_button("front-down")
-    page.wait_until(lambda: page.slider_value("Axis 3") < 0.0, "the other elbow", seconds=30.0)
+    page.wait_until(lambda: page.slider_value("3 elbow") < 0.0, "the other elbow", seconds=30.0)
     assert page.errors == []
 
 
@@ -92,26 +94,26 @@ def test_click_on_a_ghost_takes_its_branch(
     page: ViserPage, server: AppServer, artefacts: Path
 ) -> None:
     page.click_button("Home")
-    page.wait_until(lambda: page.slider_value("Axis 3") > 0.0, "the sliders at home")
+    page.wait_until(lambda: page.slider_value("3 elbow") > 0.0, "the sliders at home")
     # Sent together with the sliders, so it now belongs to the new posture.
-    page.wait_until(lambda: "On target" in page.panel_text(), "the arm at home", seconds=20.0)
+    page.wait_until(lambda: bar(page, "headline") == "On target", "the arm at home", seconds=20.0)
     page.choose("Ghosts", "front-down")
     elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
     page.wait_ready((elbow,))
     page.keep(artefacts / "app-ghosts.png")
-    before = page.slider_value("Axis 3")
+    before = page.slider_value("3 elbow")
 
     def clicked() -> bool:
         # An overloaded browser can lose a click, so click again.
         page.page.mouse.click(*page.project(page.node_pose(elbow)[:3, 3]))
         page.page.wait_for_timeout(3000)
-        return moves(server) or page.slider_value("Axis 3") * before < 0.0
+        return moves(server) or page.slider_value("3 elbow") * before < 0.0
 
     page.wait_until(clicked, "the effect of the click", seconds=40.0)
     page.wait_until(
-        lambda: page.slider_value("Axis 3") * before < 0.0, "the other elbow", seconds=30.0
+        lambda: page.slider_value("3 elbow") * before < 0.0, "the other elbow", seconds=30.0
     )
-    page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
+    page.wait_until(lambda: "Moving" not in bar(page, "headline"), "the arm to arrive")
     assert page.errors == []
 
 
@@ -124,7 +126,7 @@ def test_a_map_of_the_workspace_is_looked_into(
     stored = load_map(path)
     with AppServer((*APP, "--workspace", str(path))) as server:
         page = open_page(server.url, nodes=("/arm", MOVE))
-        page.frame.get_by_text("Show", exact=True).click()
+        page.open_tab("Scene")
 
         def drawn(cut: Cut) -> int:
             page.choose("Reachability", cut.value)

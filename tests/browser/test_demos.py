@@ -40,7 +40,7 @@ class Stage:
     def __init__(self, page: ViserPage, arm: Client) -> None:
         self.page = page
         self.arm = arm
-        page.frame.get_by_text("Programs", exact=True).click()
+        page.open_tab("Programs")
 
     def run(self, script: str) -> None:
         self.page.choose("Script", script)

@@ -74,14 +74,14 @@ def toast(page: ViserPage) -> str:
 
 
 def test_typed_digits_are_sent_on_enter_only(page: ViserPage, truth: Truth) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     home, watch = first_joint(truth), Watch(page)
     type_slowly(page, box, "50")
     assert box.input_value() == "50"
     assert not marked(box)
     assert watch.sent == []
     assert first_joint(truth) == home
-    assert page.slider_value("Axis 1") == home
+    assert page.slider_value("1 base turn") == home
     box.press("Enter")
     assert watch.sent == [50]
     wait_for_joint(page, truth, 50.0)
@@ -90,7 +90,7 @@ def test_typed_digits_are_sent_on_enter_only(page: ViserPage, truth: Truth) -> N
 
 
 def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     home, watch = first_joint(truth), Watch(page)
     type_slowly(page, box, "500")
     assert marked(box)
@@ -112,18 +112,17 @@ def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth
 
 def test_leaving_the_box_sends_the_value(page: ViserPage) -> None:
     watch = Watch(page)
-    type_slowly(page, page.number_box("Axis 1"), "12.5")
+    type_slowly(page, page.number_box("1 base turn"), "12.5")
     page.page.keyboard.press("Tab")
     assert watch.sent == [12.5]
     # The typed value is sent before the effect of the next button.
-    type_slowly(page, page.number_box("Speed"), "60")
+    type_slowly(page, page.number_box("Gripper"), "60")
     page.click_button("Home")
     assert watch.sent == [12.5, 60, "Home"]
-    page.type_number("Speed", 100)
 
 
 def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Truth) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     home, watch = box.input_value(), Watch(page)
     type_slowly(page, box, "50")
     box.press("Escape")
@@ -138,7 +137,7 @@ def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Tru
 
 
 def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     watch = Watch(page)
     type_slowly(page, box, "20")
     for key in ("ArrowUp", "ArrowUp", "ArrowDown"):
@@ -162,7 +161,7 @@ def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
 
 def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
     """Assistive technology types as a person does, or sets the value without the focus."""
-    for label, index, text in (("Gripper", 0, "35"), ("Speed", 0, "70"), ("r, p, y", 2, "-12")):
+    for label, index, text in (("Gripper", 0, "35"), ("r, p, y", 2, "-12")):
         box = page.number_box(label, index=index)
         before = float(box.input_value())
         watch = Watch(page)
@@ -174,7 +173,7 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
         page.type_number(label, before, index=index)
     watch = Watch(page)
     page.frame.evaluate("() => document.activeElement.blur()")
-    page.number_box("Speed").evaluate(
+    page.number_box("Gripper").evaluate(
         """(box) => {
             const { prototype } = HTMLInputElement;
             Object.getOwnPropertyDescriptor(prototype, "value").set.call(box, "80");
@@ -183,4 +182,31 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
         }"""
     )
     assert watch.sent == [80]
-    page.type_number("Speed", 100)
+
+
+def test_pose_form_converts_units_and_copies_the_present_pose(page: ViserPage) -> None:
+    def numbers(label: str) -> list[float]:
+        return [float(page.number_box(label, index=i).input_value()) for i in range(3)]
+
+    watch = Watch(page)
+    page.click_button("Copy current")
+    page.wait_until(lambda: numbers("x, y, z") == [478.5, 0.0, 7.6], "the pose in mm and {S}")
+    assert numbers("r, p, y") == [0.0, 25.0, 0.0]
+    page.choose("Units", "cm")
+    page.choose("Frame", "Base")
+    page.wait_until(lambda: numbers("x, y, z") == [47.85, 0.0, 28.21], "the pose in cm and base")
+    assert page.text_of("[data-now=z]") == "28.21"
+    # A value beyond the arm's reach in the chosen unit is not sent.
+    box = page.number_box("x, y, z")
+    type_slowly(page, box, "101")
+    assert marked(box)
+    page.choose("Frame", "Shoulder {S}")
+    page.choose("Units", "mm")
+    page.wait_until(lambda: numbers("x, y, z") == [478.5, 0.0, 7.6], "the pose in mm again")
+    assert len(watch.sent) == 5
+
+
+def test_gripper_is_closed_and_opened_by_buttons(page: ViserPage) -> None:
+    for label, percent in (("Close", 0.0), ("Open", 100.0)):
+        page.click_button(label)
+        page.wait_until(lambda p=percent: page.slider_value("Gripper") == p, label)  # type: ignore[misc]

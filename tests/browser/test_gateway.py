@@ -16,7 +16,7 @@ import pytest
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, THIN, Truth, bar, clear_stop, go_home
+from tests.browser.session import AXES, MOVE, THIN, Truth, bar, clear_stop, go_home
 from tests.gateway.client import SUBPROTOCOL as VISER
 from tests.gateway.client import enter, page_name, websocket
 from tests.gateway.slow_link import SlowLink
@@ -84,7 +84,7 @@ def test_stop_works_under_any_load(
                 grip.to(-0.02)
             clear_stop(page, truth)
         for number in range(STOPS):
-            page.drag_slider("Axis 1", 20.0 if number % 2 else -20.0, steps=2)
+            page.drag_slider("1 base turn", 20.0 if number % 2 else -20.0, steps=2)
             page.frame.locator("body").press("Escape" if number % 2 else " ")
             stopped()
             clear_stop(page, truth)
@@ -99,7 +99,7 @@ def test_stop_works_under_any_load(
 
 
 def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, truth: Truth) -> None:
-    q = [page.slider_value(f"Axis {axis}") for axis in range(1, 6)]
+    q = [page.slider_value(label) for label in AXES]
     with page.grip_arrow(MOVE, "z") as grip:
         page.page.keyboard.press("Space")
         truth.wait(mood="stopped")
@@ -107,12 +107,12 @@ def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, trut
         # The drag continues and moves nothing.
         grip.sweep(0.05, 5)
         page.page.wait_for_timeout(300)
-        assert [page.slider_value(f"Axis {axis}") for axis in range(1, 6)] == q
+        assert [page.slider_value(label) for label in AXES] == q
     page.wait_until(
         lambda: page.node_pose(MOVE)[2, 3] == pytest.approx(0.282, abs=2e-3), "the handle to return"
     )
     page.drag_arrow(MOVE, "z", 0.03)
-    page.wait_until(lambda: page.slider_value("Axis 2") != q[1], "a fresh drag to move it")
+    page.wait_until(lambda: page.slider_value("2 shoulder") != q[1], "a fresh drag to move it")
     page.click_button("Home")
 
 
@@ -131,10 +131,12 @@ def test_arm_is_handed_over(
     me, they = (bar(each, "name").partition(",")[0] for each in (page, other))
     other.wait_until(lambda: bar(other, "holder") == f"{me} drives", "who drives")
     # A control of a person who does not drive springs back, and the reason is shown.
-    before = other.slider_value("Axis 1")
-    other.drag_slider("Axis 1", 40.0)
+    before = other.slider_value("1 base turn")
+    other.drag_slider("1 base turn", 40.0)
     other.wait_until(lambda: bar(other, "toast") == f"{me} holds the arm: ask for it.", "why not")
-    other.wait_until(lambda: other.slider_value("Axis 1") == before, "the slider to spring back")
+    other.wait_until(
+        lambda: other.slider_value("1 base turn") == before, "the slider to spring back"
+    )
     other.press_in_bar("Request")
     page.wait_until(lambda: f"{they} asks for it" in bar(page, "name"), "the request")
     page.keep(artefacts / "gateway-request.png")
@@ -148,7 +150,7 @@ def test_arm_is_handed_over(
     other.press_in_bar("Release")
     page.wait_until(lambda: bar(page, "holder") == "Nobody drives", "nobody to drive")
     # The first person who uses a control drives.
-    other.drag_slider("Axis 1", 10.0)
+    other.drag_slider("1 base turn", 10.0)
     other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
     assert other.errors == []
 
@@ -179,7 +181,7 @@ def test_slow_connection_shows_few_but_no_old_frames(
 
         since = time.time()
         for degrees in (150.0, -150.0, 150.0, -150.0):
-            page.type_number("Axis 1", degrees)
+            page.type_number("1 base turn", degrees)
             page.page.wait_for_timeout(1000)
             truth.wait(20.0, mood="ok")
         rested = time.monotonic()

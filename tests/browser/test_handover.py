@@ -44,7 +44,7 @@ def test_program_is_ended_in_the_bar_and_its_owner_chooses_the_next_driver(
     truth = Truth(server)
     owner, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
     me, they = (bar(each, "name").partition(",")[0] for each in (owner, other))
-    owner.frame.get_by_text("Programs", exact=True).click()
+    owner.open_tab("Programs")
     owner.choose("Script", "Wave")
     run(owner)
     shown(owner, "Pause", "End", within="orders")

@@ -373,7 +373,7 @@ def test_instruments_follow_sliders_and_theme_of_visers_page(
         return found
 
     light = ink()
-    page.frame.get_by_text("Show", exact=True).click()
+    page.open_tab("Scene")
     page.click_button("Dark")
     page.wait_until(lambda: ink() != light, "the dark theme")
     page.click_button("Light")

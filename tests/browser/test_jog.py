@@ -73,12 +73,12 @@ def test_pads_and_buttons_move_while_they_are_held(
             page.keep(artefacts / "gateway-jog.png")
         mouse.up()
         truth.wait(mood="ok")
-    start = page.slider_value("Axis 5")
+    start = page.slider_value("5 wrist roll")
     box = page.page.get_by_role("button", name="Roll right").bounding_box()
     assert box is not None
     mouse.move(box["x"] + 10, box["y"] + 10)
     mouse.down()
-    page.wait_until(lambda: page.slider_value("Axis 5") > start + 3.0, "the tool to roll")
+    page.wait_until(lambda: page.slider_value("5 wrist roll") > start + 3.0, "the tool to roll")
     mouse.up()
     truth.wait(mood="ok")
 

@@ -15,7 +15,7 @@ from playwright.sync_api import Route
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
-from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, take
+from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, set_speed, take
 from tests.browser.test_app import Robot
 from tests.gateway.slow_link import SlowLink
 
@@ -104,7 +104,7 @@ def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) ->
     with AppServer(ATTENTIVE_APP) as server, SlowLink(server.port, 1e9) as line:
         truth = Truth(server)
         page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
-        page.type_number("Axis 1", -150.0)
+        page.type_number("1 base turn", -150.0)
         truth.wait(mood="moving")
         scene = page.page.locator("#scene")
         place = scene.bounding_box()
@@ -150,7 +150,7 @@ def test_reload_during_a_drag_stops_the_arm_with_a_reason(
         truth = Truth(server)
         page = open_page(server.url, nodes=("/arm", MOVE))
         take(page)
-        page.type_number("Speed", 100 * SLOW)
+        set_speed(page, 100 * SLOW)
         truth.wait(speed=SLOW)
         begin_drag(page, truth)
         name = truth.status()["holder"]
@@ -211,7 +211,7 @@ def test_page_outlasts_each_process_and_shows_the_truth(open_page: OpenPage, pro
     with AppServer(APP) as server:
         truth = Truth(server)
         page = open_page(server.url, nodes=("/arm", MOVE))
-        page.type_number("Axis 1", -150.0)
+        page.type_number("1 base turn", -150.0)
         truth.wait(mood="moving")
         os.kill(server.child(f"katana450 {process}"), signal.SIGSTOP)
         frozen = time.monotonic()

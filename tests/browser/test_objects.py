@@ -67,6 +67,7 @@ def test_an_object_is_brought_moved_changed_and_removed(
         )
         np.testing.assert_allclose(place_of(page), moved, atol=1e-9)
 
+        page.open_tab("Scene")
         page.type_number("Scale", 0.15)
         page.wait_until(
             lambda: any(

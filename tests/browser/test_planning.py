@@ -15,6 +15,7 @@ from katana450.server.api import answers
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.session import set_speed
 
 pytestmark = pytest.mark.long
 
@@ -31,7 +32,7 @@ def server() -> Iterator[AppServer]:
 @pytest.fixture(scope="module")
 def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
     with windows.open(server.url, nodes=("/arm", "/target/move")) as page:
-        page.frame.get_by_text("Programs", exact=True).click()
+        page.open_tab("Programs")
         yield page
         assert page.errors == []
 
@@ -114,7 +115,7 @@ def test_pause_during_planning_lasts_until_resume(
     until(page, r"Planning Square \d+%")
     assert orders(page) == ["Pause", "Cancel"]
     height = page.page.locator("header").bounding_box()
-    page.click_button("Pause")
+    press(page, "Pause")
     until(page, "Planning Square, paused")
     assert orders(page) == ["Resume", "Cancel"]
     assert page.page.locator("header").bounding_box() == height
@@ -130,16 +131,12 @@ def test_pause_during_planning_lasts_until_resume(
     wait(arm, lambda state: state.moving)
     page.keep(artefacts / "planning-running.png")
     # The owner can use every control that changes the pace.
-    page.click_button("Pause")
+    press(page, "Pause")
     until(page, "Square, paused", 5.0)
-    page.click_button("Resume")
+    press(page, "Resume")
     until(page, r"Square, step .*", 5.0)
-    page.drag_slider("Speed", 30.0)
+    set_speed(page, 30.0)
     wait(arm, lambda state: 0.2 < state.speed < 0.4)
-    page.click_button("Wait")
-    until(page, "Square, paused", 5.0)
-    page.click_button("Resume")
-    until(page, r"Square, step .*", 5.0)
     assert not page.page.locator("#toast.shown").is_visible()
     page.press_in_bar("STOP")
     wait(arm, lambda state: state.stopped is not None and not state.moving)

@@ -187,10 +187,12 @@ def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
     # After a view button, the view is fitted again, also at later sizes.
     desk.frame.get_by_text("Katana450", exact=True).first.click()
     desk.page.wait_for_timeout(500)
+    desk.open_tab("Scene")
     desk.click_button("Front")
     wait_whole(desk, "from the front")
     resize(desk, WIDE)
     wait_whole(desk, "from the front and wide")
+    desk.open_tab("Scene")
     desk.click_button("3D")
     wait_whole(desk, "again")
 

@@ -25,14 +25,13 @@ def test_page_drives_stops_and_offers_no_programs(
 ) -> None:
     page = open_page(server.url, nodes=("/arm", "/target/move"))
     take(page)
-    page.drag_slider("Axis 1", 20.0)
+    page.drag_slider("1 base turn", 20.0)
     page.wait_until(lambda: bar(page, "headline") == "On target", "the arm to arrive")
     page.page.keyboard.press("Space")
     page.wait_until(lambda: mood(page.page) == "stopped", "the stop")
     page.press_in_bar("Clear stop")
     page.wait_until(lambda: mood(page.page) == "ok", "the stop to be cleared")
     assert page.page.locator("#orders button").count() == 0
-    assert "Programs" not in page.panel_text()
-    assert "Objects" in page.panel_text()
+    assert page.tabs() == ["Drive", "Scene"]
     page.keep(artefacts / "without-programs.png")
     assert page.errors == []

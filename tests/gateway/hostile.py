@@ -20,5 +20,5 @@ async def peers(url: str) -> AsyncIterator[tuple[Peer, Peer]]:
 
 
 async def moves_the_arm(good: Peer, degrees: float) -> list[dict[str, Any]]:
-    await good.set("Axis 1", value=degrees)
+    await good.set("1 base turn", value=degrees)
     return await good.listen()

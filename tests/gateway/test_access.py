@@ -74,9 +74,9 @@ def test_roles_grant_exactly_their_rights(guarded: tuple[AppServer, Path]) -> No
             for request in ("acquire", "take", "ask"):
                 await watcher.say(request)
                 assert "only watch" in (await watcher.notice("refused"))["why"]
-            await watching.set("Axis 1", value=20.0)
+            await watching.set("1 base turn", value=20.0)
             assert "only watch" in (await watcher.notice("refused"))["why"]
-            await driving.set("Axis 1", value=10.0)
+            await driving.set("1 base turn", value=10.0)
             assert (await watcher.wait(holder="Operator"))["role"] == "viewer"
             async with asyncio.timeout(5.0):
                 while not any(

@@ -206,7 +206,7 @@ def test_first_control_used_acquires_the_free_lease_and_is_logged(
             assert line.grounds == "took the free lease"
             assert f"{name} (scene, took the free lease), MoveTool: " in server.output
             await end(peer)
-            await peer.set("Axis 1", value=12.5)
+            await peer.set("1 base turn", value=12.5)
             await control.say("stop")
             await control.wait(stop="confirmed")
             line = await noted(watcher, "stopped", name, "Stop")

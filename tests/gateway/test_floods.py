@@ -95,7 +95,7 @@ def test_large_message_is_refused(server: AppServer) -> None:
     async def attack() -> None:
         async with peers(server.url) as (bad, good):
             with suppress(ConnectionClosed):
-                await bad.set("Axis 1", value="x" * 10 * MAX_MESSAGE_BYTES)
+                await bad.set("1 base turn", value="x" * 10 * MAX_MESSAGE_BYTES)
                 await bad.listen(5.0)
             assert bad.socket.close_code == 1009
             assert await good.listen(BRIEF) == []

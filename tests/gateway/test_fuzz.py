@@ -38,7 +38,7 @@ HERE = "127.0.0.1"
 
 NASTY: tuple[Any, ...] = (
     None, True, -1, 2**63, -(2**31), 1e308, -0.0, "", "x" * 300, "\x00", "NaN", "../..", [], {},
-    [[]], [0.0] * 5, [1e9] * 4, {"value": 1}, [None] * 3, "Axis 1", "/target/move",
+    [[]], [0.0] * 5, [1e9] * 4, {"value": 1}, [None] * 3, "1 base turn", "/target/move",
 )  # fmt: skip
 NOT_JSON: tuple[Any, ...] = (math.nan, math.inf, -math.inf, b"\xff\xfe", b"")
 

@@ -41,19 +41,19 @@ ATTACKS: dict[str, Attack] = {
     "a gizmo that was never taken hold of": lambda p: p.say(
         **GIZMO, wxyz=UPRIGHT, position=[0.3, 0.0, 0.2]
     ),
-    "a slider that is not a number": lambda p: p.set("Axis 1", value=math.nan),
-    "an infinite slider": lambda p: p.set("Axis 2", value=-math.inf),
-    "a slider beyond its range": lambda p: p.set("Axis 1", value=400.0),
-    "a slider below its range": lambda p: p.set("Axis 3", value=-117.8),
-    "a slider that is text": lambda p: p.set("Axis 1", value="12"),
-    "a slider that is a list": lambda p: p.set("Axis 1", value=[1.0]),
-    "a slider that is nothing": lambda p: p.set("Axis 1", value=None),
-    "a slider that is a yes": lambda p: p.set("Axis 1", value=True),
-    "a control taken away": lambda p: p.set("Axis 1", removed=True),
-    "a control gone deaf": lambda p: p.set("Axis 1", update_cb=[]),
-    "a control with a new range": lambda p: p.set("Axis 1", props={"max": 9999.0}),
-    "a value and more": lambda p: p.set("Axis 1", value=10.0, removed=True),
-    "no update at all": lambda p: p.set("Axis 1"),
+    "a slider that is not a number": lambda p: p.set("1 base turn", value=math.nan),
+    "an infinite slider": lambda p: p.set("2 shoulder", value=-math.inf),
+    "a slider beyond its range": lambda p: p.set("1 base turn", value=400.0),
+    "a slider below its range": lambda p: p.set("3 elbow", value=-117.8),
+    "a slider that is text": lambda p: p.set("1 base turn", value="12"),
+    "a slider that is a list": lambda p: p.set("1 base turn", value=[1.0]),
+    "a slider that is nothing": lambda p: p.set("1 base turn", value=None),
+    "a slider that is a yes": lambda p: p.set("1 base turn", value=True),
+    "a control taken away": lambda p: p.set("1 base turn", removed=True),
+    "a control gone deaf": lambda p: p.set("1 base turn", update_cb=[]),
+    "a control with a new range": lambda p: p.set("1 base turn", props={"max": 9999.0}),
+    "a value and more": lambda p: p.set("1 base turn", value=10.0, removed=True),
+    "no update at all": lambda p: p.set("1 base turn"),
     "a tool there is not": lambda p: p.set("Tool", value="hammer"),
     "a button there is not": lambda p: p.set("Drive", value="Explode"),
     "a typed pose that is not a number": lambda p: p.set("x, y, z", value=[0.0, math.nan, 0.0]),
@@ -148,7 +148,7 @@ def test_arm_obeys_a_valid_browser_after_the_attacks(server: AppServer) -> None:
                 m["updates"] for m in messages if m["type"] == "GuiUpdateMessage"
             ]
             # The other browser does not hold the lease: it gets the true value back.
-            await bad.set("Axis 1", value=30.0)
+            await bad.set("1 base turn", value=30.0)
             (truth,) = [m for m in await bad.listen() if m["type"] == "GuiUpdateMessage"]
             assert truth["updates"] == {"value": 12.5}
             assert await good.listen(BRIEF) == []

@@ -208,7 +208,7 @@ def test_owner_on_the_tcp_port_paces_its_program(server: AppServer, arm: Client)
 
 
 @pytest.mark.long
-def test_page_paces_its_program_on_both_sockets(server: AppServer, arm: Client) -> None:
+def test_page_paces_its_program_and_a_stranger_does_not(server: AppServer, arm: Client) -> None:
     async def driven() -> None:
         async with opened(server.url) as (peer, control):
 
@@ -225,22 +225,18 @@ def test_page_paces_its_program_on_both_sockets(server: AppServer, arm: Client) 
             await peer.set("Program", value="Run")
             await control.wait(40.0, mood="planning")
             assert control.status["headline"].startswith("Planning")
-            await peer.set("Motion", value="Pause")
+            await control.say("pause")
             await until(program="paused")
             await control.wait(headline="Square, paused", orders=["resume", "end"])
-            await peer.set("Motion", value="Resume")
-            await until(program="running")
-            await peer.set("Speed", value=20.0)
-            await until(speed=0.2)
-            await peer.set("Program", value="Wait")
-            await until(program="paused")
             await control.say("resume")
             await until(program="running")
+            await control.say("speed", value=0.2)
+            await until(speed=0.2)
             await control.say("speed", value=0.3)
             await until(speed=0.3)
             assert not [each for each in control.heard if each["is"] == "refused"]
-            async with opened(server.url) as (stranger, watching):
-                await stranger.set("Motion", value="Pause")
+            async with opened(server.url) as (_, watching):
+                await watching.say("pause")
                 refused = await watching.notice("refused")
                 assert "Square holds the arm" in refused["why"]
                 await until(program="running")

@@ -45,7 +45,7 @@ def test_hanging_page_of_the_driver_causes_a_stop_in_time() -> None:
             await control.say("take")
             await control.wait(mine=True)
             for degrees in (165.0, -170.0, 165.0):
-                await peer.set("Axis 1", value=degrees)
+                await peer.set("1 base turn", value=degrees)
                 await control.wait(mood="moving")
                 control.alive = False
                 await control.wait(mood="stopped")

@@ -75,14 +75,14 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
     server: viser.ViserServer, robot: Robot
 ) -> None:
     state = standing(robot)
-    MachinePanel(server.gui, robot.joint_group, RecordedGestures(), state)
+    MachinePanel(server.gui, robot, RecordedGestures(), state)
     controls = {
         handle.label: handle for handle in internals.controls(server)
         if isinstance(handle, viser.GuiSliderHandle)
     }  # fmt: skip
     joints = robot.joint_group
-    labels = [f"{axis + 1}. {name}" for axis, name in enumerate(joints.names)]
-    assert set(controls) == {*labels, "Speed"}
+    labels = [f"{axis + 1} {name}" for axis, name in enumerate(joints.names)]
+    assert set(controls) == set(labels)
     for axis, label in enumerate(labels):
         unit = 1e3 if joints.slides[axis] else float(np.degrees(1.0))
         assert controls[label].min == pytest.approx(unit * joints.lower[axis], abs=0.01)
@@ -90,6 +90,6 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
         assert controls[label].max <= unit * joints.upper[axis] + 1e-9
         # No joint name can produce a label that the guard treats differently.
         assert label not in (*PERSONAL, *ProgramRunner.controls)
-    assert "mm" in page(joints, state)
+    assert "mm" in page(joints, labels, state)
     texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]
     assert any("It is &lt;b&gt;no&lt;/b&gt; arm." in text for text in texts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
 from katana450.extensions.programs.server.panel import ProgramsPanel, _page
 from katana450.extensions.programs.server.preview import GHOSTS
+from katana450.extensions.programs.server.step_list import ListedStep, steps_of
+from katana450.extensions.programs.server.step_list import page as step_page
 from katana450.extensions.programs.timeline import Timeline
 from katana450.maths.kinematics.forward import forward
 from katana450.server.api.answers import Progress
@@ -88,11 +91,11 @@ def test_panel_previews_steers_and_teaches(
     panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
     program_runner.progress = Progress(name="x", by="me", status="running")
-    for label in ("Wait", "Run", "End"):
+    for label in ("Run", "End"):
         panel._orders.value = label  # type: ignore[misc]  # as above
         panel._order(ANNA)
     assert [order for _, order in program_runner.requests] == [
-        ProgramOrder.RUN, ProgramOrder.PAUSE, ProgramOrder.RUN, ProgramOrder.END
+        ProgramOrder.RUN, ProgramOrder.RUN, ProgramOrder.END
     ]  # fmt: skip
     assert parse(program_runner.requests[0][0]).name == "Circle with gripper"
 
@@ -101,6 +104,18 @@ def test_panel_previews_steers_and_teaches(
         panel._on_teach(ANNA)
     assert len(parse((tmp_path / "My script.yaml").read_text(encoding="utf-8")).steps) == 2
     assert panel._choice.value == "My script"
+
+
+def marked(panel: ProgramsPanel) -> list[str]:
+    """Return the names of the steps that the list marks as current."""
+    return re.findall(r"<li aria-current=step><span>(\w+)</span>", panel._list.content)
+
+
+def test_names_of_steps_are_escaped_in_markup() -> None:
+    text = step_page((ListedStep("<b>", 1.25), ListedStep("wait", 0.0)), 1)
+    assert "<li><span>&lt;b&gt;</span><span>1.2 s</span></li>" in text
+    assert "<li aria-current=step><span>wait</span><span></span></li>" in text
+    assert step_page((), None) == ""
 
 
 def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
@@ -143,14 +158,23 @@ def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
     assert robot.frames(robot.joint_values(q, fingers))["tcp"] == pytest.approx(tool, abs=1e-9)
 
     assert timeline.span <= panel._look.max < timeline.span + 0.11
+    setting, first, second = steps_of(program)
+    assert [setting.name, first.name, second.name] == ["tool tcp", "joints", "line"]
+    assert setting.seconds == 0.0
+    assert first.seconds + second.seconds == pytest.approx(timeline.span)
+    assert marked(panel) == []
+    panel._look.value = first.seconds + 0.01  # type: ignore[misc]  # as above
+    panel.follow()
+    assert marked(panel) == ["line"]
     panel._look.value = 1.0  # type: ignore[misc]  # as above
     preview.look(1.0)
     assert looked_at()
     preview.look(0.0)
     assert not looked_at()
     preview.look(1.0)
-    program_runner.progress = Progress(name="x", by="me", status="running")
+    program_runner.progress = Progress(name="x", by="me", status="running", step=2)
     panel.follow()
+    assert marked(panel) == ["joints"]
     assert not ghosts()
     assert not looked_at()
     assert panel._look.disabled

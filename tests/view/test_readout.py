@@ -10,9 +10,11 @@ import pytest
 
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import condition_number, limit_distances, manipulability
 from katana450.server.view.controls import ends
-from katana450.server.view.readout import page
+from katana450.server.view.pose_display import BASE, SHOULDER, UNITS, PoseDisplay
+from katana450.server.view.readout import details, page
 
 
 def test_limit_distance_of_every_axis_is_shown_and_the_nearest_marked(
@@ -20,7 +22,7 @@ def test_limit_distance_of_every_axis_is_shown_and_the_nearest_marked(
 ) -> None:
     random, chain = np.random.default_rng(2), arm.chain
     for q in random.uniform(chain.lower, chain.upper, (20, 5)):
-        text = page(arm, replace(session.begin(session.ready, 0.0, 0.0), q=q))
+        text = details(arm, replace(session.begin(session.ready, 0.0, 0.0), q=q))
         (rooms,) = re.findall(r"data-now='limits'>(.*?)</table>", text)
         cells = re.findall(r"<td( class=nearest)?>(\d+)°</td>", rooms)
         distances = np.degrees(limit_distances(chain, q))
@@ -30,13 +32,45 @@ def test_limit_distance_of_every_axis_is_shown_and_the_nearest_marked(
 
 def test_velocity_measures_equal_those_of_the_kinematics(arm: MountedArm, session: Session) -> None:
     chain, state = arm.chain, session.begin(session.ready, 0.0, 0.0)
-    text = page(arm, state)
+    text = details(arm, state)
     assert f"<td data-now='condition'>{condition_number(chain, state.q):.0f}</td>" in text
     assert f"<td data-now='manipulability'>{manipulability(chain, state.q):.3f}</td>" in text
 
 
 def test_condition_is_infinite_in_a_singularity(arm: MountedArm, session: Session) -> None:
-    assert "<td data-now='condition'>∞</td>" in page(arm, session.begin(np.zeros(5), 0.0, 0.0))
+    assert "<td data-now='condition'>∞</td>" in details(arm, session.begin(np.zeros(5), 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("unit", "frame", "x", "z", "heading"),
+    [
+        ("mm", SHOULDER, "478.5", "7.6", "tcp in {S}"),
+        ("mm", BASE, "478.5", "282.1", "tcp in base"),
+        ("cm", BASE, "47.85", "28.21", "tcp in base"),
+        ("in", SHOULDER, "18.840", "0.297", "tcp in {S}"),
+    ],
+)
+def test_tool_pose_is_shown_in_the_chosen_units_and_frame(
+    arm: MountedArm, session: Session, unit: str, frame: str, x: str, z: str, heading: str
+) -> None:
+    display = PoseDisplay(UNITS[unit], frame, arm.T_base_shoulder)
+    text = page(arm, session.begin(session.ready, 0.0, 0.0), display)
+    assert f"<th>{heading}</th>" in text
+    for place in ("now", "goal"):
+        assert f"<td data-{place}='x'>{x}</td>" in text
+        assert f"<td data-{place}='z'>{z}</td>" in text
+        assert f"<td data-{place}='pitch'>25.0</td>" in text
+    assert f"<td class='unit'>{unit}</td>" in text
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("frame", [BASE, SHOULDER])
+def test_pose_is_the_same_from_its_numbers_in_any_units_and_frame(
+    arm: MountedArm, unit: str, frame: str
+) -> None:
+    T = forward(arm.chain, np.array([0.4, -1.0, 1.2, 0.3, -0.7]))
+    display = PoseDisplay(UNITS[unit], frame, arm.T_base_shoulder)
+    np.testing.assert_allclose(display.pose(*display.numbers(T)), T, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -22,9 +22,9 @@ def controls(server: viser.ViserServer) -> list[Any]:
 
 
 def panel(server: viser.ViserServer) -> list[Any]:
-    """Return the handles at the top level of the panel."""
-    root: Any = server.gui._container_handle_from_uuid["root"]
-    return list(root._children.values())
+    """Return the handles of all elements of the panel, in its tabs and folders too."""
+    containers: Any = server.gui._container_handle_from_uuid.values()
+    return [handle for container in containers for handle in container._children.values()]
 
 
 def sent(server: viser.ViserServer) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Iterator
 from functools import partial
 from threading import Event
 
@@ -24,7 +25,8 @@ from katana450.server.service.nodes import Nodes
 from katana450.server.service.runner import guarded
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
-from katana450.server.view.panel_folder import FolderContext
+from katana450.server.view.panel_folder import FolderContext, PanelFolder
+from katana450.server.view.panel_tabs import PanelTabs
 from katana450.server.view.view import View, ViewOptions
 from katana450.server.view.view_updater import ViewUpdater
 
@@ -65,9 +67,8 @@ def build_frontend(
         gateway.attach(ArmHandle(robot, session, link, None, nodes))
         return link, _machine_view(gateway, config, robot, link), None
     planning_worker = PlanningWorker(session, link.state_publisher, link)
-    view = _view(gateway, config, found, link, ViewOptions(layers, meshes))
-    if config.options is not None:
-        _add_folders(view, gateway, config.options, robot, link)
+    folders = partial(_folders, gateway, config.options, robot, link)
+    view = _view(gateway, config, found, link, ViewOptions(layers, meshes, folders))
     go = partial(gateway.hub.gate.submit, cmd.Go()) if settings.go_on_release else None
     detours = DetourPlanner(session, link.state_publisher, planning_worker, go)
     planning_worker.notify = gateway.announce
@@ -113,10 +114,16 @@ def _view(
     )
 
 
-def _add_folders(
-    view: View, gateway: Gateway, options: Namespace, robot: Robot, link: FrontEnd
-) -> None:
-    """Add the folders of the extensions to the panel. Raises KatanaError."""
+def _folders(
+    gateway: Gateway,
+    options: Namespace | None,
+    robot: Robot,
+    link: FrontEnd,
+    tabs: PanelTabs,
+) -> Iterator[PanelFolder]:
+    """Add the controls of the extensions to the panel. Raises KatanaError."""
+    if options is None:
+        return
     context = FolderContext(
         gateway.viser,
         robot,
@@ -125,11 +132,12 @@ def _add_folders(
         gateway.hub,
         gateway.call,
         options,
+        tabs,
     )
     for part in serve_extensions():
         folder = None if part.folder is None else part.folder(context)
         if folder is not None:
-            view.add(folder)
+            yield folder
 
 
 def _machine_view(

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from katana450.server.service.runner import Runner
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
 
+TAB = "Programs"
+"""Label of the panel's tab with the controls."""
+
 OWNER_SILENCE, LONGEST_OWNER_SILENCE = 1.0, 10.0
 """[s] Default and longest heartbeat timeout of a program's owner, after which the program ends."""
 
@@ -60,14 +63,15 @@ def _folder(context: FolderContext) -> PanelFolder | None:
     if not isinstance(runner, ProgramRunner):
         # Another extension provides the only runner of this server.
         return None
-    return ProgramsPanel(
-        context.server,
-        context.robot,
-        PanelAccess(runner, context.hub, context.call),
-        Scripts(context.options.programs),
-        context.gestures,
-        context.state,
-    )
+    with context.tabs.tab(TAB):
+        return ProgramsPanel(
+            context.server,
+            context.robot,
+            PanelAccess(runner, context.hub, context.call),
+            Scripts(context.options.programs),
+            context.gestures,
+            context.state,
+        )
 
 
 EXTENSION = Extension(

@@ -107,17 +107,17 @@ class CommandGate:
             raise LeaseError("The server itself may not move the arm.")
         return self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
 
-    def claim(self, actor: Actor, *, pacing: bool = False) -> Actor:
+    def claim(self, actor: Actor) -> Actor:
         """Return ``actor`` with the grounds on which it may command now; send no command.
 
-        A gesture without a command, such as grabbing a handle, uses this. ``pacing``: the gesture
-        pauses, resumes or slows down. Raises, and acquires a free lease, as ``submit`` does.
+        A gesture without a command, such as grabbing a handle, uses this. Raises, and acquires a
+        free lease, as ``submit`` does.
         """
         with self._lock:
             try:
                 self.check_runs()
                 self._check_settled(actor)
-                return self._granted(actor, pacing=pacing)
+                return self._granted(actor, pacing=False)
             except LeaseError as error:
                 self.recorder.refuse("gesture", actor, error)
                 raise

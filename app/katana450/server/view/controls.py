@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -11,9 +12,9 @@ import viser
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.state import State
+from katana450.arm.control.messages import AXIS_NAMES
+from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError, LeaseError
-from katana450.server.viser_bridge.labels import PACING
 
 WORTH_SENDING = 2e-6
 """Smallest change [deg, mm] that is sent. The conversion to radians and back rounds by less."""
@@ -37,11 +38,6 @@ Listen = Callable[[Clickable, Callable[[], cmd.Command]], None]
 
 A change by this program sends nothing.
 """
-
-ORDERS: dict[str, cmd.Command] = {
-    "Pause": cmd.Pause(),
-    "Resume": cmd.Resume(),
-}
 
 
 class GestureGate(Protocol):
@@ -119,24 +115,16 @@ def refuse(
         )
 
 
-def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSliderHandle[float]:
-    """Add the buttons Pause and Resume and the speed slider. Return the slider [percent]."""
-    orders = gui.add_button_group(
-        PACING[0],
-        tuple(ORDERS),
-        hint="Pause: wait on the path until Resume. STOP is at the top, and on Space and Esc",
-    )
-    listen(orders, lambda: ORDERS[orders.value])
-    speed = gui.add_slider(
-        PACING[1],
-        min=1.0,
-        max=100.0,
-        step=1.0,
-        initial_value=round(100.0 * state.speed),
-        hint="Percent of the maximum speed, also for the current motion",
-    )
-    listen(speed, lambda: cmd.SpeedScale(speed.value / 100.0))
-    return speed
+def joint_labels(robot: Robot) -> tuple[str, ...]:
+    """Return the label of each joint: its number, as in messages, and its name.
+
+    Joints of an arm that the robot description only numbers have the names of a five-axis arm.
+    """
+    arm = robot.arm
+    names = robot.joint_group.names if arm is None else arm.chain.names
+    if arm is not None and all(re.fullmatch(r"axis_?\d+", name) for name in names):
+        names = AXIS_NAMES
+    return tuple(f"{number} {name}" for number, name in enumerate(names, start=1))
 
 
 def ends(lower: float, upper: float) -> tuple[float, float]:

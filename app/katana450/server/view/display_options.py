@@ -47,7 +47,6 @@ def add_views(gui: viser.GuiApi, shows: DisplayOptions) -> None:
 
 def add_shows(gui: viser.GuiApi, shows: DisplayOptions) -> None:
     """Add the controls of the folder "Show"."""
-    add_themes(gui)
     box = gui.add_checkbox(
         "Velocity ellipsoid",
         initial_value=False,

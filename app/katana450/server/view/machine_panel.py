@@ -1,8 +1,9 @@
-"""The control panel of a mechanism that is driven joint by joint: the reason, and its sliders."""
+"""The control panel of a mechanism that is driven joint by joint: sliders and joint values."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from html import escape
 
 import viser
@@ -10,18 +11,20 @@ import viser
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.messages import headline, mood, sentence, signed
+from katana450.arm.control.messages import signed
 from katana450.arm.control.state import State
+from katana450.arm.robot.robot import Robot
 from katana450.server.view.controls import (
     GestureGate,
     Listen,
-    add_motion,
     ends,
+    joint_labels,
     listener,
     set_slider,
 )
 from katana450.server.view.display_options import add_themes
 from katana450.server.view.event_list import EventList
+from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.view_updater import READOUT_INTERVAL
 
@@ -37,32 +40,33 @@ class MachinePanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        joints: JointSet,
+        robot: Robot,
         gestures: GestureGate,
         state: State,
     ) -> None:
-        """Add the controls to ``gui``; they show ``state`` first."""
+        """Add the tabs to ``gui``; they show ``state`` first."""
         self._gui = gui
-        self._joints = joints
+        self._joints = joints = robot.joint_group
+        self._labels = joint_labels(robot)
         self._shown_at = -math.inf
         self._shown = ""
         listen: Listen = listener(gestures)
-        self._readout = gui.add_html(page(joints, state))
-        gui.add_html(f"<div class='k450'><p><b>Joints only.</b> {escape(joints.why)}</p></div>")
-        with gui.add_folder("Joints"):
+        tabs = PanelTabs(gui)
+        with tabs.tab(DRIVE):
+            gui.add_html(f"<div class='k450'><p><b>Joints only.</b> {escape(joints.why)}</p></div>")
             self._sliders = [self._slider(axis, state, listen) for axis in range(joints.n)]
-        drive = gui.add_button_group(
-            "Drive",
-            tuple(GESTURES),
-            hint="Home: every joint to zero, or to the limit nearest to zero. Hold: stop here.",
-        )
-        listen(drive, lambda: GESTURES[drive.value])
-        self._speed = add_motion(gui, listen, state)
-        gui.add_html(style())
-        with gui.add_folder("Show", expand_by_default=False):
+            drive = gui.add_button_group(
+                "Drive",
+                tuple(GESTURES),
+                hint="Home: every joint to zero, or to the limit nearest to zero. Hold: stop here.",
+            )
+            listen(drive, lambda: GESTURES[drive.value])
+            self._readout = gui.add_html(page(joints, self._labels, state))
+            gui.add_html(style())
+        with tabs.tab(SCENE):
             add_themes(gui)
-        with gui.add_folder("Why", expand_by_default=False):
-            self._why = EventList(gui, gestures)
+            with gui.add_folder("Why", expand_by_default=False):
+                self._why = EventList(gui, gestures)
 
     def follow(
         self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool
@@ -74,8 +78,7 @@ class MachinePanel:
         if caught_up:
             for axis, slider in enumerate(self._sliders):
                 set_slider(slider, shown(self._joints, axis, float(state.goal[axis])))
-            set_slider(self._speed, 100.0 * state.speed)
-        text = page(self._joints, state)
+        text = page(self._joints, self._labels, state)
         if text != self._shown:
             self._shown = self._readout.content = text
         self._why.follow(event_log)
@@ -88,7 +91,7 @@ class MachinePanel:
         slides = joints.slides[axis]
         slider = self._gui.add_slider(
             # The number stands in messages too, and keeps the label apart from other controls.
-            f"{axis + 1}. {joints.names[axis]}",
+            self._labels[axis],
             min=low,
             max=high,
             step=10.0 ** math.floor(math.log10((high - low) / STEPS)),
@@ -106,19 +109,16 @@ def shown(joints: JointSet, axis: int, value: float) -> float:
     return 1e3 * value if joints.slides[axis] else math.degrees(value)
 
 
-def page(joints: JointSet, state: State) -> str:
+def page(joints: JointSet, labels: Sequence[str], state: State) -> str:
     """Return the read-out for ``state`` as HTML."""
     rows = "".join(
-        f"<tr><th>{axis + 1}. {escape(name)}</th>"
+        f"<tr><th>{escape(label)}</th>"
         f"<td data-now='{axis}'>{signed(shown(joints, axis, float(state.q[axis])), 1)}</td>"
         f"<td data-goal='{axis}'>{signed(shown(joints, axis, float(state.goal[axis])), 1)}</td>"
         f"<td class='unit'>{'mm' if joints.slides[axis] else '°'}</td></tr>"
-        for axis, name in enumerate(joints.names)
+        for axis, label in enumerate(labels)
     )
     return (
-        f"<div class='k450'>"
-        f"<p class='status {mood(state)}'><b>{escape(headline(state))}</b>"
-        f"<span>{escape(sentence(state)) or '&nbsp;'}</span></p>"
-        f"<table><thead><tr><th>joint</th><th>now</th><th>goal</th><th></th></tr></thead>"
-        f"<tbody>{rows}</tbody></table></div>"
+        f"<div class='k450'><table><thead><tr><th>joint</th><th>now</th><th>goal</th><th></th></tr>"
+        f"</thead><tbody>{rows}</tbody></table></div>"
     )

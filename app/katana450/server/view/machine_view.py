@@ -51,8 +51,7 @@ class MachineView(ViewUpdater):
         server.initial_camera.look_at = look.target
         self._nodes = MachineNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
-        joints = robot.joint_group
-        self._panel = MachinePanel(server.gui, joints, gestures, state_publisher.snapshot.state)
+        self._panel = MachinePanel(server.gui, robot, gestures, state_publisher.snapshot.state)
         self.show(state_publisher.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:

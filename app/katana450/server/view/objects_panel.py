@@ -38,7 +38,7 @@ OWN, REMOVE = "Own colour", "Remove"
 
 
 class ObjectsPanel:
-    """A folder of controls for the chosen scene object."""
+    """The controls for the chosen scene object."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class ObjectsPanel:
         state: Callable[[], State],
         environment: Environment,
     ) -> None:
-        """Add the folder to the panel.
+        """Add the controls to the open folder of ``server``.
 
         Args:
             server: viser's server.
@@ -62,47 +62,46 @@ class ObjectsPanel:
         self._shown: SceneObject | None = None
         gui = server.gui
         names = _names(self._objects)
-        with gui.add_folder("Objects", expand_by_default=False):
-            self._choice = gui.add_dropdown(
-                "Object", names, hint="The controls below are for this object"
-            )
-            self._colour = gui.add_rgb("Colour", COLOUR)
-            self._opacity = gui.add_slider(
-                "Opacity",
-                min=100.0 * MIN_OPACITY,
-                max=100.0,
-                step=1.0,
-                initial_value=100.0,
-                hint="Percent. It does not change the collision checks",
-            )
-            self._scale = gui.add_number(
-                "Scale",
-                1.0,
-                min=MIN_SCALE,
-                max=MAX_SCALE,
-                step=0.001,
-                hint="Relative to the original size",
-            )
-            self._turn = gui.add_slider(
-                "Turn",
-                min=-180.0,
-                max=180.0,
-                step=1.0,
-                initial_value=0.0,
-                hint="About the vertical, in degrees",
-            )
-            self._hidden = gui.add_checkbox(
-                "Hidden",
-                initial_value=False,
-                hint="Not drawn. The arm still keeps clear of it",
-            )
-            self._mounts = gui.add_button_group(
-                "Attach to",
-                tuple(MOUNTS),
-                hint="Hand: it moves with the hand as a part of it. Table: it is set down on the "
-                "table below. Here: it stays where it is, even in the air",
-            )
-            self._acts = gui.add_button_group("And", (OWN, REMOVE))
+        self._choice = gui.add_dropdown(
+            "Object", names, hint="The controls below are for this object"
+        )
+        self._colour = gui.add_rgb("Colour", COLOUR)
+        self._opacity = gui.add_slider(
+            "Opacity",
+            min=100.0 * MIN_OPACITY,
+            max=100.0,
+            step=1.0,
+            initial_value=100.0,
+            hint="Percent. It does not change the collision checks",
+        )
+        self._scale = gui.add_number(
+            "Scale",
+            1.0,
+            min=MIN_SCALE,
+            max=MAX_SCALE,
+            step=0.001,
+            hint="Relative to the original size",
+        )
+        self._turn = gui.add_slider(
+            "Turn",
+            min=-180.0,
+            max=180.0,
+            step=1.0,
+            initial_value=0.0,
+            hint="About the vertical, in degrees",
+        )
+        self._hidden = gui.add_checkbox(
+            "Hidden",
+            initial_value=False,
+            hint="Not drawn. The arm still keeps clear of it",
+        )
+        self._mounts = gui.add_button_group(
+            "Attach to",
+            tuple(MOUNTS),
+            hint="Hand: it moves with the hand as a part of it. Table: it is set down on the "
+            "table below. Here: it stays where it is, even in the air",
+        )
+        self._acts = gui.add_button_group("And", (OWN, REMOVE))
         self._on(self._colour, lambda scene_object: _recoloured(scene_object, self._colour.value))
         self._on(
             self._opacity,

@@ -1,4 +1,4 @@
-"""A folder of controls that an extension adds to the panel of an arm."""
+"""Controls that an extension adds to a tab of the panel of an arm."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.server.service.hub import Hub
 from katana450.server.view.controls import GestureGate
+from katana450.server.view.panel_tabs import PanelTabs
 
 
 class PanelFolder(Protocol):
-    """A folder with the controls of an extension, and the nodes that it shows in the scene."""
+    """The controls of an extension, and the nodes that it shows in the scene."""
 
     def follow(self) -> None:
         """Show changes. Called in the view's thread for each state that is shown."""
@@ -33,6 +34,8 @@ class FolderContext(NamedTuple):
         call: Runs a function in the server's thread and returns afterwards. Raises the errors of
             the function, and LeaseError if the server does not answer.
         options: Options of ``katana450 serve``.
+        tabs: The tabs of the panel. An extension opens the one in which its controls stand, by its
+            label, and adds the controls to it. A new label is a new tab.
     """
 
     server: viser.ViserServer
@@ -42,3 +45,4 @@ class FolderContext(NamedTuple):
     hub: Hub
     call: Callable[[Callable[[], None]], None]
     options: Namespace
+    tabs: PanelTabs

@@ -1,4 +1,4 @@
-"""The read-out as HTML: the status of the arm, and the pose of its tool now and at the goal."""
+"""The read-out as HTML: the pose of the tool now and at the goal, and the distances to limits."""
 
 from __future__ import annotations
 
@@ -9,70 +9,68 @@ from katana450.arm.control.messages import (
     ROOM,
     condition,
     degrees,
-    headline,
     limit_text,
-    mood,
-    sentence,
     signed,
 )
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.resources import STATIC
+from katana450.server.view.pose_display import PoseDisplay
 
 ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
-def page(arm: MountedArm, state: State) -> str:
-    """Return the whole read-out for ``state``."""
+def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
+    """Return the tool pose now and at the goal as ``display`` says, and the nearest limit now."""
     chain = arm.chain_to(state.tool)
-    now, goal = (_numbers(forward(chain, q)) for q in (state.q, state.goal))
+    now, goal = (_numbers(forward(chain, q), display) for q in (state.q, state.goal))
     rows = "".join(
         f"<tr><th>{name}</th><td data-now='{name}'>{a}</td><td data-goal='{name}'>{b}</td>"
-        f"<td class='unit'>{'mm' if name in 'xyz' else '°'}</td></tr>"
+        f"<td class='unit'>{display.unit.name if name in 'xyz' else '°'}</td></tr>"
         for name, a, b in zip(ROWS, now, goal, strict=True)
     )
-    why = sentence(state)
+    distances = limit_distances(chain, state.q)
+    nearest = int(distances.argmin())
+    limit = limit_text(nearest, float(distances[nearest]))
     return (
-        f"<div class='k450'>"
-        f"<p class='status {mood(state)}'><b>{escape(headline(state))}</b>"
-        f"<span>{escape(why) or '&nbsp;'}</span></p>"
-        f"<table><thead><tr><th>{escape(state.tool)} in {{S}}</th><th>now</th><th>goal</th>"
-        f"<th></th></tr></thead><tbody>{rows}</tbody></table>{_at_once(chain, state.q)}</div>"
+        f"<div class='k450'><table><thead><tr><th>{escape(state.tool)} in {display.frame_name}</th>"
+        f"<th>now</th><th>goal</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
+        f"<table class='at-once'>{_row('limit', 'nearest limit', limit)}</table></div>"
     )
 
 
-def _at_once(chain: Chain, q: FloatArray) -> str:
-    """Return a table of the distances at ``q`` to a singularity and to the joint limits."""
-    values = singular_values(chain, q)
-    distances = limit_distances(chain, q)
+def details(arm: MountedArm, state: State) -> str:
+    """Return the distances of the arm to a singularity and to every joint limit."""
+    chain = arm.chain_to(state.tool)
+    values = singular_values(chain, state.q)
+    distances = limit_distances(chain, state.q)
     nearest = int(distances.argmin())
     rows = (
         ("singular", "smallest singular value", f"{values[-1]:.3f}"),
         ("manipulability", "manipulability", f"{math.prod(values):.3f}"),
         ("condition", "condition", condition(values)),
-        ("limit", "nearest limit", limit_text(nearest, float(distances[nearest]))),
     )
     every = "".join(
         f"<td{' class=nearest' if number == nearest else ''}>{degrees(angle, 0)}</td>"
         for number, angle in enumerate(distances.tolist())
     )
-    return "<table class='at-once'>{}</table>{}".format(
-        "".join(
-            f"<tr><th>{escape(name)}</th><td data-now='{key}'>{escape(value)}</td></tr>"
-            for key, name, value in rows
-        ),
-        f"<table class='rooms' data-now='limits'><tr><th>{escape(ROOM)}</th>{every}</tr></table>",
+    return (
+        f"<div class='k450'><table>{''.join(_row(*row) for row in rows)}</table>"
+        f"<table class='rooms' data-now='limits'><tr><th>{escape(ROOM)}</th>{every}</tr></table>"
+        f"</div>"
     )
 
 
-def _numbers(T: FloatArray) -> list[str]:
-    position = [signed(1e3 * float(x), 1) for x in T[:3, 3]]
-    return position + [signed(math.degrees(angle), 1) for angle in so3.to_rpy(T[:3, :3])]
+def _row(key: str, name: str, value: str) -> str:
+    return f"<tr><th>{escape(name)}</th><td data-now='{key}'>{escape(value)}</td></tr>"
+
+
+def _numbers(T: FloatArray, display: PoseDisplay) -> list[str]:
+    position, angles = display.numbers(T)
+    return [signed(x, display.unit.decimals) for x in position] + [signed(x, 1) for x in angles]
 
 
 def style() -> str:

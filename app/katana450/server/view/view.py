@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,11 +24,13 @@ from katana450.server.view.display_options import DisplayOptions
 from katana450.server.view.ellipsoid import EllipsoidNode
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
-from katana450.server.view.objects_panel import ObjectsPanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import Panel
 from katana450.server.view.panel_folder import PanelFolder
+from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
+from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
+from katana450.server.view.scene_tab import SceneTab
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.tint import Tint
 from katana450.server.view.traces import Traces
@@ -58,10 +60,12 @@ class ViewOptions:
     Attributes:
         layers: layers of extensions.
         meshes: the meshes of scene objects.
+        folders: adds the controls of extensions to the tabs of the panel. Raises KatanaError.
     """
 
     layers: tuple[ViewLayer, ...] = ()
     meshes: Meshes = field(default_factory=Meshes)
+    folders: Callable[[PanelTabs], Iterable[PanelFolder]] = lambda _: ()
 
 
 class View(ViewUpdater):
@@ -120,17 +124,21 @@ class View(ViewUpdater):
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
-        self._panel = Panel(server, robot, gestures, session.choices, shows, state)
-        self._objects = ObjectsPanel(
-            server, gestures, lambda: state_publisher.snapshot.state, session.environment
-        )
-        self._folders: list[PanelFolder] = []
+        tabs = PanelTabs(server.gui)
+        with tabs.tab(DRIVE):
+            self._panel = Panel(server, robot, gestures, session.choices, state)
+        self._folders = tuple(view_options.folders(tabs))
+        with tabs.tab(SCENE):
+            self._scene_tab = SceneTab(
+                server,
+                gestures,
+                shows,
+                lambda: state_publisher.snapshot.state,
+                session.environment,
+            )
+        # At the end of the panel, because the element takes an empty line.
+        server.gui.add_html(style())
         self.show(state_publisher.snapshot)
-
-    def add(self, folder: PanelFolder) -> None:
-        """Add a folder that follows each state. Call it before ``start``."""
-        self._folders.append(folder)
-        folder.follow()
 
     def _show_ellipsoid(self, visible: bool) -> None:
         self._ellipsoid.show(visible, self._state_publisher.snapshot.state)
@@ -150,10 +158,9 @@ class View(ViewUpdater):
             self._traces.follow(state)
             self._cameras.follow(state)
             caught_up = snapshot.ticket == self._last_ticket()
-            self._panel.follow(
-                state, time.perf_counter(), self._state_publisher.event_log, caught_up=caught_up
-            )
-            self._objects.follow(state, caught_up=caught_up)
+            self._panel.follow(state, time.perf_counter(), caught_up=caught_up)
+            event_log = self._state_publisher.event_log
+            self._scene_tab.follow(state, event_log, caught_up=caught_up)
             for folder in self._folders:
                 folder.follow()
         self._server.flush()

@@ -133,7 +133,7 @@ class Gestures:
             self._gate.check_current(actor)
             runner.check_may_touch(actor)
             return actor
-        actor = self._gate.claim(actor, pacing=self._guard.paces(message))
+        actor = self._gate.claim(actor)
         if isinstance(message, wire.TransformControlsDragStartMessage):
             browser.drags[message.name] = actor
         return actor

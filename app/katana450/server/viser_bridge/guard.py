@@ -14,7 +14,7 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
-from katana450.server.viser_bridge.labels import PACING, PERSONAL
+from katana450.server.viser_bridge.labels import PERSONAL
 
 WORKSPACE = 1.5
 """Maximum coordinate [m] of a gizmo in the base frame, more than twice the arm's reach."""
@@ -60,10 +60,6 @@ class Guard:
         if isinstance(message, wire.GuiUpdateMessage):
             return getattr(self._control(message), "label", None) not in PERSONAL
         return not isinstance(message, wire.ViewerCameraMessage)
-
-    def paces(self, message: Any) -> bool:
-        """Return whether ``message`` only pauses, resumes or changes the speed of a motion."""
-        return self.is_of(message, PACING)
 
     def is_of(self, message: Any, labels: tuple[str, ...]) -> bool:
         """Return whether ``message`` is for a control with one of ``labels``."""

@@ -34,7 +34,7 @@ LOADER = re.compile(
 DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
 """Digits of the base 88 in which viser's page contains its packed program."""
 
-OUR_SCRIPTS = ("theme", "viser", "fields", "fit", "sheet", "frame")
+OUR_SCRIPTS = ("theme", "viser", "fields", "fit", "sheet", "names", "frame")
 """Names of our files in the order in which they run. The last one gets the themes."""
 
 

@@ -1,4 +1,4 @@
-"""The panel of programs: choose, preview, run, step, pause and end a script; teach a new one."""
+"""The panel of programs: choose, preview, run, step and end a script; teach a new one."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts, file_name
+from katana450.extensions.programs.server import step_list
 from katana450.extensions.programs.server.preview import Preview
 from katana450.extensions.programs.server.state_line import RUNS
+from katana450.extensions.programs.server.step_list import ListedStep
 from katana450.extensions.programs.teach import script_from_postures
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api.answers import Progress
@@ -35,7 +37,6 @@ MAX_TAUGHT_POSTURES = 200
 ORDERS = {
     "Run": ProgramOrder.RUN,
     "Step": ProgramOrder.STEP,
-    "Wait": ProgramOrder.PAUSE,
     "End": ProgramOrder.END,
 }
 """The order that each button gives."""
@@ -64,7 +65,7 @@ class Steering(Protocol):
 
 
 class ProgramsPanel:
-    """The folder of controls, and the preview in the scene."""
+    """The controls, and the preview in the scene."""
 
     def __init__(
         self,
@@ -75,13 +76,14 @@ class ProgramsPanel:
         gestures: GestureGate,
         state: Callable[[], State],
     ) -> None:
-        """Build the controls. ``state`` returns the newest state."""
+        """Add the controls to the open tab of ``server``. ``state`` returns the newest state."""
         self._steering = steering
         self._scripts = scripts
         self._gestures = gestures
         self._state = state
         self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
+        self._steps: tuple[ListedStep, ...] = ()
         # The script that was last requested.
         self._text = ""
         # Held while an order is carried out: viser calls back in a thread of its own.
@@ -90,45 +92,43 @@ class ProgramsPanel:
         self._with_ghosts = False
         self._preview = Preview(server, robot)
         gui = server.gui
-        with gui.add_folder("Programs", expand_by_default=False):
-            names = tuple(scripts.paths)
-            # The first script that this arm can run: the library has one for the bare flange too.
-            fitting = (name for name in names if _suits(scripts, name, robot))
-            self._choice = gui.add_dropdown(
-                "Script",
-                names,
-                initial_value=next(fitting, None),
-                hint="Scripts of the library and of --programs DIR",
-            )
-            self._choice.on_update(lambda _: self._draw(None))
-            self._orders = gui.add_button_group(
-                "Program",
-                ("Preview", *ORDERS),
-                hint="Preview: plan it and show the tool's path. Step: run to the end of a step. "
-                "Wait: pause until Run or Step. End: end the run, or the planning",
-            )
-            self._orders.on_click(self._guarded(self._order))
-            self._look = gui.add_slider(
-                "Look at",
-                min=0.0,
-                max=1.0,
-                step=FOLLOW_INTERVAL,
-                initial_value=0.0,
-                disabled=True,
-                hint="Time in the preview [s], at full speed: shows the arm at that time",
-            )
-            self._look.on_update(lambda _: self._preview.look(self._look.value))
-            self._status = gui.add_html("")
-            self._teach = gui.add_button_group(
-                "Teach",
-                ("Add pose", "Forget", "Save"),
-                hint="Add pose: add the present pose. Save: save a script through all poses in the "
-                "folder of --programs, or else as a download",
-            )
-            self._teach.on_click(self._guarded(self._on_teach))
-            self._name = gui.add_text(
-                "Name", "My script", hint="Name of the script that Save writes"
-            )
+        names = tuple(scripts.paths)
+        # The first script that this arm can run: the library has one for the bare flange too.
+        fitting = (name for name in names if _suits(scripts, name, robot))
+        self._choice = gui.add_dropdown(
+            "Script",
+            names,
+            initial_value=next(fitting, None),
+            hint="Scripts of the library and of --programs DIR",
+        )
+        self._choice.on_update(lambda _: self._draw(None))
+        self._orders = gui.add_button_group(
+            "Program",
+            ("Preview", *ORDERS),
+            hint="Preview: plan it and show the tool's path. Step: run to the end of a step. "
+            "End: end the run, or the planning",
+        )
+        self._orders.on_click(self._guarded(self._order))
+        self._look = gui.add_slider(
+            "Look at",
+            min=0.0,
+            max=1.0,
+            step=FOLLOW_INTERVAL,
+            initial_value=0.0,
+            disabled=True,
+            hint="Time in the preview [s], at full speed: shows the arm at that time",
+        )
+        self._look.on_update(lambda _: self._preview.look(self._look.value))
+        self._status = gui.add_html("")
+        self._list = gui.add_html("", visible=False)
+        self._teach = gui.add_button_group(
+            "Teach",
+            ("Add pose", "Forget", "Save"),
+            hint="Add pose: add the present pose. Save: save a script through all poses in the "
+            "folder of --programs, or else as a download",
+        )
+        self._teach.on_click(self._guarded(self._on_teach))
+        self._name = gui.add_text("Name", "My script", hint="Name of the script that Save writes")
 
     def follow(self) -> None:
         """Update the display of the program's progress."""
@@ -139,6 +139,7 @@ class ProgramsPanel:
         if self._order_lock.acquire(blocking=False):
             try:
                 self._follow_program()
+                self._follow_steps(progress)
             finally:
                 self._order_lock.release()
         if not self._look.disabled and progress is not None and progress.status in RUNS:
@@ -152,8 +153,16 @@ class ProgramsPanel:
             self._draw(program)
             self._with_ghosts = self._with_ghosts and program is None
 
+    def _follow_steps(self, progress: Progress | None) -> None:
+        look = 0.0 if self._look.disabled else self._look.value
+        current = step_list.current_step(self._steps, progress, look)
+        page = step_list.page(self._steps, current)
+        if page != self._list.content:
+            self._list.content, self._list.visible = page, bool(page)
+
     def _draw(self, program: Program | None) -> None:
-        """Show the preview of ``program``."""
+        """Show the preview and the steps of ``program``."""
+        self._steps = () if program is None else step_list.steps_of(program)
         span = self._preview.show(program, self._state().tool, ghosts=self._with_ghosts)
         self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
@@ -164,7 +173,7 @@ class ProgramsPanel:
         button = self._orders.value
         progress = self._steering.progress
         status = "" if progress is None else progress.status
-        if button in ("Wait", "End") or (button != "Preview" and status in RUNS):
+        if button == "End" or (button != "Preview" and status in RUNS):
             self._steering.steer(ORDERS[button], actor)
             return
         text = self._scripts.text(self._choice.value)

@@ -1,0 +1,131 @@
+"""The form of the tool pose: tool and priority, units and frame, and numbers to type."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import viser
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
+from katana450.arm.control.state import State
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.priority import Priority
+from katana450.server.view.controls import Listen, set_value
+from katana450.server.view.pose_display import BASE, SHOULDER, UNITS, PoseDisplay
+
+MAX_TYPED_POSITION = 1.0
+"""Maximum [m] of a typed coordinate, beyond any tool point of the arm."""
+
+ANGLE_DECIMALS = 1
+
+
+class PoseForm:
+    """The form. Its numbers stay until a person changes them or copies the present pose."""
+
+    def __init__(self, gui: viser.GuiApi, arm: MountedArm, listen: Listen, state: State) -> None:
+        """Add the controls to ``gui``. They show ``state`` first."""
+        self._arm = arm
+        self._state = state
+        self._tool = gui.add_dropdown(
+            "Tool",
+            tuple(arm.tools),
+            initial_value=state.tool,
+            hint="The frame of the gizmo, these numbers and the read-out",
+        )
+        listen(self._tool, lambda: cmd.SetTool(self._tool.value))
+        self._priority = gui.add_dropdown(
+            "Priority",
+            tuple(PRIORITIES.values()),
+            initial_value=PRIORITIES[state.priority],
+            hint="Which part of the target is kept when five axes cannot satisfy all of it",
+        )
+        listen(self._priority, lambda: cmd.SetPriority(_priority(self._priority.value)))
+        self._meaning = gui.add_html(_meaning(state.priority))
+        self._unit = gui.add_dropdown(
+            "Units", tuple(UNITS), initial_value="mm", hint="Of the position here and above"
+        )
+        self._frame = gui.add_dropdown(
+            "Frame",
+            (SHOULDER, BASE),
+            initial_value=SHOULDER,
+            hint="Of the numbers here and above: {S} is where axes 1 and 2 cross, base is the "
+            "frame of the robot on the table",
+        )
+        self.display = self._chosen()
+        self._position = gui.add_vector3(
+            "x, y, z", (0.0, 0.0, 0.0), step=1.0, hint="Tool position in these units and this frame"
+        )
+        self._angles = gui.add_vector3(
+            "r, p, y",
+            (0.0, 0.0, 0.0),
+            min=(-180.0, -180.0, -180.0),
+            max=(180.0, 180.0, 180.0),
+            step=1.0,
+            hint="Roll, pitch and yaw in degrees, in this frame; pitch above 0 points down",
+        )
+        self._angles.precision = ANGLE_DECIMALS
+        self._fill(self._goal(state))
+        for choice in (self._unit, self._frame):
+            choice.on_update(self._change_display)
+        # viser shows the label of a row as the name of the pose, and each button by its own text.
+        copy = gui.add_button("Copy current", hint="Fills in the present pose of the tool")
+        copy.on_click(self._copy)
+        go = gui.add_button("Go to pose", hint="Or to the nearest possible pose")
+        listen(go, lambda: cmd.SetPose(self.display.pose(self._position.value, self._angles.value)))
+
+    def follow(self, state: State) -> None:
+        """Remember ``state``, whose pose can be copied."""
+        self._state = state
+
+    def set_controls(self, state: State) -> None:
+        """Show the tool and the priority of ``state``."""
+        set_value(self._tool, state.tool)
+        set_value(self._priority, PRIORITIES[state.priority])
+        meaning = _meaning(state.priority)
+        if meaning != self._meaning.content:
+            self._meaning.content = meaning
+
+    def _goal(self, state: State) -> FloatArray:
+        return forward(self._arm.chain_to(state.tool), state.goal)
+
+    def _chosen(self) -> PoseDisplay:
+        return PoseDisplay(UNITS[self._unit.value], self._frame.value, self._arm.T_base_shoulder)
+
+    # These callbacks are coroutines, because viser calls only those in the order of the messages.
+
+    async def _change_display(self, _: viser.GuiEvent[Any]) -> None:
+        """Convert the numbers to the chosen units and frame."""
+        T = self.display.pose(self._position.value, self._angles.value)
+        self.display = self._chosen()
+        self._fill(T)
+
+    async def _copy(self, event: viser.GuiEvent[Any]) -> None:
+        if event.client_id is not None:
+            state = self._state
+            self._fill(forward(self._arm.chain_to(state.tool), state.q))
+
+    def _fill(self, T: FloatArray) -> None:
+        """Show the pose ``T`` (4, 4) in {S}."""
+        unit = self.display.unit
+        position, angles = self.display.numbers(T)
+        end = MAX_TYPED_POSITION * unit.per_metre
+        self._position.min, self._position.max = (-end, -end, -end), (end, end, end)
+        self._position.step, self._position.precision = unit.step, unit.decimals
+        set_value(self._position, _rounded(position, unit.decimals))
+        set_value(self._angles, _rounded(angles, ANGLE_DECIMALS))
+
+
+def _rounded(numbers: list[float], decimals: int) -> tuple[float, ...]:
+    return tuple(round(number, decimals) + 0.0 for number in numbers)
+
+
+def _meaning(priority: Priority) -> str:
+    return f"<div class='k450'><p class='hint'>{escape(PRIORITY_HINTS[priority])}</p></div>"
+
+
+def _priority(name: str) -> Priority:
+    return next(priority for priority, text in PRIORITIES.items() if text == name)

@@ -1,0 +1,106 @@
+"""The panel for everybody: names for screen readers, sizes of targets and text, and contrast."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Frame, Page
+
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+
+MOVE = "/target/move"
+TABS = ("Drive", "Programs", "Scene")
+AXE = Path(__file__).parents[1] / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
+
+CONTROLS = """() => {
+    const shown = (each) => each.checkVisibility() && each.getBoundingClientRect().width > 0;
+    const found = (selector) => [...document.querySelectorAll(selector)].filter(shown);
+    const name = (each) => each.getAttribute("aria-label") || each.textContent.trim()
+        || each.labels?.[0]?.textContent || "";
+    const box = (each) => each.getBoundingClientRect();
+    const panel = found("[role=tablist]")[0].parentElement;
+    const inside = (selector) => found(selector).filter((each) => panel.contains(each));
+    const boxes = "input:not([type=hidden], [type=checkbox])";
+    return {
+        names: found(`[role=slider], button:not([aria-hidden]), ${boxes}, [type=checkbox]`)
+            .map((each) => [each.outerHTML.slice(0, 200), name(each)]),
+        heights: inside(`button[data-variant=outline], button[data-block], ${boxes}`)
+            .map((each) => [name(each), box(each).height]),
+        thumbs: inside("[role=slider]").map((each) => [box(each).width, box(each).height]),
+        text: inside(`label[for], button[data-variant=outline], ${boxes}, .k450`)
+            .map((each) => [name(each).slice(0, 40), parseFloat(getComputedStyle(each).fontSize)]),
+    };
+}"""
+"""Script that describes the visible controls of the open tab."""
+
+VIOLATIONS = """async () => {
+    const { violations } = await axe.run(document, { iframes: false });
+    return violations.filter(({ impact }) => ["critical", "serious"].includes(impact))
+        .map(({ id, nodes }) => [id, nodes.map((each) => [each.html, each.failureSummary])]);
+}"""
+"""Script that returns the critical and serious findings of axe-core."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+def controls(page: ViserPage, tab: str) -> dict[str, Any]:
+    """Open ``tab``, wait until its controls have names, and describe them."""
+    page.open_tab(tab)
+
+    def named() -> bool:
+        return all(name for _, name in page.frame.evaluate(CONTROLS)["names"])
+
+    page.wait_until(named, "names of all controls")
+    found: dict[str, Any] = page.frame.evaluate(CONTROLS)
+    return found
+
+
+def test_every_control_of_the_panel_has_a_name_and_can_be_hit(
+    server: AppServer, open_page: OpenPage
+) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE))
+    for tab in TABS:
+        found = controls(page, tab)
+        assert len(found["names"]) > 5
+        small = [each for each in found["heights"] if each[1] < 31.9]
+        assert found["heights"]
+        assert not small
+        # The slider of the preview has no thumb before there is a plan.
+        assert len(found["thumbs"]) == {"Drive": 6, "Programs": 0, "Scene": 2}[tab]
+        assert all(min(size) >= 16.0 for size in found["thumbs"])
+        assert not [each for each in found["text"] if each[1] < 13.0]
+    page.open_tab("Drive")
+    for label in ("1 base turn", "Gripper"):
+        assert page.frame.get_by_role("slider", name=label, exact=True).count() == 1
+        assert page.frame.get_by_role("textbox", name=label, exact=True).count() == 1
+    for label in ("x", "y", "z", "p"):
+        assert page.frame.get_by_role("textbox", name=label, exact=True).count() >= 1
+    assert page.errors == []
+
+
+def findings(document: Page | Frame) -> Any:
+    document.evaluate(AXE.read_text(encoding="utf-8"))
+    return document.evaluate(VIOLATIONS)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not AXE.exists(), reason="axe-core is not installed: make check-js")
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_serious_on_page_and_panel(
+    server: AppServer, open_page: OpenPage, theme: str, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), color_scheme=theme)
+    assert findings(page.page) == []
+    for tab in TABS:
+        controls(page, tab)
+        assert findings(page.frame) == [], tab
+        page.keep(artefacts / f"panel-{tab.lower()}-{theme}.png")
