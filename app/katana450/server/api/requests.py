@@ -54,6 +54,7 @@ from katana450.server.api.motion_requests import (
     Pose,
     Position,
     Servo,
+    Step,
     Turn,
 )
 from katana450.server.api.people_requests import Kick, ListPeople, Mute, Unmute
@@ -117,6 +118,7 @@ __all__ = [
     "SetPriority",
     "Shape",
     "Speed",
+    "Step",
     "Stop",
     "Take",
     "Tool",
@@ -308,6 +310,7 @@ AnyRequest = (
     | Give
     | Decline
     | Jog
+    | Step
     | Speed
     | Joint
     | Joints
