@@ -23,5 +23,5 @@ export default [
       "prefer-const": "error",
     },
   },
-  { files: ["static/instruments/*.js"], languageOptions: { sourceType: "module" } },
+  { files: ["static/{instruments,jog,people,welcome}/*.js"], languageOptions: { sourceType: "module" } },
 ];
