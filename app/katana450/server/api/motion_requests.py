@@ -165,6 +165,16 @@ class Gripper(Request, frozen=True, kw_only=True):
     angle: float
 
 
+class Undo(Request, frozen=True):
+    """Undo the last change of a goal, an object or a setting by this client.
+
+    To undo a goal, the arm moves back to the earlier one. Refused while the arm is stopped, and
+    without a change since the last stop or change of driver.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+
 class EndDrag(Request, frozen=True):
     """End a drag: the nearest pose that the arm can reach becomes the target."""
 

@@ -56,6 +56,7 @@ from katana450.server.api.motion_requests import (
     Servo,
     Step,
     Turn,
+    Undo,
 )
 from katana450.server.api.people_requests import Kick, ListPeople, Mute, Unmute
 from katana450.server.api.scene_requests import (
@@ -123,6 +124,7 @@ __all__ = [
     "Take",
     "Tool",
     "Turn",
+    "Undo",
     "Unmute",
     "Watch",
     "Withdraw",
@@ -325,6 +327,7 @@ AnyRequest = (
     | Branch
     | EndDrag
     | Go
+    | Undo
     | Home
     | GoToZero
     | Hold
