@@ -113,13 +113,14 @@
       const ready = Viser.replayed(messages);
       dress(messages);
       Fit.hear(messages);
-      if (ready) Fit.begin();
+      if (ready) Fit.begin(() => outer?.katana?.drawn());
       if (!kept || tries > 0 || !ready) return;
       tries = 1;
       setTimeout(() => restore(line), AGAIN);
     },
   });
 
+  window.katanaScene = { pixelOf: Fit.pixelOf };
   Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

@@ -1,7 +1,7 @@
 // Steps and gripper in the Jog sheet: one press moves the target by one step. Loaded with the sheet.
 import { html } from "../instruments/shape.js";
 
-const SIZES = { 0: "Hold", 0.1: "0.1", 1: "1", 10: "10" }; // mm or degrees
+const SIZES = [0, 0.1, 1, 10]; // mm or degrees; 0 to hold
 const RADIANS = Math.PI / 180;
 const EDGE = 0.5; // fraction of a stick's travel that counts as a press
 // Name and unit of each of the five steps of the tool.
@@ -34,7 +34,7 @@ export class Steps {
   constructor(root, say, arm) {
     this.#say = say;
     this.#arm = arm;
-    const sizes = Object.entries(SIZES).map(([size, label]) => radio("step", size, label, size === "0"));
+    const sizes = SIZES.map((size) => radio("step", size, size ? `${size}` : "Hold", !size));
     const legend = html("legend", {}, "Step, mm or °");
     root.querySelector(".choice").append(radio("frame", "joints", "Joints", false));
     root.querySelector("#pads").before(html("fieldset", { class: "choice" }, legend, ...sizes));
@@ -64,7 +64,7 @@ export class Steps {
     }
     const by = [0, 0, 0, 0, 0];
     by[axis] = sign * (axis < 3 ? this.#size / 1000 : this.#size * RADIANS);
-    this.#say({ do: "step", by, frame: this.#frame });
+    this.#say({ do: "step_tool", by, frame: this.#frame });
   }
 
   // Return whether the key was handled. moves: {code: [axis, sign]} of the keys that move.

@@ -88,7 +88,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Joint: [requests.Joint(axis=1, value=0.1)],
         requests.Joints: [requests.Joints(q=q)],
         requests.Nudge: [requests.Nudge(axis=1, by=0.01)],
-        requests.Step: [requests.Step(by=(0.0, 0.0, 0.01, 0.0, 0.0))],
+        requests.StepTool: [requests.StepTool(by=(0.0, 0.0, 0.01, 0.0, 0.0))],
         requests.Servo: [requests.Servo(q=q)],
         requests.Jog: [requests.Jog(rates=(0.0,) * 5)],
         requests.Pose: [requests.Pose(T=cast(Any, FAR))],

@@ -25,7 +25,7 @@ def names(program: Client) -> set[str]:
 def test_goals_are_undone_in_order(program: Client) -> None:
     start = program.go(requests.Home())
     program.nudge(1, 0.2)
-    program.go(requests.Step(by=(0.0, 0.0, 0.03, 0.0, 0.0)))
+    program.go(requests.StepTool(by=(0.0, 0.0, 0.03, 0.0, 0.0)))
     after_nudge = undo(program)
     np.testing.assert_allclose(after_nudge.q[0], start.q[0] + 0.2, atol=1e-6)
     np.testing.assert_allclose(np.array(after_nudge.q)[1:], start.q[1:], atol=1e-6)

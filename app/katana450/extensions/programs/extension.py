@@ -10,8 +10,11 @@ from katana450.cli.serve_options import MIN_SILENCE, heartbeat_timeout
 from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
+    from starlette.routing import BaseRoute
+
     from katana450.server.service.runner import Runner
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
+    from katana450.server.web.http_api import RouteContext
 
 OWNER_SILENCE, LONGEST_OWNER_SILENCE = 1.0, 10.0
 """[s] Default and longest heartbeat timeout of a program's owner, after which the program ends."""
@@ -70,6 +73,13 @@ def _folder(context: FolderContext) -> PanelFolder | None:
     )
 
 
+def _routes(context: RouteContext) -> list[BaseRoute]:
+    from katana450.extensions.programs.server.script_routes import routes
+
+    return routes(context)
+
+
 EXTENSION = Extension(
-    "programs", serve=ServeExtension(add_serve_options, runner=_runner, folder=_folder)
+    "programs",
+    serve=ServeExtension(add_serve_options, routes=_routes, runner=_runner, folder=_folder),
 )

@@ -44,7 +44,7 @@ class Jog(Request, frozen=True, kw_only=True):
                 raise ValueError(f"the rate {rate} is not between {-limit:g} and {limit:g}")
 
 
-class Step(Request, frozen=True, kw_only=True):
+class StepTool(Request, frozen=True, kw_only=True):
     """Move the target of the tool by one step. Steps in a row add up.
 
     Attributes:

@@ -54,7 +54,7 @@ from katana450.server.api.motion_requests import (
     Pose,
     Position,
     Servo,
-    Step,
+    StepTool,
     Turn,
     Undo,
 )
@@ -119,7 +119,7 @@ __all__ = [
     "SetPriority",
     "Shape",
     "Speed",
-    "Step",
+    "StepTool",
     "Stop",
     "Take",
     "Tool",
@@ -312,7 +312,7 @@ AnyRequest = (
     | Give
     | Decline
     | Jog
-    | Step
+    | StepTool
     | Speed
     | Joint
     | Joints

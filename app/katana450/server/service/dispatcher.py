@@ -206,7 +206,7 @@ class Dispatcher:
                 return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
             case requests.Turn(pitch=pitch, roll=roll):
                 return cmd.TurnTool(pitch, roll)
-            case requests.Step(by=by, frame=frame):
+            case requests.StepTool(by=by, frame=frame):
                 return cmd.StepTool(np.array(by), frame)
             case requests.Tool(name=name):
                 return cmd.SetTool(name)
