@@ -141,9 +141,7 @@ def test_window_without_storage_shows_the_card(server: AppServer, open_page: Ope
     assert page.errors == []
 
 
-def test_poster_covers_the_scene_until_it_is_drawn(
-    server: AppServer, open_page: OpenPage, artefacts: Path
-) -> None:
+def test_poster_covers_the_scene_until_it_is_drawn(server: AppServer, open_page: OpenPage) -> None:
     with SlowLink(server.port, 2e6, delay=0.1) as line:
         page = open_page(
             f"http://127.0.0.1:{line.port}",
