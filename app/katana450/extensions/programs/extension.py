@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from katana450.cli.serve_options import MIN_SILENCE, heartbeat_timeout
 from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
-    from starlette.routing import BaseRoute
-
     from katana450.server.service.runner import Runner
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
@@ -73,7 +71,7 @@ def _folder(context: FolderContext) -> PanelFolder | None:
     )
 
 
-def _routes(context: RouteContext) -> list[BaseRoute]:
+def _routes(context: RouteContext) -> list[Any]:
     from katana450.extensions.programs.server.script_routes import routes
 
     return routes(context)
