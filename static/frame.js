@@ -5,6 +5,7 @@
 (() => {
   const REPORT_EVERY = 50; // ms
   const AGAIN = 100; // ms
+  const FOLDS = 400; // ms in which viser's panel replaces its own settings by the controls
   const TRIES = 100; // attempts to restore the camera
   const STEADY = 1000; // ms for which viser must keep the restored camera
   // The properties of the floor and the file of the sky, for each theme.
@@ -12,6 +13,7 @@
   const page = new URLSearchParams(location.search).get("page");
   const outer = window.parent === window ? null : window.parent;
 
+  document.documentElement.dataset.loading = "";
   Viser.keepFocus();
   Viser.forgoCode();
   const sheet = new CSSStyleSheet();
@@ -25,6 +27,7 @@
   let tries = 0;
   let there = null; //  ms, since when viser has the kept view; null while it has another
   const room = new Map(); //   the last message of each type that depends on the theme
+  let loaded = null; // timer
   let seen = 0;
   let reported = 0;
   let reporting = false;
@@ -101,6 +104,8 @@
       return false;
     },
     connected() {
+      document.documentElement.dataset.loading = "";
+      clearTimeout(loaded);
       seen = 0;
       kept = camera;
       tries = 0;
@@ -113,6 +118,7 @@
       const ready = Viser.replayed(messages);
       dress(messages);
       Fit.hear(messages);
+      if (ready) loaded = setTimeout(() => delete document.documentElement.dataset.loading, FOLDS);
       if (ready) Fit.begin(() => outer?.katana?.drawn());
       if (!kept || tries > 0 || !ready) return;
       tries = 1;

@@ -30,6 +30,18 @@ WATCHED = """
 """
 """Script that records the states of the poster."""
 
+SETTINGS = """
+    window.settings = {seen: 0, shown: 0};
+    (function note() {
+        requestAnimationFrame(note);
+        const found = document.querySelector(".mantine-Stack-root:has(> .mantine-TextInput-root)");
+        if (!found || found.parentElement.parentElement.offsetHeight === 0) return;
+        settings.seen += 1;
+        if (getComputedStyle(found).visibility !== "hidden") settings.shown += 1;
+    })();
+"""
+"""Script that counts the frames with viser's settings for developers in an open panel."""
+
 SIZES = {"wide": (1440, 900), "portrait": (390, 844), "landscape": (844, 390)}
 
 NO_STORAGE = """Object.defineProperty(window, "localStorage", {get() {
@@ -156,6 +168,21 @@ def test_poster_covers_the_scene_until_it_is_drawn(server: AppServer, open_page:
             "shown",
             "gone",
         ]
+
+
+def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
+    with AppServer() as server:
+        page = open_page(server.url, nodes=("/arm", MOVE), script=SETTINGS)
+        server.kill()
+        page.wait_lost()
+        server.restart()
+        page.wait_until(lambda: page.connected, "the connection", seconds=30.0)
+        page.wait_ready(("/arm", MOVE))
+        page.page.wait_for_timeout(800)
+        found = page.frame.evaluate("settings")
+        # The panel shows them for a moment by itself.
+        assert found["seen"] > 0
+        assert found["shown"] == 0
 
 
 @pytest.mark.parametrize("size", list(SIZES))

@@ -11,3 +11,7 @@ interface Navigator {
   /** WebHID, which only some browsers have. */
   hid?: any;
 }
+interface WindowEventMap {
+  /** Sent by page.js with each status. */
+  status: CustomEvent<any>;
+}
