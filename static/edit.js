@@ -69,6 +69,8 @@ const Edit = (() => {
     window.addEventListener("status", note);
     byId("undo").addEventListener("click", undo);
     scene.addEventListener("load", () => {
+      // A page that could not be loaded gives no access.
+      if (!scene.contentDocument) return;
       const inner = scene.contentWindow;
       listen(inner);
       inner.addEventListener("pointerdown", ({ target, clientX, clientY }) => {

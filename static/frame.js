@@ -5,7 +5,6 @@
 (() => {
   const REPORT_EVERY = 50; // ms
   const AGAIN = 100; // ms
-  const FOLDS = 400; // ms in which viser's panel replaces its own settings by the controls
   const TRIES = 100; // attempts to restore the camera
   const STEADY = 1000; // ms for which viser must keep the restored camera
   // The properties of the floor and the file of the sky, for each theme.
@@ -27,7 +26,7 @@
   let tries = 0;
   let there = null; //  ms, since when viser has the kept view; null while it has another
   const room = new Map(); //   the last message of each type that depends on the theme
-  let loaded = null; // timer
+  let loaded = false; // whether the whole scene of this connection has arrived
   let seen = 0;
   let reported = 0;
   let reporting = false;
@@ -69,6 +68,10 @@
       { capture: true, passive: true },
     );
 
+  // viser's own settings fold away slowly. They are shown again when a person asks for them.
+  for (const kind of ["pointerdown", "keydown"])
+    window.addEventListener(kind, () => loaded && delete document.documentElement.dataset.loading, { capture: true });
+
   // The server sends every window the light theme. It is changed to the window's theme here, before
   // viser gets it. This needs no answer of the server, which a slow page would miss.
   function dress(messages) {
@@ -105,7 +108,7 @@
     },
     connected() {
       document.documentElement.dataset.loading = "";
-      clearTimeout(loaded);
+      loaded = false;
       seen = 0;
       kept = camera;
       tries = 0;
@@ -118,7 +121,7 @@
       const ready = Viser.replayed(messages);
       dress(messages);
       Fit.hear(messages);
-      if (ready) loaded = setTimeout(() => delete document.documentElement.dataset.loading, FOLDS);
+      if (ready) loaded = true;
       if (ready) Fit.begin(() => outer?.katana?.drawn());
       if (!kept || tries > 0 || !ready) return;
       tries = 1;

@@ -85,7 +85,7 @@ export class Welcome {
   // Put the ring on the handle, wherever the camera shows it.
   #place() {
     const { scene } = this.#page;
-    const pixel = scene.contentWindow?.katanaScene?.pixelOf(HANDLE);
+    const pixel = scene.contentDocument?.defaultView.katanaScene?.pixelOf(HANDLE);
     this.#pulse.hidden = !pixel;
     if (!pixel) return;
     this.#pulse.style.left = `${scene.offsetLeft + pixel[0]}px`;
