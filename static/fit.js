@@ -103,10 +103,24 @@ const Fit = (() => {
         target.look_at = put.look_at;
       }
     },
+    // Return the pixel of this document that shows a node, or a point [m] of viser's world; null
+    // without one, or behind the camera.
+    pixelOf(place) {
+      const { camera, canvas } = viewer() ?? {};
+      if (!camera || !node("")) return null;
+      const point = typeof place === "string"
+        ? node(place)?.getWorldPosition(vector([0, 0, 0]))
+        : vector(place).applyMatrix4(root());
+      if (!point) return null;
+      const { x, y, z } = point.project(camera);
+      const { left, top, width, height } = canvas.getBoundingClientRect();
+      return z < 1 ? [left + ((1 + x) / 2) * width, top + ((1 - y) / 2) * height] : null;
+    },
     // Note that the person has chosen the view of this name.
     choose: (view) => (riding = view === "Tool"),
     // Begin to fit as soon as all shapes are loaded; the rest of the scene is there.
-    begin() {
+    // Call `drawn` as soon as there are some.
+    begin(drawn) {
       if (begun) return;
       begun = true;
       let [count, steady, tries] = [0, 0, 0];
@@ -114,6 +128,7 @@ const Fit = (() => {
         const before = count;
         count = viewer()?.cameraControl && node("") ? corners().length : 0;
         steady = count && count === before ? steady + 1 : 0;
+        if (count || tries === TRIES - 1) drawn();
         if (steady < STEADY && ++tries < TRIES) return;
         clearInterval(timer);
         if (count) new ResizeObserver(refit).observe(viewer().canvas);

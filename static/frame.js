@@ -12,6 +12,7 @@
   const page = new URLSearchParams(location.search).get("page");
   const outer = window.parent === window ? null : window.parent;
 
+  document.documentElement.dataset.loading = "";
   Viser.keepFocus();
   Viser.forgoCode();
   const sheet = new CSSStyleSheet();
@@ -25,6 +26,7 @@
   let tries = 0;
   let there = null; //  ms, since when viser has the kept view; null while it has another
   const room = new Map(); //   the last message of each type that depends on the theme
+  let loaded = false; // whether the whole scene of this connection has arrived
   let seen = 0;
   let reported = 0;
   let reporting = false;
@@ -66,6 +68,10 @@
       { capture: true, passive: true },
     );
 
+  // viser's own settings fold away slowly. They are shown again when a person asks for them.
+  for (const kind of ["pointerdown", "keydown"])
+    window.addEventListener(kind, () => loaded && delete document.documentElement.dataset.loading, { capture: true });
+
   // The server sends every window the light theme. It is changed to the window's theme here, before
   // viser gets it. This needs no answer of the server, which a slow page would miss.
   function dress(messages) {
@@ -101,6 +107,8 @@
       return false;
     },
     connected() {
+      document.documentElement.dataset.loading = "";
+      loaded = false;
       seen = 0;
       kept = camera;
       tries = 0;
@@ -113,13 +121,15 @@
       const ready = Viser.replayed(messages);
       dress(messages);
       Fit.hear(messages);
-      if (ready) Fit.begin();
+      if (ready) loaded = true;
+      if (ready) Fit.begin(() => outer?.katana?.drawn());
       if (!kept || tries > 0 || !ready) return;
       tries = 1;
       setTimeout(() => restore(line), AGAIN);
     },
   });
 
+  window.katanaScene = { pixelOf: Fit.pixelOf };
   Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

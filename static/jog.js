@@ -24,6 +24,8 @@ const Jog = (() => {
   const holds = new Set();
   let mouse = { rates: none(), at: 0 };
   let open = false;
+  let steps = null; // steps and gripper, loaded when the sheet is first opened
+  let loading = false;
   let moving = false;
   /** @type {(request: object) => void} */
   let say = () => {};
@@ -44,9 +46,11 @@ const Jog = (() => {
       button.classList.toggle("on", holds.has(button.dataset.hold));
   }
 
-  // Return whether the key is one of KEYS and was handled.
+  // Return whether the key moves the arm or its gripper and was handled.
   function key(event) {
-    if (!open || !(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return false;
+    if (!open || event.ctrlKey || event.metaKey || event.altKey) return false;
+    if (steps?.key(event, KEYS)) return true;
+    if (!(event.code in KEYS)) return false;
     if (event.type === "keydown") keys.add(event.code);
     else keys.delete(event.code);
     show();
@@ -99,7 +103,9 @@ const Jog = (() => {
     const pressed = (n) => found.buttons[n]?.pressed ?? false;
     if (pressed(1) && !stopHeld) stop();
     stopHeld = pressed(1);
-    if (!pressed(4) && !pressed(5)) return none();
+    const held = pressed(4) || pressed(5);
+    steps?.grip(held && pressed(3), held && pressed(0));
+    if (!held) return none();
     const [x = 0, y = 0, u = 0, v = 0] = found.axes;
     return [-bent(y), -bent(x), -bent(v), Number(pressed(12)) - Number(pressed(13)), bent(u)];
   }
@@ -134,12 +140,15 @@ const Jog = (() => {
 
   function rates() {
     if (!open) return none();
+    const pad = gamepad();
+    steps?.deflect(steps.on ? pad : none());
+    if (steps?.on) return none();
     const sum = none();
     const add = (other) => other.forEach((value, i) => (sum[i] += value));
     for (const code of keys) sum[KEYS[code][0]] += KEYS[code][1];
     for (const hold of holds) sum[HOLDS[hold][0]] += HOLDS[hold][1];
     Object.values(pads).forEach(add);
-    add(gamepad());
+    add(pad);
     if (performance.now() - mouse.at < MOUSE_FRESH) add(mouse.rates);
     return sum.map((value, i) => Math.max(-1, Math.min(1, value)) * (i < 3 ? LINEAR : ANGULAR));
   }
@@ -154,7 +163,7 @@ const Jog = (() => {
     sentAt = performance.now();
     /** @type {HTMLInputElement} */
     const frame = document.querySelector("[name=frame]:checked");
-    say({ do: "jog", rates: now, frame: frame.value });
+    say({ do: "jog", rates: now, frame: frame.value === "tool" ? "tool" : "base" });
   }
 
   function begin(options) {
@@ -193,12 +202,26 @@ const Jog = (() => {
     setInterval(sendJog, EVERY);
   }
 
+  // Without an answer the sheet works as before, and the next opening tries again.
+  async function load() {
+    if (steps || loading) return;
+    loading = true;
+    try {
+      const { Steps } = await import("./jog/steps.js");
+      steps = await Steps.in(byId("jog"), say);
+    } catch (error) {
+      console.warn(`No steps in the Jog sheet: ${error.message}`);
+    }
+    loading = false;
+  }
+
   return {
     begin,
     key,
     quiet,
     show(shown) {
       open = shown;
+      if (shown) load();
       quiet();
       sendJog();
     },

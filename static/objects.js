@@ -43,6 +43,7 @@ const Objects = (() => {
     if (!mesh) return;
     // A changed unit applies to the object that is already placed.
     placed = again && placed ? placed : mesh.name;
+    window.dispatchEvent(new Event("placed"));
     say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key });
     tell(`${placed}: ${mesh.text}`);
   }
@@ -81,13 +82,18 @@ const Objects = (() => {
     byId("load").addEventListener("click", () => byId("scene-file").click());
     byId("save").addEventListener("click", save);
     byId("unit").addEventListener("change", () => add(true));
-    chosen(byId("object-file"), (first) => {
-      file = first;
-      placed = null;
-      add(false);
-    });
+    chosen(byId("object-file"), take);
     chosen(byId("scene-file"), load);
   }
 
-  return { begin };
+  // Read a file that was chosen or dropped: an object, or a scene in a .zip file.
+  function take(first) {
+    if (byId("objects").hidden) byId("objects-button").click();
+    if (/\.zip$/i.test(first.name)) return load(first);
+    file = first;
+    placed = null;
+    return add(false);
+  }
+
+  return { begin, take };
 })();

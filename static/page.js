@@ -9,6 +9,7 @@
   const SIGN_IN = 4401; // close code: the page has to sign in again
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
+  const WELCOMED = "katana450.welcome";
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
@@ -114,7 +115,7 @@
       if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();
     } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
       if (!event.repeat) say({ do: "go" });
-    } else if (typing(event.target) || !Jog.key(event)) return;
+    } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event))) return;
     event.preventDefault();
     event.stopImmediatePropagation();
   }
@@ -135,7 +136,8 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  window.katana = { key, blur, toast };
+  const drawn = () => byId("poster").classList.add("done");
+  window.katana = { key, blur, toast, drawn };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
   window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page}`));
@@ -292,6 +294,7 @@
       byId("gate").hidden = true;
       proven = null;
       draw();
+      window.dispatchEvent(new CustomEvent("status", { detail: status }));
     }
     drawLink();
   };
@@ -326,6 +329,7 @@
   });
   Jog.begin({ say, stop });
   Objects.begin({ say });
+  Edit.begin({ say, toast });
   // Who is connected, for admins; loaded on first use.
   byId("people-button").addEventListener("click", async () => {
     help.close();
@@ -346,6 +350,18 @@
       return null;
     }
   }
+
+  // The first steps: at each visit until they are dismissed, and from the help.
+  let welcome = null;
+  async function showWelcome() {
+    const { Welcome } = await import("./welcome/welcome.js");
+    if (welcome) welcome.show();
+    else welcome = new Welcome({ say, kept, scene });
+  }
+  byId("welcome-button").addEventListener("click", () => {
+    help.close();
+    showWelcome();
+  });
 
   async function showInstruments(shown) {
     const button = byId("instruments-button");
@@ -385,5 +401,8 @@
     const { protocol, host } = location;
     worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });
     if (kept?.getItem(OPEN) === "yes") showInstruments(true);
+    window.addEventListener("status", ({ detail }) => {
+      if (detail.role !== "viewer" && !kept?.getItem(WELCOMED)) showWelcome();
+    }, { once: true });
   });
 })();

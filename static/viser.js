@@ -11,9 +11,11 @@ const Viser = (() => {
   const PANEL_HANDLE = `${PANEL} [style*="height: 3.5em"]`;
   const PANEL_CONTENT = `${PANEL} [style*="width: 20em"]`;
   // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
-  // miscounts and the picture stays faint. It also starts with the light theme.
+  // miscounts and the picture stays faint. It also starts with the light theme. Without controls from
+  // the server, as before each connection, its panel shows settings for developers.
   const STEADY = `canvas { opacity: 1 !important }
-    html[data-theme=dark]:not([data-mantine-color-scheme=dark]) #root { opacity: 0 }`;
+    html[data-theme=dark]:not([data-mantine-color-scheme=dark]) #root { opacity: 0 }
+    html[data-loading] .mantine-Stack-root:has(> .mantine-TextInput-root) { visibility: hidden }`;
   const [CONNECTED, BATCH, SEND, SERVER] = ["connected", "message_batch", "send", "set_server"];
 
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;

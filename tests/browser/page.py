@@ -34,6 +34,10 @@ READY_SECONDS = 60.0  # a software renderer compiles shaders for up to 22 s
 POLL_MILLISECONDS = 20.0
 THROTTLE_MILLISECONDS = 50.0
 DRAG_STEPS = 8
+FIRST_VISIT = "window.firstVisit = true;"
+DISMISSED = """try {
+    if (!window.firstVisit) localStorage.setItem("katana450.welcome", "done");
+} catch {}"""
 COARSE = 0.5  # drawn pixels per pixel of the window: a software renderer is four times as fast
 
 
@@ -67,6 +71,7 @@ class ViserPage:
 
         `nodes` must exist in addition to the nodes that the server has sent by then. With
         `own_camera` the page uses its own initial camera. `script` runs first in both documents;
+        with FIRST_VISIT the first steps are shown;
         `context_options` are Playwright's.
         """
         camera = camera or Camera()
@@ -77,7 +82,7 @@ class ViserPage:
         best = drawing is Drawing.BEST
         options = json.dumps({"draws": drawing is Drawing.ALWAYS, "fullQuality": best})
         scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
-        context.add_init_script(f"window.harness = {options};\n{scripts}\n{script}")
+        context.add_init_script(f"window.harness = {options};\n{scripts}\n{script}\n{DISMISSED}")
         page = context.new_page()
         errors: list[str] = []
         page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)

@@ -30,6 +30,8 @@ NAN = math.nan
         (lambda: cmd.MoveTool(np.array([0.0, 0.0, NAN])), "finite"),
         (lambda: cmd.MoveTool("abc"), "list of numbers"),  # type: ignore[arg-type]
         (lambda: cmd.TurnTool(NAN, 0.0), "pitch"),
+        (lambda: cmd.StepTool(np.zeros(3)), "5 numbers"),
+        (lambda: cmd.StepTool(np.zeros(5), "tool"), "JogFrame"),  # type: ignore[arg-type]
         (lambda: cmd.TurnTool(0.0, -math.inf), "roll"),
         (lambda: cmd.SetPose(np.zeros((4, 4))), "T"),
         (lambda: cmd.SetPose(np.diag([1.0, 1.0, 2.0, 1.0])), "rotation"),

@@ -36,6 +36,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
             cmd.Servo(q),
         ),
         *(cmd.MoveTool(np.array((0.3, 0.0, 0.1))), cmd.TurnTool(0.1, 0.1), cmd.SetPose(np.eye(4))),
+        cmd.StepTool(np.full(5, 0.01)),
         *(cmd.SetGripper(0.1), cmd.SetTool("flange"), cmd.SetPriority(Priority.PITCH)),
         *(cmd.TakeBranch(BRANCHES[0]), cmd.EndDrag(), cmd.Home(), cmd.GoToZero(), cmd.Hold()),
         *(cmd.Stop(), cmd.ClearStop(), cmd.Pause(), cmd.Resume(), cmd.GoAlong(0.5)),

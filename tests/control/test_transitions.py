@@ -70,6 +70,7 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.Servo: lambda: cmd.Servo(np.array(state.setpoint) + 0.002),
         cmd.MoveTool: lambda: cmd.MoveTool(FAR + 0.01),
         cmd.TurnTool: lambda: cmd.TurnTool(-0.4, 0.3),
+        cmd.StepTool: lambda: cmd.StepTool(np.array([-0.4, 0.4, 0.0, 0.0, 0.0])),
         cmd.SetPose: lambda: cmd.SetPose(pose),
         cmd.SetGripper: lambda: cmd.SetGripper(0.4),
         cmd.SetTool: lambda: cmd.SetTool("flange"),

@@ -3,7 +3,7 @@ import globals from "globals";
 
 // Defined at the top of one script of a document and used by the others.
 const shared = {
-  Fields: "readonly", Fit: "readonly", Jog: "readonly", Objects: "readonly", Theme: "readonly", Viser: "readonly",
+  Edit: "readonly", Fields: "readonly", Fit: "readonly", Jog: "readonly", Objects: "readonly", Theme: "readonly", Viser: "readonly",
 };
 
 export default [
@@ -23,5 +23,5 @@ export default [
       "prefer-const": "error",
     },
   },
-  { files: ["static/instruments/*.js"], languageOptions: { sourceType: "module" } },
+  { files: ["static/{instruments,jog,people,selection,welcome}/*.js"], languageOptions: { sourceType: "module" } },
 ];

@@ -31,6 +31,7 @@ from katana450.arm.control.object_commands import (
     SetAppearance,
 )
 from katana450.arm.control.state import Finding
+from katana450.arm.control.step_tool import StepTool
 from katana450.arm.control.stop_commands import ClearStop, Stop
 from katana450.arm.control.traits import (
     BaseCommand,
@@ -81,6 +82,7 @@ __all__ = [
     "SetPriority",
     "SetTool",
     "SpeedScale",
+    "StepTool",
     "Stop",
     "TakeBranch",
     "TurnTool",
@@ -365,6 +367,7 @@ Command = (
     | SetJoints
     | Servo
     | MoveTool
+    | StepTool
     | TurnTool
     | SetPose
     | SetGripper

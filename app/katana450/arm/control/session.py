@@ -339,6 +339,8 @@ class Session:
             case cmd.TurnTool(pitch=pitch, roll=roll):
                 target = replace(current_target(arm, state), pitch=pitch, roll=roll)
                 return tool_targets.dragged(arm, state, target)
+            case cmd.StepTool(by=by, frame=frame):
+                return tool_targets.stepped(arm, state, by, frame)
             case cmd.SetPose(T=T):
                 return tool_targets.with_pose_target(arm, state, PoseTarget(T))
             case cmd.TakeBranch(branch=branch):

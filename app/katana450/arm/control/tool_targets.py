@@ -24,8 +24,10 @@ from katana450.arm.control.motion_stepper import jog_twist
 from katana450.arm.control.state import GRIPPER_LIMITS, Reason, State
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch, branch_of
+from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tracker import track
+from katana450.maths.kinematics.velocity import JogFrame
 
 NO_RATES = frozen(np.zeros(5))
 """The rates of a jog that ends."""
@@ -49,6 +51,17 @@ def dragged(arm: ArmModel, state: State, target: ToolTarget, *, let_go: bool = F
     """
     since = current_target(arm, state) if state.since is None else state.since
     return with_mode(state, Tracking(target, since, let_go))
+
+
+def stepped(arm: ArmModel, state: State, by: FloatArray, frame: JogFrame) -> State:
+    """Return ``state`` with its tool target moved ``by`` (5,): see ``commands.StepTool``."""
+    target = current_target(arm, state)
+    moved = by[:3]
+    if frame is JogFrame.TOOL:
+        moved = forward(arm.chain_to(state.tool), state.goal)[:3, :3] @ moved
+    pitch, roll = target.pitch + float(by[3]), target.roll + float(by[4])
+    target = replace(target, position=frozen(target.position + moved), pitch=pitch, roll=roll)
+    return dragged(arm, state, target, let_go=True)
 
 
 def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from katana450.cli.serve_options import MIN_SILENCE, heartbeat_timeout
 from katana450.extension import Extension, ServeExtension
@@ -12,6 +12,7 @@ from katana450.extension import Extension, ServeExtension
 if TYPE_CHECKING:
     from katana450.server.service.runner import Runner
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
+    from katana450.server.web.http_api import RouteContext
 
 TAB = "Programs"
 """Label of the panel's tab with the controls."""
@@ -74,6 +75,13 @@ def _folder(context: FolderContext) -> PanelFolder | None:
         )
 
 
+def _routes(context: RouteContext) -> list[Any]:
+    from katana450.extensions.programs.server.script_routes import routes
+
+    return routes(context)
+
+
 EXTENSION = Extension(
-    "programs", serve=ServeExtension(add_serve_options, runner=_runner, folder=_folder)
+    "programs",
+    serve=ServeExtension(add_serve_options, routes=_routes, runner=_runner, folder=_folder),
 )

@@ -27,6 +27,12 @@ MAX_LINEAR_RATE = 0.5
 MAX_ANGULAR_RATE = 3.0
 """Maximum angular jog rate [rad/s], for the same reason."""
 
+MAX_LINEAR_STEP = 0.1
+"""Maximum step of the tool point along one axis [m]."""
+
+MAX_ANGULAR_STEP = 1.0
+"""Maximum step of pitch or roll [rad]."""
+
 MIN_SPEED, MAX_SPEED = 0.05, 1.0
 """Limits of the fraction of full speed."""
 

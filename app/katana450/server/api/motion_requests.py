@@ -11,8 +11,10 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import (
     COMMAND,
     MAX_ANGULAR_RATE,
+    MAX_ANGULAR_STEP,
     MAX_JOINTS,
     MAX_LINEAR_RATE,
+    MAX_LINEAR_STEP,
     Frame,
     Matrix4,
     Rates,
@@ -40,6 +42,26 @@ class Jog(Request, frozen=True, kw_only=True):
         for rate, limit in zip(self.rates, limits, strict=True):
             if not math.isfinite(rate) or abs(rate) > limit:
                 raise ValueError(f"the rate {rate} is not between {-limit:g} and {limit:g}")
+
+
+class StepTool(Request, frozen=True, kw_only=True):
+    """Move the target of the tool by one step. Steps in a row add up.
+
+    Attributes:
+        by: Step of the tool point (x, y, z) [m], then of pitch and roll [rad].
+        frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+    by: Rates
+    frame: JogFrame = JogFrame.BASE
+
+    def __post_init__(self) -> None:
+        limits = (MAX_LINEAR_STEP,) * 3 + (MAX_ANGULAR_STEP,) * 2
+        for step, limit in zip(self.by, limits, strict=True):
+            if not math.isfinite(step) or abs(step) > limit:
+                raise ValueError(f"the step {step} is not between {-limit:g} and {limit:g}")
 
 
 class Joint(Request, frozen=True, kw_only=True):
@@ -141,6 +163,16 @@ class Gripper(Request, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
     angle: float
+
+
+class Undo(Request, frozen=True):
+    """Undo the last change of a goal, an object or a setting by this client.
+
+    To undo a goal, the arm moves back to the earlier one. Refused while the arm is stopped, and
+    without a change since the last stop or change of driver.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
 
 
 class EndDrag(Request, frozen=True):

@@ -54,7 +54,9 @@ from katana450.server.api.motion_requests import (
     Pose,
     Position,
     Servo,
+    StepTool,
     Turn,
+    Undo,
 )
 from katana450.server.api.people_requests import Kick, ListPeople, Mute, Unmute
 from katana450.server.api.scene_requests import (
@@ -117,10 +119,12 @@ __all__ = [
     "SetPriority",
     "Shape",
     "Speed",
+    "StepTool",
     "Stop",
     "Take",
     "Tool",
     "Turn",
+    "Undo",
     "Unmute",
     "Watch",
     "Withdraw",
@@ -308,6 +312,7 @@ AnyRequest = (
     | Give
     | Decline
     | Jog
+    | StepTool
     | Speed
     | Joint
     | Joints
@@ -322,6 +327,7 @@ AnyRequest = (
     | Branch
     | EndDrag
     | Go
+    | Undo
     | Home
     | GoToZero
     | Hold

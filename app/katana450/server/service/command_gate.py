@@ -23,6 +23,7 @@ from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.participants import is_same_person
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import ClearBy, StopRecord
+from katana450.server.service.undo import UndoHistory
 
 log = logging.getLogger(__name__)
 
@@ -65,6 +66,7 @@ class CommandGate:
         """Notes commands, stops and changes of the lease for the event log."""
         self.presser_of: Callable[[StopCause], Actor | None] = lambda _: None
         """Function that returns the participant that pressed STOP; None for another cause."""
+        self.undo = UndoHistory(clock)
         self._clear_by = clear_by
         self._presses = Presses()
         self._cleared = 0
@@ -89,7 +91,8 @@ class CommandGate:
                     granted = self._checked(command, actor)
                     # What follows from the command later is void after a revocation.
                     granted = replace(granted, seen=self.revocations)
-                    ticket = self.present().deliver(command, granted)
+                    with self.undo.noted(self.present(), command, granted):
+                        ticket = self.present().deliver(command, granted)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise

@@ -111,6 +111,8 @@ class Dispatcher:
             return about_people
         if isinstance(request, hub.runner.request_types):
             return hub.runner.handle(window, request)
+        if isinstance(request, requests.Undo):
+            return self._undo(window)
         command = self._command(request)
         if command is None:
             self._change_lease(window, request)
@@ -143,6 +145,15 @@ class Dispatcher:
         except TimeoutError:
             return msgspec.structs.replace(pending, outcome=UNKNOWN)
         return serialize.concluded(pending, outcome)
+
+    def _undo(self, window: Window) -> answers.Answer:
+        """Undo the last change of ``window``."""
+        gate, hub = self._hub.gate, self._hub
+        state = gate.check_runs().state
+        change, command = gate.undo.inverse(window.person.key, gate.revocations, state)
+        ticket = hub.move(window, command, change.actor.seen)
+        gate.undo.forget(change)
+        return _done(ticket, None)
 
     def _change_lease(self, window: Window, request: requests.Request) -> None:
         """Execute a request about the lease."""
@@ -195,6 +206,8 @@ class Dispatcher:
                 return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
             case requests.Turn(pitch=pitch, roll=roll):
                 return cmd.TurnTool(pitch, roll)
+            case requests.StepTool(by=by, frame=frame):
+                return cmd.StepTool(np.array(by), frame)
             case requests.Tool(name=name):
                 return cmd.SetTool(name)
             case requests.SetPriority(priority=priority):

@@ -96,5 +96,6 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
         "taken": "" if taker is None else f"{taker} took over from you.",
         "planning": program is not None and program.status == "planning",
         "orders": list(hub.runner.orders(window)) if hub.arm is not None else [],
+        "undo": [each.name for each in hub.gate.undo.changes(person.key, hub.gate.revocations)],
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
     }

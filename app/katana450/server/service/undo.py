@@ -1,0 +1,162 @@
+"""The last changes of the driver, with the commands that undo them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.scene_objects import SceneObject, named
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.server.service.interfaces import ArmInterface
+
+MAX_CHANGES = 20
+"""Maximum number of changes that can be undone."""
+
+SAME_GESTURE = 1.0
+"""[s] Maximum pause between two commands of one drag, or of one jog."""
+
+GOALS: dict[type[cmd.BaseCommand], str] = {
+    cmd.MoveTool: "drag",
+    cmd.TurnTool: "drag",
+    cmd.EndDrag: "drag",
+    cmd.SetPose: "pose",
+    cmd.SetJoint: "joint",
+    cmd.SetAxes: "joints",
+    cmd.SetJoints: "joints",
+    cmd.Nudge: "joint step",
+    cmd.StepTool: "step",
+    cmd.Jog: "jog",
+    cmd.TakeBranch: "branch",
+    cmd.Go: "detour",
+    cmd.Home: "home",
+    cmd.GoToZero: "zero",
+}
+"""The commands that change the goal of the arm, in words."""
+
+SINGLE = (cmd.Nudge, cmd.StepTool, cmd.TakeBranch, cmd.Go, cmd.Home, cmd.GoToZero, cmd.Remove)
+"""Commands of which each is a change of its own, however soon it follows."""
+
+OBJECTS = (cmd.PlaceObject, cmd.MoveObject, cmd.Attach, cmd.Remove)
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change that can be undone.
+
+    Attributes:
+        name: What was changed, in words.
+        inverse: The command that restores the earlier value.
+        actor: The participant, with the number of revocations at the time of the change.
+        at: Time of its last command [s].
+    """
+
+    name: str
+    inverse: cmd.Command
+    actor: Actor
+    at: float
+
+    def continues(self, last: Change) -> bool:
+        """Return whether this change belongs to the gesture of the change before it."""
+        same = (self.name, self.actor.key, self.actor.seen)
+        return (last.name, last.actor.key, last.actor.seen) == same and (
+            self.at - last.at < SAME_GESTURE
+        )
+
+
+class UndoHistory:
+    """The changes that ``CommandGate`` has accepted, the newest last.
+
+    A stop or a change of driver ends the history, because it counts as a revocation.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """Begin without changes. ``clock`` is in seconds."""
+        self._clock = clock
+        self._changes: tuple[Change, ...] = ()
+
+    @contextmanager
+    def noted(self, arm: ArmInterface, command: cmd.Command, actor: Actor) -> Iterator[None]:
+        """Note what ``command`` of ``actor`` changes, if the block delivers it without an error."""
+        state, caught_up = arm.state, arm.caught_up
+        yield
+        if isinstance(command, cmd.ReplaceScene):
+            self._changes = ()
+        found = _inverse(state, command)
+        if found is None:
+            return
+        change = Change(*found, actor, self._clock())
+        last = self._changes[-1] if self._changes else None
+        one_gesture = not isinstance(command, SINGLE)
+        # A state without the last command does not show what this one changes.
+        if last is not None and change.continues(last) and (one_gesture or not caught_up):
+            self._changes = (*self._changes[:-1], replace(last, at=change.at))
+            return
+        if not isinstance(command, cmd.EndDrag):
+            self._changes = (*self._changes, change)[-MAX_CHANGES:]
+
+    def changes(self, key: str, revocations: int) -> tuple[Change, ...]:
+        """Return the changes that the participant of ``key`` can undo, the newest first."""
+        found = []
+        for change in reversed(self._changes):
+            if (change.actor.key, change.actor.seen) != (key, revocations):
+                break
+            found.append(change)
+        return tuple(found)
+
+    def inverse(self, key: str, revocations: int, state: State) -> tuple[Change, cmd.Command]:
+        """Return the newest change of the participant of ``key``, and the command that undoes it.
+
+        Raises InputError if there is none, or if the hand holds the object.
+        """
+        changes = self.changes(key, revocations)
+        if not changes:
+            raise InputError("There is nothing to undo since the last stop or change of driver.")
+        command = changes[0].inverse
+        name = _object_of(command)
+        now = None if name is None else named(state.objects, name)
+        if now is not None and now.held:
+            raise InputError(f"{now.name!r} is held: open the gripper first.")
+        return changes[0], command
+
+    def forget(self, change: Change) -> None:
+        """Remove ``change`` and everything after it: its inverse was accepted."""
+        # The inverse itself may have continued the change.
+        kept = [each.inverse is not change.inverse for each in self._changes]
+        if not all(kept):
+            self._changes = self._changes[: kept.index(False)]
+
+
+def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | None:
+    """Return the name of the change by ``command``, and its inverse; None for no such change."""
+    if type(command) in GOALS:
+        return f"arm ({GOALS[type(command)]})", cmd.SetJoints(state.goal)
+    match command:
+        case cmd.SetGripper():
+            return "gripper", cmd.SetGripper(state.gripper_goal)
+        case cmd.SpeedScale():
+            return "speed", cmd.SpeedScale(state.speed)
+        case cmd.SetTool() if state.tool:
+            return "tool", cmd.SetTool(state.tool)
+        case cmd.SetPriority():
+            return "priority", cmd.SetPriority(state.priority)
+    name = _object_of(command) if isinstance(command, OBJECTS) else None
+    if name is None:
+        return None
+    before: SceneObject | None = named(state.objects, name)
+    if before is None:
+        return f"object {name}", cmd.Remove(name)
+    return None if before.held else (f"object {name}", cmd.PlaceObject(before))
+
+
+def _object_of(command: cmd.Command) -> str | None:
+    """Return the name of the object that ``command`` is about; None without one."""
+    match command:
+        case cmd.PlaceObject(scene_object=scene_object):
+            return scene_object.name
+        case cmd.MoveObject(name=name) | cmd.Attach(name=name) | cmd.Remove(name=name):
+            return name
+    return None

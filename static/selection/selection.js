@@ -1,0 +1,113 @@
+// The selected object: a frame round it in the picture, with its name and a button to remove it.
+import { html, write } from "../instruments/shape.js";
+
+const EVERY = 100; // ms between two updates of the frame
+const MARGIN = 6; // px
+const STYLE = new URL("selection.css", import.meta.url).href;
+
+// Return the corners [m], in the base frame, of the box round an object. Its own frame is in the
+// middle of its underside.
+function corners({ shape, size, scale, T }) {
+  const [a, b, c] = size.map((each) => each * scale);
+  const wide = { cylinder: [2 * a, 2 * a, b], sphere: [2 * a, 2 * a, 2 * a] }[shape] ?? [a, b, c];
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => {
+    const at = wide.map((length, i) => length * (((corner >> i) & 1) - (i < 2 ? 0.5 : 0)));
+    return [0, 1, 2].map((row) => T[row][3] + at.reduce((sum, value, i) => sum + T[row][i] * value, 0));
+  });
+}
+
+export class Selection {
+  #scene;
+  #say;
+  #object = null;
+  #timer = null;
+  #name = html("b");
+  #frame;
+
+  constructor(stage, scene, say) {
+    this.#scene = scene;
+    this.#say = say;
+    document.head.append(html("link", { rel: "stylesheet", href: STYLE }));
+    const remove = html("button", { type: "button" }, "Remove ", html("kbd", {}, "Del"));
+    const clear = html("button", { type: "button", "aria-label": "Deselect" }, "×");
+    remove.addEventListener("click", () => this.remove());
+    clear.addEventListener("click", () => this.#show(null));
+    const bar = html("div", { role: "group", "aria-label": "Selected object" }, this.#name, remove, clear);
+    this.#frame = html("div", { id: "selection", hidden: "" }, bar);
+    stage.append(this.#frame);
+  }
+
+  // Select the object in the picture at a pixel of viser's document; the smallest one if several are
+  // there. Without one, select nothing.
+  async pick(x, y) {
+    const objects = await this.#objects();
+    const hit = objects
+      .filter(({ held, hidden }) => !held && !hidden)
+      .map((object) => [object, this.#bounds(object)])
+      .filter(([, box]) => box && x >= box.left && x <= box.right && y >= box.top && y <= box.bottom)
+      .sort(([, a], [, b]) => area(a) - area(b))[0];
+    this.#show(hit?.[0] ?? null);
+  }
+
+  // Remove the selected object. Return whether there is one.
+  remove() {
+    if (!this.#object) return false;
+    this.#say({ do: "remove", name: this.#object.name });
+    this.#show(null);
+    return true;
+  }
+
+  async #objects() {
+    const answer = await fetch("api/v1/objects").catch(() => null);
+    return answer?.ok ? (await answer.json()).objects : [];
+  }
+
+  #show(object) {
+    this.#object = object;
+    clearInterval(this.#timer);
+    this.#frame.hidden = !object;
+    if (!object) return;
+    write(this.#name, object.name);
+    this.#place();
+    let ticks = 0;
+    this.#timer = setInterval(() => {
+      this.#place();
+      // The object may be moved or removed by others.
+      if ((ticks += 1) % 10 === 0) this.#refresh();
+    }, EVERY);
+  }
+
+  async #refresh() {
+    const name = this.#object?.name;
+    const found = (await this.#objects()).find((each) => each.name === name && !each.held);
+    if (this.#object?.name !== name) return;
+    if (found) this.#object = found;
+    else this.#show(null);
+  }
+
+  #place() {
+    const box = this.#bounds(this.#object);
+    this.#frame.style.visibility = box ? "" : "hidden";
+    if (!box) return;
+    const { offsetLeft, offsetTop } = this.#scene;
+    this.#frame.style.left = `${offsetLeft + box.left}px`;
+    this.#frame.style.top = `${offsetTop + box.top}px`;
+    this.#frame.style.width = `${box.right - box.left}px`;
+    this.#frame.style.height = `${box.bottom - box.top}px`;
+  }
+
+  // Return the rectangle round an object in viser's document; null behind the camera.
+  #bounds(object) {
+    const pixels = corners(object).map((corner) => this.#scene.contentWindow.katanaScene?.pixelOf(corner));
+    if (pixels.some((each) => !each)) return null;
+    const [xs, ys] = [0, 1].map((i) => pixels.map((each) => each[i]));
+    return {
+      left: Math.min(...xs) - MARGIN,
+      right: Math.max(...xs) + MARGIN,
+      top: Math.min(...ys) - MARGIN,
+      bottom: Math.max(...ys) + MARGIN,
+    };
+  }
+}
+
+const area = ({ left, right, top, bottom }) => (right - left) * (bottom - top);

@@ -1,0 +1,144 @@
+"""Direct changes to the scene: a dropped file, a click, Delete and Ctrl-Z."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from katana450.client import Client, connect
+from katana450.server.api import answers
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.browser.session import MOVE, Truth, bar, clear_stop, prepare
+
+DROP = """async ([name, bytes]) => {
+    const data = new DataTransfer();
+    data.items.add(new File([new Uint8Array(bytes)], name));
+    const where = document.querySelector("canvas") ?? document.body;
+    for (const kind of ["dragenter", "dragover", "drop"])
+        where.dispatchEvent(new DragEvent(kind, {dataTransfer: data, bubbles: true}));
+}"""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def truth(server: AppServer) -> Truth:
+    return Truth(server)
+
+
+@pytest.fixture
+def page(server: AppServer, open_page: OpenPage, truth: Truth) -> ViserPage:
+    page = open_page(server.url, nodes=("/arm", MOVE))
+    prepare(page, truth)
+    return page
+
+
+@pytest.fixture
+def reader(server: AppServer) -> Iterator[Client]:
+    with connect(server.url, "Reader") as reader:
+        yield reader
+
+
+def names(reader: Client) -> set[str]:
+    return {each.name for each in reader.query(answers.Objects).objects}
+
+
+def pixel_of(page: ViserPage, reader: Client, name: str) -> tuple[float, float]:
+    """Return the pixel of the window in the middle of an object."""
+    found = next(each for each in reader.query(answers.Objects).objects if each.name == name)
+    T: Any = np.array(found.T)
+    return page.project(T[:3, 3] + (0.0, 0.0, 0.5 * found.size[-1]))
+
+
+@pytest.mark.parametrize("document", ["scene", "page"])
+def test_dropped_file_is_put_on_the_table(page: ViserPage, reader: Client, document: str) -> None:
+    before = names(reader)
+    data = trimesh.creation.box((30.0, 30.0, 30.0)).export(file_type="stl")
+    target = page.frame if document == "scene" else page.page.main_frame
+    target.evaluate(DROP, [f"dropped {document}.stl", list(data)])
+    page.wait_until(lambda: len(names(reader)) == len(before) + 1, "the object")
+    page.wait_until(lambda: "triangles" in page.page.inner_text("#read"), "the answer")
+    assert page.page.locator("#stage.dropping").count() == 0 or page.page.wait_for_selector(
+        "#stage:not(.dropping)"
+    )
+    # What was dropped can be undone.
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: names(reader) == before, "the object to go")
+    assert page.errors == []
+
+
+def test_clicked_object_is_removed_by_delete_and_returns(
+    page: ViserPage, reader: Client, artefacts: Path
+) -> None:
+    before = names(reader)
+    # Without a selection the key removes nothing.
+    page.page.keyboard.press("Delete")
+    page.page.mouse.click(*pixel_of(page, reader, "cup"))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    assert page.page.inner_text("#selection b") == "cup"
+    page.keep(artefacts / "selection.png")
+    assert names(reader) == before
+    page.page.keyboard.press("Delete")
+    page.wait_until(lambda: names(reader) == before - {"cup"}, "the cup to go")
+    assert not page.page.locator("#selection").is_visible()
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: names(reader) == before, "the cup to return")
+    # A click beside all objects, and a drag of the camera, select nothing.
+    page.page.mouse.click(*pixel_of(page, reader, "basin"))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    page.page.mouse.click(60, 200)
+    page.page.wait_for_selector("#selection", state="hidden")
+    assert page.errors == []
+
+
+def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> None:
+    start = np.array(truth.status()["goal"])
+    page.drag_arrow(MOVE, "y", 0.1)
+    truth.wait(10.0, moving=False)
+    moved = np.array(truth.status()["goal"])
+    assert np.abs(moved - start).max() > 0.05
+    page.page.click("#help-button")
+    page.wait_until(lambda: "arm (drag)" in page.page.inner_text("#undoable"), "the list")
+    page.page.click("#help button.main")
+    page.page.mouse.click(60, 200)
+    # The focus is in viser's document.
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: np.allclose(truth.status()["q"], start, atol=1e-6), "the way back")
+    page.drag_arrow(MOVE, "y", -0.1)
+    truth.wait(10.0, moving=False)
+    moved = np.array(truth.status()["q"])
+    page.page.keyboard.press("Space")
+    truth.wait(mood="stopped")
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: "stopped" in bar(page, "toast"), "the refusal")
+    page.page.wait_for_timeout(1100)
+    clear_stop(page, truth)
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: "nothing to undo" in bar(page, "toast"), "the refusal")
+    assert np.allclose(truth.status()["q"], moved, atol=1e-6)
+
+
+def test_undo_in_a_text_box_is_that_of_the_browser(page: ViserPage, truth: Truth) -> None:
+    start = np.array(truth.status()["goal"])
+    page.drag_arrow(MOVE, "y", 0.1)
+    truth.wait(10.0, moving=False)
+    box = page.number_box("Axis 1")
+    box.click()
+    box.press("Control+z")
+    page.page.wait_for_timeout(300)
+    assert not np.allclose(truth.status()["goal"], start, atol=1e-3)
+    box.press("Escape")
+    truth.wait(mood="stopped")
+    page.page.wait_for_timeout(1100)
+    clear_stop(page, truth)

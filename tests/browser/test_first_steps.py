@@ -1,0 +1,212 @@
+"""The first visit: a card with three things to try, dismissed for good, back by the help."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from tests.browser.conftest import OpenPage
+from tests.browser.page import FIRST_VISIT, ViserPage
+from tests.browser.server import AppServer
+from tests.browser.session import MOVE, Truth
+from tests.gateway.slow_link import SlowLink
+
+NIGHT = "rgb(20, 24, 29)"
+
+WATCHED = """
+    window.posters = [];
+    (function note() {
+        requestAnimationFrame(note);
+        const poster = window === top && document.getElementById("poster");
+        if (!poster) return;
+        const { opacity, visibility, backgroundColor } = getComputedStyle(poster);
+        const state = visibility === "hidden" ? "gone" : opacity < 1 ? "going" : "shown";
+        const now = `${state} ${poster.innerText.trim()} ${backgroundColor}`;
+        if (posters.at(-1) !== now) posters.push(now);
+    })();
+"""
+"""Script that records the states of the poster."""
+
+SETTINGS = """
+    window.settings = {seen: 0, shown: 0};
+    (function note() {
+        requestAnimationFrame(note);
+        const found = document.querySelector(".mantine-Stack-root:has(> .mantine-TextInput-root)");
+        if (!found || found.parentElement.parentElement.offsetHeight === 0) return;
+        settings.seen += 1;
+        if (getComputedStyle(found).visibility !== "hidden") settings.shown += 1;
+    })();
+"""
+"""Script that counts the frames with viser's settings for developers in an open panel."""
+
+SIZES = {"wide": (1440, 900), "portrait": (390, 844), "landscape": (844, 390)}
+
+NO_STORAGE = """Object.defineProperty(window, "localStorage", {get() {
+    throw new DOMException("No storage in this window.", "SecurityError");
+}});"""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def visit(server: AppServer, open_page: OpenPage) -> ViserPage:
+    page = open_page(server.url, nodes=("/arm", MOVE), script=FIRST_VISIT)
+    page.page.wait_for_selector("#welcome:not([hidden])")
+    return page
+
+
+def press(page: ViserPage, label: str) -> None:
+    page.page.locator("#welcome button", has_text=label).click()
+
+
+def done(page: ViserPage, label: str) -> bool:
+    step = page.page.locator("#welcome button", has_text=label)
+    return "done" in step.inner_text()
+
+
+def test_first_drag_is_asked_for_and_noticed(visit: ViserPage, artefacts: Path) -> None:
+    press(visit, "Drag the arrows")
+    ring = visit.page.locator("#pulse").bounding_box()
+    assert ring is not None
+    x, y = visit.project(visit.node_pose(MOVE)[:3, 3])
+    assert abs(ring["x"] + ring["width"] / 2 - x) < 3
+    assert abs(ring["y"] + ring["height"] / 2 - y) < 3
+    visit.keep(artefacts / "first-steps-drag.png")
+    assert not done(visit, "Drag the arrows")
+    visit.drag_arrow(MOVE, "y", 0.1)
+    visit.wait_until(lambda: done(visit, "Drag the arrows"), "the step to be done")
+    assert not visit.page.locator("#pulse").is_visible()
+    assert visit.errors == []
+
+
+def test_part_is_chosen_with_one_click(visit: ViserPage, tmp_path: Path) -> None:
+    ring = tmp_path / "ring.stl"
+    ring.write_bytes(trimesh.creation.torus(40.0, 12.0, 24, 12).export(file_type="stl"))
+    with visit.page.expect_file_chooser() as chooser:
+        press(visit, "Bring your own part")
+    chooser.value.set_files(ring)
+    visit.wait_until(lambda: "triangles" in visit.page.inner_text("#read"), "the answer")
+    visit.page.click("#objects-button")
+    visit.wait_until(lambda: done(visit, "Bring your own part"), "the step to be done")
+    assert visit.errors == []
+
+
+@pytest.mark.long
+def test_pouring_is_planned_with_progress_and_runs(
+    visit: ViserPage, server: AppServer, artefacts: Path
+) -> None:
+    truth = Truth(server)
+    press(visit, "Watch it pour")
+    says = visit.page.locator("#welcome [role=status]")
+    visit.wait_until(lambda: "%" in says.inner_text(), "progress")
+    visit.wait_until(lambda: "Step" in says.inner_text(), "the run", seconds=120.0)
+    visit.keep(artefacts / "first-steps-pour.png")
+    visit.wait_until(lambda: done(visit, "Watch it pour"), "the end", seconds=120.0)
+    assert truth.status()["water"]["basin_ml"] > 190.0
+
+
+def test_planning_is_shown_and_a_stop_ends_it(visit: ViserPage, server: AppServer) -> None:
+    press(visit, "Watch it pour")
+    says = visit.page.locator("#welcome [role=status]")
+    visit.wait_until(lambda: "Planning" in says.inner_text(), "the planning")
+    visit.page.keyboard.press("Space")
+    Truth(server).wait(mood="stopped")
+    visit.wait_until(lambda: "did not pour" in says.inner_text(), "the end")
+    assert not done(visit, "Watch it pour")
+    visit.page.wait_for_timeout(1100)
+    visit.press_in_bar("Clear stop")
+    Truth(server).wait(stopped=None)
+
+
+def test_card_is_dismissed_for_good_and_returns_by_the_help(visit: ViserPage) -> None:
+    window = visit.page
+    # The card has no focus of its own; its buttons can be reached and pressed by keys.
+    assert window.evaluate("() => document.activeElement === document.body")
+    window.get_by_role("button", name="Drag the arrows").focus()
+    window.keyboard.press("Enter")
+    assert window.locator("#pulse").is_visible()
+    window.get_by_role("button", name="Close for good").focus()
+    window.keyboard.press("Enter")
+    assert not window.locator("#welcome").is_visible()
+    assert not window.locator("#pulse").is_visible()
+    window.reload()
+    window.locator("#holder", has_text="drive").wait_for()
+    window.wait_for_timeout(500)
+    assert window.locator("#welcome").count() == 0
+    window.click("#help-button")
+    window.get_by_role("button", name="First steps").click()
+    window.wait_for_selector("#welcome:not([hidden])")
+
+
+def test_window_without_storage_shows_the_card(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, nodes=("/arm",), script=f"{FIRST_VISIT}{NO_STORAGE}")
+    page.page.wait_for_selector("#welcome:not([hidden])")
+    page.page.get_by_role("button", name="Close for good").click()
+    assert not page.page.locator("#welcome").is_visible()
+    assert page.errors == []
+
+
+def test_poster_covers_the_scene_until_it_is_drawn(server: AppServer, open_page: OpenPage) -> None:
+    with SlowLink(server.port, 2e6, delay=0.1) as line:
+        page = open_page(
+            f"http://127.0.0.1:{line.port}",
+            nodes=("/arm", MOVE),
+            script=WATCHED,
+            color_scheme="dark",
+        )
+        page.wait_until(lambda: "gone" in page.page.evaluate("posters.at(-1)"), "the scene")
+        states = page.page.evaluate("posters")
+        assert f"shown Loading the arm and its scene {NIGHT}" in states
+        assert all(each.endswith(NIGHT) for each in states)
+        # It goes once and does not return.
+        assert [each.startswith("gone") for each in states] == [False] * (len(states) - 1) + [True]
+
+
+def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
+    with AppServer() as server:
+        page = open_page(server.url, nodes=("/arm", MOVE), script=SETTINGS)
+        server.kill()
+        page.wait_lost()
+        server.restart()
+        page.wait_until(lambda: page.connected, "the connection", seconds=30.0)
+        page.wait_ready(("/arm", MOVE))
+        page.page.wait_for_timeout(800)
+        found = page.frame.evaluate("settings")
+        # The panel shows them for a moment by itself.
+        assert found["seen"] > 0
+        assert found["shown"] == 0
+
+
+@pytest.mark.parametrize("size", list(SIZES))
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_card_fits_every_size(
+    server: AppServer, open_page: OpenPage, size: str, scheme: str, artefacts: Path
+) -> None:
+    touch = {} if size == "wide" else {"has_touch": True, "is_mobile": True}
+    page = open_page(
+        server.url,
+        nodes=("/arm", MOVE),
+        window=SIZES[size],
+        own_camera=True,
+        script=FIRST_VISIT,
+        color_scheme=scheme,
+        **touch,
+    )
+    page.page.wait_for_selector("#welcome:not([hidden])")
+    page.page.wait_for_timeout(700)
+    page.keep(artefacts / f"first-steps-{size}-{scheme}.png")
+    card = page.page.locator("#welcome")
+    assert card.evaluate("(each) => each.scrollHeight <= each.clientHeight + 1")
+    assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+    if touch:
+        for button in card.locator("button").all():
+            box = button.bounding_box()
+            assert box is not None
+            assert min(box["width"], box["height"]) >= 43.5

@@ -1,0 +1,80 @@
+"""Undo over the API of a real server: goals, objects and settings, never past a stop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from katana450.client import Client, RefusedError, connect
+from katana450.server.api import answers, requests
+from tests.browser.server import AppServer
+
+
+def state(program: Client) -> answers.State:
+    return program.query(answers.State)
+
+
+def undo(program: Client) -> answers.State:
+    return program.go(requests.Undo())
+
+
+def names(program: Client) -> set[str]:
+    return {each.name for each in program.query(answers.Objects).objects}
+
+
+def test_goals_are_undone_in_order(program: Client) -> None:
+    start = program.go(requests.Home())
+    program.nudge(1, 0.2)
+    program.go(requests.StepTool(by=(0.0, 0.0, 0.03, 0.0, 0.0)))
+    after_nudge = undo(program)
+    np.testing.assert_allclose(after_nudge.q[0], start.q[0] + 0.2, atol=1e-6)
+    np.testing.assert_allclose(np.array(after_nudge.q)[1:], start.q[1:], atol=1e-6)
+    np.testing.assert_allclose(undo(program).q, start.q, atol=1e-6)
+
+
+def test_settings_are_undone(program: Client) -> None:
+    before = state(program)
+    program.ask(requests.Speed(value=0.5))
+    program.go(requests.Gripper(angle=before.gripper - 0.2))
+    program.ask(requests.Tool(name="flange"))
+    undo(program)
+    undo(program)
+    undo(program)
+    after = state(program)
+    assert (after.tool, after.speed) == (before.tool, before.speed)
+    assert after.gripper_goal == pytest.approx(before.gripper_goal)
+
+
+def test_removed_object_returns_and_new_one_goes(program: Client) -> None:
+    there = names(program)
+    program.ask(requests.Remove(name="basin"))
+    program.ask(requests.Place(name="block", shape=requests.Shape.BOX, size=[0.03, 0.03, 0.03]))
+    assert names(program) == there - {"basin"} | {"block"}
+    program.ask(requests.Undo())
+    program.ask(requests.Undo())
+    assert names(program) == there
+
+
+def test_nothing_is_undone_while_stopped_or_past_a_stop(program: Client) -> None:
+    moved = program.nudge(1, 0.2)
+    program.ask(requests.Stop())
+    with pytest.raises(RefusedError, match="stopped"):
+        program.ask(requests.Undo())
+    program.clear_stop()
+    with pytest.raises(RefusedError, match="nothing to undo"):
+        program.ask(requests.Undo())
+    np.testing.assert_allclose(state(program).q, moved.q, atol=1e-6)
+
+
+def test_nothing_is_undone_past_a_change_of_driver(server: AppServer, program: Client) -> None:
+    moved = program.nudge(1, 0.2)
+    program.ask(requests.ReleaseLease())
+    with connect(server.url, "Other") as other:
+        with pytest.raises(RefusedError, match="nothing to undo"):
+            other.ask(requests.Undo())
+        other.ask(requests.Acquire())
+        other.ask(requests.ReleaseLease())
+    program.ask(requests.Acquire())
+    with pytest.raises(RefusedError, match="nothing to undo"):
+        program.ask(requests.Undo())
+    np.testing.assert_allclose(state(program).q, moved.q, atol=1e-6)
