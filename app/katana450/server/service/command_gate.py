@@ -20,6 +20,7 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.last_pause import LastPause
 from katana450.server.service.participants import is_same_person
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import ClearBy, StopRecord
@@ -57,6 +58,7 @@ class CommandGate:
         """The arm; None until it is ready."""
         self.program: RunningProgram | None = None
         """The running program; None without one."""
+        self.pause: LastPause | None = None
         self.revocations = 0
         """Number of stops and of losses of the lease."""
         self.on_stop: Callable[[], None] = lambda: None
@@ -90,6 +92,7 @@ class CommandGate:
                     # What follows from the command later is void after a revocation.
                     granted = replace(granted, seen=self.revocations)
                     ticket = self.present().deliver(command, granted)
+                    self.pause = LastPause.after(self.pause, command, actor, self.present().state)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise
