@@ -43,6 +43,9 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
     if state is not None:
         head = paused_headline(hub, reader) if rests_paused(state) else headline(state)
         now = StatusLine(mood(state), head, sentence(state))
+        plans = hub.arm is not None and hub.arm.busy and not state.moving and not state.paused
+        if plans:
+            now = StatusLine("planning", "Planning a path", "The arm then follows it.")
         if state.status not in FIRST:
             now = hub.runner.status_line(state, now)
     if stopped is not None:
