@@ -39,6 +39,7 @@ from katana450.server.api.lease_requests import (
     Decline,
     Give,
     ReleaseLease,
+    Rename,
     Take,
     Withdraw,
 )
@@ -109,6 +110,7 @@ __all__ = [
     "Query",
     "ReleaseLease",
     "Remove",
+    "Rename",
     "Request",
     "RequestDecoder",
     "Resume",
@@ -336,6 +338,7 @@ AnyRequest = (
     | Get
     | Watch
     | Query
+    | Rename
     | ListPeople
     | Kick
     | Mute
