@@ -130,7 +130,7 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  window.katana = { key, blur, toast };
+  window.katana = { key, blur, toast, view: null };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
   window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page}`));
@@ -221,6 +221,7 @@
       byId("orders").replaceChildren(...status.orders.map(made));
     }
     Pace.draw(up ? status : null);
+    More.draw(status.name);
     const simulated = status.silence_profile === "simulation";
     text("on-silence", simulated ? SIMULATION : "stops after a quarter of a second");
   }
@@ -281,6 +282,7 @@
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
+    else if (data.heard && More.hear(data.heard));
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
@@ -317,7 +319,9 @@
       show(other, false);
       show(id, byId(id).hidden);
     });
+  const kept = storage();
   Pace.begin({ say, toast });
+  More.begin({ say, toast, kept, view: () => window.katana.view });
   Jog.begin({ say, stop });
   Objects.begin({ say });
   // Who is connected, for admins; loaded on first use.
@@ -329,7 +333,6 @@
 
   // The instruments, which are loaded on first use
 
-  const kept = storage();
   let panel = null;
 
   // A browser may refuse to store anything.

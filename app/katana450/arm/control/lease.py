@@ -89,7 +89,7 @@ class Lease:
         return self.holder if self.left == math.inf else None
 
     def renamed(self, person: Person) -> Self:
-        """Return the lease with the new name of ``person``, if it holds or has requested the arm."""
+        """Return the lease with the new name of ``person``, where it holds or requests it."""
         waiting = tuple(person if each == person else each for each in self.waiting)
         holder = person if self.holder == person else self.holder
         return replace(self, holder=holder, waiting=waiting)
