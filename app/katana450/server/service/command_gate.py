@@ -58,7 +58,7 @@ class CommandGate:
         """The arm; None until it is ready."""
         self.program: RunningProgram | None = None
         """The running program; None without one."""
-        self.pause: LastPause | None = None
+        self.last_pause: LastPause | None = None
         self.revocations = 0
         """Number of stops and of losses of the lease."""
         self.on_stop: Callable[[], None] = lambda: None
@@ -91,8 +91,8 @@ class CommandGate:
                     granted = self._checked(command, actor)
                     # What follows from the command later is void after a revocation.
                     granted = replace(granted, seen=self.revocations)
-                    ticket = self.present().deliver(command, granted)
-                    self.pause = LastPause.after(self.pause, command, actor, self.present().state)
+                    ticket = (arm := self.present()).deliver(command, granted)
+                    self.last_pause = LastPause.after(self.last_pause, command, actor, arm.state)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise

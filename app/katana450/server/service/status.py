@@ -66,7 +66,7 @@ def rests_paused(state: State) -> bool:
 
 def paused_headline(hub: Hub, reader: Person | None) -> str:
     """Return the headline of a paused arm, in which ``reader`` is "you"."""
-    pause, program = hub.gate.pause, hub.gate.program
+    pause, program = hub.gate.last_pause, hub.gate.program
     if pause is None:
         return "Paused"
     if program is not None and pause.key == program.person.key:
@@ -90,7 +90,7 @@ def common(hub: Hub) -> dict[str, Any]:
     """Return the part of the status that is the same for all pages."""
     state = hub.arm.state if hub.arm is not None else None
     stopped, holder, age = hub.stopped, hub.lease.driver, silence(hub)
-    now, pause = state_line(hub), hub.gate.pause
+    now, pause = state_line(hub), hub.gate.last_pause
     timed = pause is not None and now.headline.startswith(f"Paused by {pause.name}")
     return {
         **now._asdict(),
@@ -119,7 +119,7 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     planning = program is not None and program.status == "planning"
     taker = hub.taken_by(window)
     age = hub.age(window)
-    own_pause = hub.gate.pause is not None and hub.gate.pause.key == person.key
+    own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
     clears = hub.gate.may_clear_stop(person)
     until = "Clear stop is pressed" if clears else f"{hub.gate.clears} clears the stop"
     return {

@@ -179,7 +179,7 @@ class ProgramRunner(Runner):
                 return self._send(*commands)
             case ProgramOrder.PAUSE:
                 ticket = self._send(cmd.Pause())
-                self.hub.gate.pause = LastPause.by(window.actor)
+                self.hub.gate.last_pause = LastPause.by(window.actor)
                 return ticket
             case ProgramOrder.END:
                 return self._end(f"{window.person.name} ended it.")
