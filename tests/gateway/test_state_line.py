@@ -10,6 +10,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.state_line import duration
 from katana450.server.service import status
@@ -47,6 +48,13 @@ def test_pause_names_the_person_and_the_time_until_resume(table: Staged) -> None
     shown = bar(table, driver), bar(table, other)
     assert [each["headline"] for each in shown] == ["On target", "On target"]
     assert shown[0]["paused_at"] is None
+
+
+def test_server_pauses_after_a_person_has_paused(table: Staged) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.move(driver, cmd.Pause())
+    table.hub.gate.pause(Finding(Reason.DRIVER_SILENT, 0.3))
+    assert table.arm.holds == 1
 
 
 def test_pause_of_an_unknown_person_has_no_name(table: Staged) -> None:
