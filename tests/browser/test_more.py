@@ -31,7 +31,7 @@ def test_person_chooses_a_name_and_saves_picture_and_link(
     for text, words in (("", "empty"), ("x" * 30, "30 characters"), (taken, "is taken")):
         name.fill(text)
         name.press("Enter")
-        page.wait_until(lambda words=words: words in why.inner_text(), words)
+        why.filter(has_text=words).wait_for()
     page.keep(artefacts / "more.png")
     name.fill("Anna")
     name.press("Enter")
