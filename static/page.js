@@ -13,15 +13,10 @@
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
-  const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
-  /** @type {HTMLInputElement} */
-  const speedInput = document.querySelector("#speed input");
-  /** @type {HTMLOutputElement} */
-  const speedOutput = document.querySelector("#speed output");
   const page = name();
   const worker = new Worker("static/link.js");
   const say = (message) => worker.postMessage({ say: message });
@@ -137,13 +132,14 @@
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
   const drawn = () => byId("poster").classList.add("done");
-  window.katana = { key, blur, toast, drawn };
+  window.katana = { key, blur, toast, drawn, view: null };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
   window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page}`));
 
   // Display
 
+  const time = (seconds, style) => new Date(1000 * seconds).toLocaleTimeString([], style);
   const text = (id, words) => {
     const element = byId(id);
     if (element.textContent !== words) element.textContent = words;
@@ -194,8 +190,10 @@
     stopButton.classList.toggle("asked", !proven && (asking !== null || status?.stop === "requested"));
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : status.mood;
-    text("headline", proven ? "Stopped" : status.headline);
-    const at = status.stopped_at ? `${new Date(1000 * status.stopped_at).toLocaleTimeString()}:` : "";
+    body.style.setProperty("--done", status.fraction);
+    const since = status.paused_at ? `, ${time(status.paused_at, { timeStyle: "short" })}` : "";
+    text("headline", proven ? "Stopped" : status.headline + since);
+    const at = status.stopped_at ? `${time(status.stopped_at)}:` : "";
     const cause = status.stopped ? [at, status.stopped] : [proven];
     text("why", [status.taken, status.why, ...cause, status.until].filter(Boolean).join(" "));
     byId("objects-button").hidden = status.role === "viewer";
@@ -212,6 +210,7 @@
     const connected = windows > 1 ? `, ${windows} connected` : "";
     byId("people-help").hidden = status.role !== "admin";
     text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
+    byId("acts").classList.toggle("asked", requests.length > 0);
     const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
     if (key !== drawnActs) {
       drawnActs = key;
@@ -220,13 +219,11 @@
     const orders = [status.planning, ...status.orders].join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
-      const label = (order) => (order === "end" && status.planning ? "Cancel" : ORDERS[order]);
-      const made = (order) => act(label(order), { do: "steer", order }, order !== "end");
+      const made = (order) => act(status.planning ? "Cancel" : "End", { do: "steer", order });
       byId("orders").replaceChildren(...status.orders.map(made));
     }
-    const percent = String(Math.round(100 * status.speed));
-    if (document.activeElement !== speedInput) speedInput.value = percent;
-    speedOutput.value = `${percent} %`;
+    Pace.draw(up ? status : null);
+    More.draw(status.name);
     const simulated = status.silence_profile === "simulation";
     text("on-silence", simulated ? SIMULATION : "stops after a quarter of a second");
   }
@@ -236,6 +233,7 @@
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : "starting";
     byId("go").hidden = true;
+    Pace.draw(null);
     text("headline", proven ? "Stopped" : "No connection");
     text("why", proven ?? "");
   }
@@ -286,6 +284,7 @@
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
+    else if (data.heard && More.hear(data.heard));
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
@@ -323,10 +322,9 @@
       show(other, false);
       show(id, byId(id).hidden);
     });
-  speedInput.addEventListener("input", () => {
-    speedOutput.value = `${speedInput.value} %`;
-    say({ do: "speed", value: Number(speedInput.value) / 100 });
-  });
+  const kept = storage();
+  Pace.begin({ say, toast });
+  More.begin({ say, toast, kept, view: () => window.katana.view });
   Jog.begin({ say, stop });
   Objects.begin({ say });
   Edit.begin({ say, toast });
@@ -339,7 +337,6 @@
 
   // The instruments, which are loaded on first use
 
-  const kept = storage();
   let panel = null;
 
   // A browser may refuse to store anything.

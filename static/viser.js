@@ -140,9 +140,15 @@ const Viser = (() => {
     }
   }
 
+  // Return a PNG of what the page in `frame` draws; null before its first picture.
+  function picture(frame) {
+    const canvas = frame.contentWindow?.__viserMutable?.canvas;
+    return canvas ? new Promise((done) => canvas.toBlob(done, "image/png")) : null;
+  }
+
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, STEADY,
-    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, controlOf, fill, type,
+    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, controlOf, fill, type, picture,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,
     // Return the three.js object of a node; "" is viser's world.

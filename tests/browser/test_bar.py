@@ -76,12 +76,12 @@ def test_stop_is_always_visible_and_the_largest_button(
 def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None:
     page.page.focus("#stop")
     order = ["stop"]
-    for _ in range(6):
+    for _ in range(9):
         page.page.keyboard.press("Tab")
         order.append(page.page.evaluate("() => document.activeElement.id"))
     # The buttons of the lease, which have no id, lie in between.
-    buttons = ["instruments-button", "objects-button", "jog-button", "help-button"]
-    assert [each for each in order if each] == ["stop", *buttons, "scene"]
+    buttons = ["instruments-button", "objects-button", "jog-button", "help-button", "more-button"]
+    assert [each for each in order if each] == ["stop", "pause", *buttons, "scene"]
     page.page.click("#help-button")
     assert page.page.get_by_role("dialog", name="Help and keys").is_visible()
     assert page.page.locator("#headline").is_visible()

@@ -15,7 +15,6 @@ from katana450.server.api import answers
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import set_speed
 
 pytestmark = pytest.mark.long
 
@@ -72,7 +71,7 @@ def wait(arm: Client, condition: Callable[[answers.State], bool]) -> answers.Sta
 def test_a_cancelled_preview_leaves_the_planner_free(page: ViserPage, artefacts: Path) -> None:
     page.choose("Script", "Pour")
     page.click_button("Preview")
-    until(page, r"Planning Pour \d+%")
+    until(page, r"Planning Pour \d+ %")
     assert orders(page) == ["Cancel"]
     assert "does not start by itself" in page.page.inner_text("#why")
     page.keep(artefacts / "planning.png")
@@ -112,31 +111,33 @@ def test_pause_during_planning_lasts_until_resume(
 ) -> None:
     page.choose("Script", "Square")
     page.click_button("Run")
-    until(page, r"Planning Square \d+%")
-    assert orders(page) == ["Pause", "Cancel"]
+    until(page, r"Planning Square \d+ %")
+    assert orders(page) == ["Cancel"]
     height = page.page.locator("header").bounding_box()
-    press(page, "Pause")
-    until(page, "Planning Square, paused")
-    assert orders(page) == ["Resume", "Cancel"]
+    pause = page.page.locator("#pause")
+    page.press_in_bar("Pause")
+    page.wait_until(lambda: pause.inner_text() == "Resume", "the pause")
+    assert "Paused by you. " in page.page.inner_text("#why")
     assert page.page.locator("header").bounding_box() == height
     page.keep(artefacts / "planning-paused.png")
-    until(page, "Square, paused")
+    until(page, r"Paused by you, \S+( [AP]M)?")
+    assert "Square: " in page.page.inner_text("#why")
     before = arm.query(answers.State)
     page.page.wait_for_timeout(1500)
     after = arm.query(answers.State)
     assert after.q == before.q
-    assert headline(page) == "Square, paused"
-    press(page, "Resume")
-    until(page, r"Square, step \d+ of \d+", 5.0)
+    page.press_in_bar("Resume")
+    until(page, r"Square: .*, step \d+ of \d+.*", 5.0)
     wait(arm, lambda state: state.moving)
     page.keep(artefacts / "planning-running.png")
-    # The owner can use every control that changes the pace.
-    press(page, "Pause")
-    until(page, "Square, paused", 5.0)
-    press(page, "Resume")
-    until(page, r"Square, step .*", 5.0)
-    set_speed(page, 30.0)
-    wait(arm, lambda state: 0.2 < state.speed < 0.4)
+    # The same controls change the pace of the program.
+    page.press_in_bar("Pause")
+    until(page, r"Paused by you, .*", 5.0)
+    page.press_in_bar("Resume")
+    until(page, r"Square: .*", 5.0)
+    page.page.get_by_role("slider", name="Speed in percent").fill("30")
+    wait(arm, lambda state: state.speed == 0.3)
+    assert page.page.inner_text("#speed output") == "30 %"
     assert not page.page.locator("#toast.shown").is_visible()
     page.press_in_bar("STOP")
     wait(arm, lambda state: state.stopped is not None and not state.moving)

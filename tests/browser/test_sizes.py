@@ -28,7 +28,7 @@ WIDE, WIDER, PORTRAIT, LANDSCAPE = (1440, 900), (1920, 1080), (390, 844), (844, 
 SIZES = (WIDE, WIDER, PORTRAIT, LANDSCAPE)
 PHONE = {"has_touch": True, "is_mobile": True}
 
-MOODS = {*(status.value for status in Status), "moving", "stopped"}
+MOODS = {*(status.value for status in Status), "moving", "program", "planning", "lost"}
 """All moods of an arm whose state is known."""
 
 LEAST_FINGER = 40.0

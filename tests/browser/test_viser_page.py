@@ -107,6 +107,9 @@ def test_page_offers_its_scene(page: ViserPage) -> None:
         for name in names:
             assert ask(page, f"typeof Viser.viewer().cameraControl.{name}") == "function"
         assert ask(page, "Viser.viewer().camera.fov") == pytest.approx(np.degrees(CAMERA.fov))
+    with part("picture"):
+        kind = "Viser.picture({ contentWindow: window }).then(({ type }) => type)"
+        assert ask(page, kind) == "image/png"
     with part("node"):
         assert ask(page, "Viser.node('/box').isObject3D && Viser.node('').isObject3D")
         assert ask(page, "Viser.node('/none') === undefined")

@@ -71,7 +71,7 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
                     assert control.status["stop"] == "requested"
                     assert isinstance(arm.ask(requests.Stop()), answers.Done)
                     assert ask(f"{server.url}/health")[0] == 503
-                shown = await control.wait(stop="confirmed")
+                shown = await control.wait(stop="confirmed", headline="Stopped")
                 assert (shown["mood"], shown["headline"]) == ("stopped", "Stopped")
                 await asyncio.sleep(1.0)
                 state = arm.query(answers.State)

@@ -227,7 +227,7 @@ def test_page_paces_its_program_and_a_stranger_does_not(server: AppServer, arm: 
             assert control.status["headline"].startswith("Planning")
             await control.say("pause")
             await until(program="paused")
-            await control.wait(headline="Square, paused", orders=["resume", "end"])
+            await control.wait(headline="Paused by you", orders=["end"])
             await control.say("resume")
             await until(program="running")
             await control.say("speed", value=0.2)

@@ -89,11 +89,15 @@ def test_pause_during_planning_starts_the_program_paused(table: Staged, slow: Sl
     assert isinstance(table.arm.commands[-1], cmd.Pause)
     table.arm.rest = replace(table.arm.rest, paused=True)
     shown = bar(table, window)
-    assert shown["headline"] == "Planning Wave, paused"
-    assert shown["orders"] == ["resume", "end"]
+    assert shown["headline"] == "Planning Wave 20 %"
+    assert shown["why"].startswith("Paused by you. Step 1 of 2: timing paths.")
+    assert shown["why"].endswith("Then it waits for Resume.")
+    assert (shown["paused"], shown["pace"], shown["orders"]) == (True, "", ["end"])
     finish(table, window, slow)
     assert table.status == "paused"
-    assert bar(table, window)["headline"] == "Wave, paused"
+    shown = bar(table, window)
+    assert (shown["mood"], shown["headline"]) == ("paused", "Paused by you")
+    assert shown["why"].startswith("Wave: speed, step 1 of 2")
     assert not any(isinstance(command, cmd.Resume) for command in table.arm.commands)
     table.wait(60.0, window)
     assert not followed(table)
@@ -243,14 +247,14 @@ def test_bar_shows_the_progress_of_planning(table: Staged, slow: Slow) -> None:
     ask(table, window, None)
     due = time.monotonic() + 10.0
     # The planning thread may not have started yet.
-    while (shown := bar(table, window))["headline"] == "Planning the script 0%":
+    while (shown := bar(table, window))["headline"] == "Planning the script 0 %":
         assert time.monotonic() < due
         time.sleep(0.005)
-    assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20%")
-    assert shown["why"] == "Step 1 of 2: timing paths, 20%. It does not start by itself."
+    assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20 %")
+    assert shown["why"] == "Step 1 of 2: timing paths. It does not start by itself."
     table.arm.moves = True
     shown = bar(table, window)
-    assert (shown["mood"], shown["headline"]) == ("moving", "Moving")
+    assert (shown["mood"], shown["headline"]) == ("moving", "Moving to the target")
     assert shown["why"].startswith("Planning Wave. Step 1 of 2")
     table.arm.moves = False
     table.stop("Anybody")
@@ -273,8 +277,9 @@ def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
         hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         hub.move(other, cmd.SpeedScale(1.0))
-    assert bar(table, owner)["orders"] == ["pause", "end"]
+    assert (bar(table, owner)["orders"], bar(table, owner)["pace"]) == (["end"], "")
     assert bar(table, other)["orders"] == []
+    assert bar(table, other)["pace"] == "Wave drives: ask for the arm."
     # The page of the owner is reloaded.
     hub.leave(owner)
     again = table.join(PAGES[0])

@@ -100,7 +100,8 @@ def test_window_of_the_absent_owner_or_an_admin_ends_it(table: Staged) -> None:
     table.hub.leave(owner)
     with pytest.raises(LeaseError, match="belongs to"):
         table.programs.steer(stranger, ProgramOrder.END)
-    assert table.programs.orders(other) == ("pause", "end")
+    assert table.programs.orders(other) == ("end",)
+    assert status.of(table.hub, other)["pace"] == ""
     table.programs.steer(other, ProgramOrder.END)
     assert table.status == "stopped"
     assert table.arm.holds

@@ -3,7 +3,7 @@ import globals from "globals";
 
 // Defined at the top of one script of a document and used by the others.
 const shared = {
-  Edit: "readonly", Fields: "readonly", Fit: "readonly", Jog: "readonly", Objects: "readonly", Theme: "readonly", Viser: "readonly",
+  Edit: "readonly", Fields: "readonly", Fit: "readonly", Jog: "readonly", More: "readonly", Objects: "readonly", Pace: "readonly", Theme: "readonly", Viser: "readonly",
 };
 
 export default [

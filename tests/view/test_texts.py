@@ -103,6 +103,13 @@ def test_gap_is_reported_with_the_axis_and_the_leap(state: State) -> None:
     assert headline(held) == STATUS[Status.GAP]
 
 
+def test_reasons_about_the_goal_say_so_while_the_arm_moves(state: State) -> None:
+    limited = with_findings(state, Finding(Reason.AXIS_LIMIT, math.radians(7.75), 1))
+    moving = replace(limited, goal=state.goal + 0.1)
+    assert headline(moving) == "Moving as near as it can"
+    assert sentence(moving) == "At the goal: axis 2 at its limit of 7.75°."
+
+
 def test_contact_is_reported_with_both_parts_and_the_distance(state: State) -> None:
     parts = ("finger_left_link", "upper_arm_link")
     blocked = with_findings(state, Finding(Reason.CONTACT, 0.0083, parts=parts))

@@ -52,14 +52,14 @@ class Person:
 
     Attributes:
         key: identity, unique for each page; not shown to people.
-        name: display name.
+        name: display name, which may change; it takes no part in comparisons.
         role: the rights.
         link: number of the access link, for the event log; empty without one.
         address: network address, for the event log; empty if it is unknown.
     """
 
     key: str
-    name: str
+    name: str = field(compare=False)
     role: Role
     link: str = field(default="", compare=False)
     address: str = field(default="", compare=False)
@@ -87,6 +87,12 @@ class Lease:
     def driver(self) -> Person | None:
         """The holder; None while the arm is free or the holder has closed its window."""
         return self.holder if self.left == math.inf else None
+
+    def renamed(self, person: Person) -> Self:
+        """Return the lease with the new name of ``person``, where it holds or requests it."""
+        waiting = tuple(person if each == person else each for each in self.waiting)
+        holder = person if self.holder == person else self.holder
+        return replace(self, holder=holder, waiting=waiting)
 
     def acquire(self, person: Person, t: float) -> Self:
         """Return the lease with ``person`` as its holder, if the arm is free."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from katana450.arm.control.branch_options import BranchOption
-from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.arm.control.state import CAUSES, Finding, Reason, State, Status
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.priority import Priority
@@ -145,7 +145,27 @@ BRANCH_HEADINGS = ("branch", "off by", "path", "singular")
 
 NOTHING_LOST = "nothing"
 
-MOVING = "Moving"
+MOVING = "Moving to the target"
+
+UNDER_WAY: dict[Status, str] = {
+    Status.OK: MOVING,
+    Status.LIMITED: "Moving as near as it can",
+    Status.GAP: "Moving to the edge",
+    Status.PAUSED: "Pausing…",
+    Status.STOPPED: "Stopping…",
+}
+"""Headlines of an arm that still moves, where they differ from ``STATUS``."""
+
+ABOUT_NOW = (
+    *CAUSES,
+    Reason.STOPPED,
+    Reason.PAUSED,
+    Reason.WAITING,
+    Reason.CONTACT,
+    Reason.LOPSIDED,
+    Reason.INTERNAL,
+)
+"""Reasons whose numbers are present ones. Those of all others belong to the goal."""
 
 
 def mood(state: State) -> str:
@@ -162,16 +182,23 @@ def title(robot: str) -> str:
 
 def headline(state: State) -> str:
     """Return the state of the arm in two to four words."""
-    if state.moving and state.status is Status.OK:
-        return MOVING
+    if state.moving:
+        return UNDER_WAY.get(state.status, STATUS[state.status])
     return STATUS[state.status]
 
 
 def sentence(state: State) -> str:
-    """Return one sentence on why the arm does not reach its target; empty if it does."""
+    """Return one sentence on why the arm does not reach its target; empty if it does.
+
+    While the arm moves, reasons that concern its goal begin with "At the goal".
+    """
     if not state.findings:
         return ""
-    return _capital("; ".join(_reason(state, each) for each in state.findings)) + "."
+    now = [_reason(state, each) for each in state.findings if each.reason in ABOUT_NOW]
+    goal = [_reason(state, each) for each in state.findings if each.reason not in ABOUT_NOW]
+    if goal and state.moving:
+        goal[0] = f"at the goal: {goal[0]}"
+    return _capital("; ".join((*now, *goal))) + "."
 
 
 def _reason(state: State, finding: Finding) -> str:

@@ -168,7 +168,11 @@ class SetSpeed:
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:
         """Return the command that sets the speed, at least MIN_SPEED."""
-        return (cmd.SpeedScale(max(self.value * speed, cmd.MIN_SPEED)),)
+        return (cmd.SpeedScale(self.scale(speed)),)
+
+    def scale(self, speed: float) -> float:
+        """Return the fraction of full speed for a program with the fraction ``speed``."""
+        return max(self.value * speed, cmd.MIN_SPEED)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return True: the speed applies at once."""

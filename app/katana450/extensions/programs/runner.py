@@ -8,7 +8,7 @@ from enum import Enum
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import ACTION_TIMEOUT
+from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan, SetSpeed, Wait
 from katana450.extensions.programs.program import Program
 
 
@@ -108,6 +108,27 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     if run.single and program.tasks[after.number].number != task.number:
         return replace(after, single=False), (cmd.Pause(),)
     return after, ()
+
+
+def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:
+    """Return the approximate time until ``run`` ends [s], without pauses and finger motions.
+
+    ``allowed`` is the maximum fraction of full speed for the tasks to come.
+    """
+    if run.phase is not Phase.RUNNING:
+        return 0.0
+    left, speed = 0.0, state.speed
+    for number, task in enumerate(program.tasks[run.number :], run.number):
+        order = task.order
+        begun = run.started and number == run.number
+        rest = 1.0 - order.fraction(state, run.waited) if begun else 1.0
+        if isinstance(order, SetSpeed):
+            speed = min(order.scale(program.speed), allowed)
+        elif isinstance(order, FollowPlan):
+            left += rest * order.plan.duration / speed
+        elif isinstance(order, Wait):
+            left += rest * order.seconds
+    return left
 
 
 def _met(state: State) -> str:

@@ -1,8 +1,10 @@
-"""Requests about the lease, the right to drive the arm."""
+"""Requests about the lease, the right to drive the arm, and the names of its users."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
 
 from katana450.server.api.fields import LEASE, Request, RequestTraits
 
@@ -66,3 +68,15 @@ class Decline(Request, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = LEASE
 
     to: int
+
+
+class Rename(Request, frozen=True, kw_only=True):
+    """Choose the name that others see. Refused if it is empty, too long or taken.
+
+    Attributes:
+        name: Name, of at most 24 characters. That of an access link cannot be changed.
+    """
+
+    traits: ClassVar[RequestTraits] = RequestTraits()
+
+    name: Annotated[str, Meta(max_length=200)]

@@ -19,6 +19,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         task: Present task in words.
         fraction: Fraction of the task that is done, or of all planning.
         seconds: Duration of all motions at full speed [s].
+        seconds_left: Approximate time until the run ends, at the present speed [s]; 0 if none runs.
         why: What is wrong with the program, or why it was planned again or not run.
         unattended: Whether it runs without heartbeats of its owner.
         began: Time at which the run began, in UTC, in ISO 8601; null before that.
@@ -33,6 +34,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     task: str = ""
     fraction: float = 0.0
     seconds: float = 0.0
+    seconds_left: float = 0.0
     why: str = ""
     unattended: bool = False
     began: str | None = None

@@ -39,6 +39,7 @@ from katana450.server.api.lease_requests import (
     Decline,
     Give,
     ReleaseLease,
+    Rename,
     Take,
     Withdraw,
 )
@@ -111,6 +112,7 @@ __all__ = [
     "Query",
     "ReleaseLease",
     "Remove",
+    "Rename",
     "Request",
     "RequestDecoder",
     "Resume",
@@ -342,6 +344,7 @@ AnyRequest = (
     | Get
     | Watch
     | Query
+    | Rename
     | ListPeople
     | Kick
     | Mute

@@ -20,6 +20,7 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.last_pause import LastPause
 from katana450.server.service.participants import is_same_person
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import ClearBy, StopRecord
@@ -58,6 +59,7 @@ class CommandGate:
         """The arm; None until it is ready."""
         self.program: RunningProgram | None = None
         """The running program; None without one."""
+        self.last_pause: LastPause | None = None
         self.revocations = 0
         """Number of stops and of losses of the lease."""
         self.on_stop: Callable[[], None] = lambda: None
@@ -91,8 +93,9 @@ class CommandGate:
                     granted = self._checked(command, actor)
                     # What follows from the command later is void after a revocation.
                     granted = replace(granted, seen=self.revocations)
-                    with self.undo.noted(self.present(), command, granted):
-                        ticket = self.present().deliver(command, granted)
+                    with self.undo.noted(arm := self.present(), command, granted):
+                        ticket = arm.deliver(command, granted)
+                    self.last_pause = LastPause.after(self.last_pause, command, actor, arm.state)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise
@@ -300,8 +303,7 @@ class CommandGate:
         """Stop the arm; return the ticket, which is 0 for a repeated press."""
         cause = pressed(actor.name, actor.key, stop.cause.press, time.time())
         # A press that came by another path is in the state, even if its stop was cleared since.
-        known = () if self.arm is None else self.arm.state.presses
-        if cause.press in known or not self._presses.counts(stop):
+        if self.is_known(cause.press) or not self._presses.counts(stop):
             return 0
         return self._stop(cause, actor)
 

@@ -173,6 +173,8 @@ class Dispatcher:
                 hub.hand_over(window, number)
             case requests.Decline(to=number):
                 hub.decline(window, number)
+            case requests.Rename(name=name):
+                hub.rename(window, name)
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of ``request``; None for a request about the lease."""

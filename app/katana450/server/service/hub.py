@@ -27,6 +27,7 @@ from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
 from katana450.server.service.mutes import MutedError
+from katana450.server.service.names import free_name, renamed
 from katana450.server.service.participants import Takeover, Window, key_of, presser_of, session_of
 from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
@@ -138,6 +139,13 @@ class Hub:
         self._note_presence("join", window)
         self.heartbeat(window)
         return window
+
+    def rename(self, window: Window, name: str) -> None:
+        """Give ``window`` the display name ``name``. Raises InputError; see ``names.renamed``."""
+        key, (_, number) = window.person.key, self._remembered[window.person.key]
+        person = renamed(window.person, name, (each.person for each in self.windows))
+        window.person, self._remembered[key] = person, (person, number)
+        self.gate.change(lambda lease, _: lease.renamed(person), window.actor)
 
     def leave(self, window: Window, *, for_good: bool = False) -> None:
         """Remove ``window``, whose control socket is closed.
@@ -398,7 +406,5 @@ class Hub:
     def _new_person(self, key: str, identity: Identity) -> tuple[Person, int]:
         self._numbers += 1
         number = self._numbers
-        name = identity.name or f"Window {number}"
-        if any(person.name == name for person in self._known_people):
-            name = f"{name} ({number})"
+        name = free_name(identity.name, number, self._known_people)
         return identity.person(key, name), number

@@ -16,12 +16,12 @@ SHARED_SESSION = "programs"
 """Session of all programs that send single requests over HTTP, on a server without links."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Window:
     """The record of one connected page or program.
 
     Attributes:
-        person: Person and role.
+        person: Person and role; a person may choose another name.
         number: Number, counted up from 1.
         notify: Function that queues a notice to the client.
         heartbeat: Newest heartbeat.

@@ -86,7 +86,10 @@ class Runner:
         return line
 
     def orders(self, window: Window) -> tuple[str, ...]:  # noqa: ARG002
-        """Return the orders that the bar of the page offers to ``window``."""
+        """Return the orders that the bar of the page offers to ``window``.
+
+        Pause and Resume are not among them: the bar always has them.
+        """
         return ()
 
 

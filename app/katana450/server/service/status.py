@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from katana450.arm.control.lease import Person
 from katana450.arm.control.messages import headline, mood, sentence
-from katana450.arm.control.state import Status
+from katana450.arm.control.state import State, Status
 from katana450.arm.runtime.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Window
@@ -34,24 +35,66 @@ def health(hub: Hub) -> str | None:
     return hub.supervisor_problem() or hub.stop_path.problem or None
 
 
-def common(hub: Hub) -> dict[str, Any]:
-    """Return the part of the status that is the same for all pages."""
+def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
+    """Return the state line, in which ``reader`` is "you"."""
     state = hub.arm.state if hub.arm is not None else None
-    stopped, holder, age = hub.stopped, hub.lease.driver, silence(hub)
+    stopped, age = hub.stopped, silence(hub)
     now = StatusLine("starting", "Starting", "")
     if state is not None:
-        now = StatusLine(mood(state), headline(state), sentence(state))
+        head = paused_headline(hub, reader) if rests_paused(state) else headline(state)
+        now = StatusLine(mood(state), head, sentence(state))
+        plans = hub.arm is not None and hub.arm.busy and not state.moving and not state.paused
+        if plans:
+            now = StatusLine("planning", "Planning a path", "The arm then follows it.")
         if state.status not in FIRST:
             now = hub.runner.status_line(state, now)
     if stopped is not None:
-        now = StatusLine("stopped", "Stopped", "")
+        rests = stopped.confirmed and not (state is not None and state.moving)
+        now = StatusLine("stopped", "Stopped" if rests else "Stopping…", "")
     if age is not None:
         now = StatusLine("lost", "No answer from the arm", f"The state shown is {age:.1f} s old.")
     if stopped is not None and not stopped.confirmed:
         why = f"The arm has not confirmed the stop. {now.why}".rstrip()
-        now = StatusLine("stopped", "Stop requested", why)
+        now = StatusLine("stopped", "Stopping…" if age is None else "Stop requested", why)
+    return now
+
+
+def rests_paused(state: State) -> bool:
+    """Return whether a person or a program has paused the arm, and it rests."""
+    return state.paused and not state.moving
+
+
+def paused_headline(hub: Hub, reader: Person | None) -> str:
+    """Return the headline of a paused arm, in which ``reader`` is "you"."""
+    pause, program = hub.gate.last_pause, hub.gate.program
+    if pause is None:
+        return "Paused"
+    if program is not None and pause.key == program.person.key:
+        return "Paused after a step"
+    return f"Paused by {'you' if reader is not None and pause.key == reader.key else pause.name}"
+
+
+def pace_refusal(hub: Hub, window: Window) -> str:
+    """Return why ``window`` may not pause, resume or slow down the arm; empty if allowed."""
+    driver, program, person = hub.lease.driver, hub.gate.program, window.person
+    if not person.role.may_drive:
+        return "You may watch, not drive."
+    if driver is None or driver == person:
+        return ""
+    if program is not None and program.person == driver and hub.runner.orders(window):
+        return ""
+    return f"{driver.name} drives: ask for the arm."
+
+
+def common(hub: Hub) -> dict[str, Any]:
+    """Return the part of the status that is the same for all pages."""
+    state = hub.arm.state if hub.arm is not None else None
+    stopped, holder, age = hub.stopped, hub.lease.driver, silence(hub)
+    now, pause = state_line(hub), hub.gate.last_pause
+    timed = pause is not None and now.headline.startswith(f"Paused by {pause.name}")
     return {
         **now._asdict(),
+        "paused_at": pause.at if timed and pause is not None else None,
         "stop": None if stopped is None else stopped.stage,
         "stopped": None if stopped is None else stopped.why,
         "stopped_at": None if stopped is None else stopped.cause.at or None,
@@ -61,6 +104,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
         "detour": state is not None and state.detour is not None and age is None,
         "speed": 1.0 if state is None else state.speed,
+        "paused": state is not None and state.paused,
         "windows": len(hub.windows),
     }
 
@@ -72,11 +116,15 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     # While a program drives, its owner decides on requests for the lease.
     decides = hub.giver(window) == lease.holder
     program = hub.runner.progress()
+    planning = program is not None and program.status == "planning"
     taker = hub.taken_by(window)
     age = hub.age(window)
+    own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
     clears = hub.gate.may_clear_stop(person)
     until = "Clear stop is pressed" if clears else f"{hub.gate.clears} clears the stop"
     return {
+        **(state_line(hub, person)._asdict() if own_pause else {}),
+        "pace": pace_refusal(hub, window),
         "may_clear_stop": clears,
         "until": "" if hub.stopped is None else f"Nothing moves until {until}.",
         "name": person.name,
@@ -94,7 +142,8 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
             if mine and each.person != person and each.person.role.may_drive
         ],
         "taken": "" if taker is None else f"{taker} took over from you.",
-        "planning": program is not None and program.status == "planning",
+        "planning": planning,
+        "fraction": round(program.fraction, 2) if program is not None and planning else 0.0,
         "orders": list(hub.runner.orders(window)) if hub.arm is not None else [],
         "undo": [each.name for each in hub.gate.undo.changes(person.key, hub.gate.revocations)],
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,

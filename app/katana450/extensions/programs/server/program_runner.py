@@ -31,6 +31,7 @@ from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.hub import Hub
+from katana450.server.service.last_pause import LastPause
 from katana450.server.service.participants import Window, session_of
 from katana450.server.service.runner import Runner, StatusLine
 
@@ -177,7 +178,9 @@ class ProgramRunner(Runner):
                 self._run, commands = runner.stepping(self._run)
                 return self._send(*commands)
             case ProgramOrder.PAUSE:
-                return self._send(cmd.Pause())
+                ticket = self._send(cmd.Pause())
+                self.hub.gate.last_pause = LastPause.by(window.actor)
+                return ticket
             case ProgramOrder.END:
                 return self._end(f"{window.person.name} ended it.")
 
@@ -281,6 +284,7 @@ class ProgramRunner(Runner):
             task=now.name,
             fraction=now.fraction,
             seconds=program.duration,
+            seconds_left=runner.seconds_left(program, run, arm.state, self._allowed),
             why=now.why,
             unattended=self._owner.unattended and self.running,
             began=None if began is None else began.isoformat(timespec="seconds"),
@@ -292,12 +296,7 @@ class ProgramRunner(Runner):
 
     def orders(self, window: Window) -> tuple[str, ...]:
         """Return the orders that the page of ``window`` offers; none if it is not the owner."""
-        arm = self.hub.arm
-        if arm is None or not self.owns(window):
-            return ()
-        stopped = self.hub.stopped is not None
-        offered = state_line.orders(arm.state, self.progress(), stopped=stopped, waits=self.waits)
-        return tuple(order.value for order in offered)
+        return state_line.orders(self.progress()) if self.owns(window) else ()
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""

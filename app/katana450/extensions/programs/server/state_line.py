@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from katana450.arm.control.state import State
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.program_planning import PlanningPhase
@@ -11,8 +13,8 @@ from katana450.server.service.runner import StatusLine
 RUNS = ("running", "paused", "blocked")
 """Statuses of a program that holds the arm, as in `answers.Progress.status`."""
 
-PLANNING = "planning"
-"""The mood of the page while a program is planned."""
+PLANNING, PROGRAM = "planning", "program"
+"""The moods of the page while a program is planned, and while it runs."""
 
 
 def status_line(
@@ -24,27 +26,48 @@ def status_line(
     """
     if program is None:
         return line
-    step = f"Step {program.step} of {program.steps}"
     if program.status in RUNS:
-        if program.unattended:
-            line = line._replace(why=f"{_unattended(program)} {line.why}".rstrip())
-        if state.paused:
-            return line._replace(headline=f"{program.name}, paused", why=f"{step}. {line.why}")
-        return line._replace(mood="moving", headline=f"{program.name}, {step.lower()}")
-    if program.status != PlanningPhase.PLANNING.value:
-        return line
+        return _running(state, line, program)
+    if program.status == PlanningPhase.PLANNING.value:
+        return _planning(state, line, program, waits=waits)
+    return line
+
+
+def _running(state: State, line: StatusLine, program: Progress) -> StatusLine:
+    """Return the line while ``program`` holds the arm."""
+    about = [f"step {program.step} of {program.steps}"]
+    if program.seconds_left > 0.0:
+        about.append(f"{duration(program.seconds_left)} left")
+    whys = [_unattended(program)] if program.unattended else []
+    if state.paused:
+        whys.append(f"{program.name}: {program.task}, {', '.join(about)}.")
+        return line._replace(why=" ".join((*whys, line.why)).rstrip())
+    headline = f"{program.name}: {', '.join((program.task, *about))}"
+    return StatusLine(PROGRAM, headline, " ".join((*whys, line.why)).strip())
+
+
+def _planning(state: State, line: StatusLine, program: Progress, *, waits: bool) -> StatusLine:
+    """Return the line while ``program`` is planned."""
     headline = f"Planning {program.name or 'the script'}"
     about = [program.why] if program.why else []
     if program.steps:
-        about.append(f"{step}: {program.task}, {program.fraction:.0%}.")
+        about.append(f"Step {program.step} of {program.steps}: {program.task}.")
     if state.moving:
         return line._replace(why=" ".join((f"{headline}.", *about)))
-    headline += ", paused" if state.paused else f" {program.fraction:.0%}"
+    headline += f" {100.0 * program.fraction:.0f} %"
+    if state.paused:
+        about.insert(0, f"{line.headline}.")
     if waits:
         about.append("Then it waits for Resume." if state.paused else "Then it runs.")
     else:
         about.append("It does not start by itself.")
     return StatusLine(PLANNING, headline, " ".join(about))
+
+
+def duration(seconds: float) -> str:
+    """Return a time [s] in words, rounded up to whole seconds."""
+    whole = math.ceil(seconds)
+    return f"{whole} s" if whole < 100 else f"{whole // 60} min {whole % 60} s"
 
 
 def _unattended(program: Progress) -> str:
@@ -53,16 +76,7 @@ def _unattended(program: Progress) -> str:
     return f"Unattended: started by {program.by}{at}."
 
 
-def orders(
-    state: State, program: Progress | None, *, stopped: bool, waits: bool
-) -> tuple[ProgramOrder, ...]:
-    """Return the orders that the page offers to the owner of ``program``.
-
-    ``waits``: whether the program runs as soon as it is planned.
-    """
-    if program is None:
-        return ()
-    pause = () if stopped else (ProgramOrder.RESUME if state.paused else ProgramOrder.PAUSE,)
-    if program.status == PlanningPhase.PLANNING.value:
-        return (*(pause if waits else ()), ProgramOrder.END)
-    return (*pause, ProgramOrder.END) if program.status in RUNS else ()
+def orders(program: Progress | None) -> tuple[str, ...]:
+    """Return the orders that the page offers to the owner of ``program``."""
+    ends = program is not None and program.status in (PlanningPhase.PLANNING.value, *RUNS)
+    return (ProgramOrder.END.value,) if ends else ()

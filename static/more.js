@@ -1,0 +1,107 @@
+// The small menu: the person's name, a picture of the scene, and a link to this view.
+"use strict";
+const More = (() => {
+  const NAME = "katana450.name";
+  /** @type {(id: string) => any} */
+  const byId = (id) => document.getElementById(id);
+  const [dialog, button, field, why] = ["more", "more-button", "own-name", "own-name-why"].map(byId);
+  const ID = "name"; // id of the request for a name
+  /** @type {(request: object) => void} */
+  let say = () => {};
+  /** @type {(words: string) => void} */
+  let toast = () => {};
+  /** @type {Storage | null} */
+  let kept = null;
+  let wanted = ""; // name that was sent and not answered yet
+  let known = ""; // name that the server shows
+
+  const refuse = (words) => {
+    why.textContent = words;
+    field.setAttribute("aria-invalid", String(words !== ""));
+  };
+
+  function ask(name) {
+    wanted = name;
+    say({ do: "rename", name, id: ID });
+  }
+
+  function open() {
+    field.value = known;
+    refuse("");
+    dialog.show();
+    button.setAttribute("aria-expanded", "true");
+    field.select();
+  }
+
+  async function snapshot() {
+    const picture = await Viser.picture(byId("scene"));
+    if (!picture) return toast("There is no picture yet. Wait until the scene is shown.");
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(picture);
+    link.download = `katana450-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href));
+    toast(`The picture is saved as ${link.download}.`);
+  }
+
+  async function copyView(view) {
+    const place = (point) => point.map((x) => Number(x.toFixed(4))).join(",");
+    const query = { initialCameraPosition: place(view.position), initialCameraLookAt: place(view.look_at) };
+    const link = byId("view-link");
+    // Commas are legal in a query and easier to read.
+    const search = Object.entries(query).map((pair) => pair.join("=")).join("&");
+    link.value = `${location.origin}${location.pathname}?${search}`;
+    link.hidden = false;
+    try {
+      await navigator.clipboard.writeText(link.value);
+      toast("The link to this view is copied.");
+    } catch {
+      link.select();
+      toast("Copy the marked link: this browser does not allow the page to do it.");
+    }
+  }
+
+  // `view` returns the camera of the scene; null before the first.
+  function begin(options) {
+    ({ say, toast, kept } = options);
+    const toggle = () => (dialog.open ? dialog.close() : open());
+    button.addEventListener("click", toggle);
+    document.querySelector("#who p").addEventListener("click", toggle);
+    dialog.addEventListener("close", () => button.setAttribute("aria-expanded", "false"));
+    byId("own-name-form").addEventListener("submit", (event) => {
+      event.preventDefault();
+      ask(field.value);
+    });
+    byId("snapshot").addEventListener("click", snapshot);
+    byId("copy-view").addEventListener("click", () => {
+      const view = options.view();
+      if (view) copyView(view);
+      else toast("There is no view yet. Wait until the scene is shown.");
+    });
+  }
+
+  // Take the name in a status; use the kept one for a person whom the server has named.
+  function draw(name) {
+    if (name === known) return;
+    const first = known === "";
+    known = name;
+    const own = kept?.getItem(NAME);
+    if (first && own && own !== name && /^Window \d+$/.test(name)) ask(own);
+  }
+
+  // Take an answer; return whether it was for the menu.
+  function hear(answer) {
+    if (answer.id !== ID) return false;
+    if (answer.is === "refused") {
+      refuse(answer.why);
+      if (!dialog.open) toast(answer.why);
+    } else {
+      kept?.setItem(NAME, wanted.trim());
+      refuse("");
+      if (dialog.open) dialog.close();
+    }
+    return true;
+  }
+
+  return { begin, draw, hear };
+})();

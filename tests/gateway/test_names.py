@@ -1,0 +1,59 @@
+"""Test the names that people choose: what others see, and refusals in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.session import Session
+from katana450.errors import InputError
+from katana450.server.service import status
+from katana450.server.service.names import MAX_NAME, renamed
+from tests.gateway.test_hub import PAGES, Table
+
+
+@pytest.fixture
+def table(session: Session) -> Table:
+    return Table(session.begin(session.ready, 0.0, 0.0))
+
+
+def test_new_name_is_seen_everywhere_and_the_driver_keeps_the_arm(table: Table) -> None:
+    driver, other = (table.join(page) for page in PAGES)
+    table.touch(driver.person.key)
+    holds, revocations = table.arm.holds, table.hub.gate.revocations
+    table.hub.rename(driver, "  Anna   B. ")
+    assert status.of(table.hub, driver)["name"] == "Anna B."
+    assert status.common(table.hub)["holder"] == "Anna B."
+    assert status.of(table.hub, driver)["mine"]
+    assert (table.arm.holds, table.hub.gate.revocations) == (holds, revocations)
+    table.hub.request(other)
+    table.hub.rename(other, "Ben")
+    assert [each["name"] for each in status.of(table.hub, driver)["asking"]] == ["Ben"]
+    table.hub.move(driver, cmd.Pause())
+    assert table.arm.actors[-1].name == "Anna B."
+    # A page that is reloaded keeps its name.
+    table.hub.leave(driver)
+    assert table.join(PAGES[0]).person.name == "Anna B."
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("", "The name is empty"),
+        ("  ", "The name is empty"),
+        ("x" * (MAX_NAME + 1), f"The maximum is {MAX_NAME}"),
+        ("window 2", "is taken"),
+        ("a\u202eb", "cannot be shown"),
+    ],
+)
+def test_unsuitable_name_is_refused_in_words(table: Table, name: str, why: str) -> None:
+    window, _ = (table.join(page) for page in PAGES)
+    with pytest.raises(InputError, match=why):
+        table.hub.rename(window, name)
+    assert window.person.name == "Window 1"
+
+
+def test_name_of_an_access_link_stays() -> None:
+    with pytest.raises(InputError, match="access link"):
+        renamed(Person("key", "Anna", Role.OPERATOR, link="7"), "Ben", ())

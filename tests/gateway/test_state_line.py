@@ -1,0 +1,131 @@
+"""Test the state line and the motion controls of the bar: what moves or waits, and who paused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason
+from katana450.extensions.programs.requests import ProgramOrder
+from katana450.extensions.programs.server.state_line import duration
+from katana450.server.service import status
+from katana450.server.service.participants import Window
+from tests.gateway.test_hub import PAGES
+from tests.gateway.test_program_runner import Staged
+
+
+@pytest.fixture
+def table(session: Session) -> Staged:
+    return Staged(session)
+
+
+def bar(table: Staged, window: Window) -> dict[str, Any]:
+    return status.common(table.hub) | status.of(table.hub, window)
+
+
+def paused(table: Staged, *, value: bool) -> None:
+    table.arm.rest = replace(table.arm.rest, paused=value)
+
+
+def test_pause_names_the_person_and_the_time_until_resume(table: Staged) -> None:
+    driver, other = (table.join(page) for page in PAGES)
+    table.hub.move(driver, cmd.Pause())
+    paused(table, value=True)
+    shown = bar(table, driver), bar(table, other)
+    assert [each["headline"] for each in shown] == ["Paused by you", "Paused by Window 1"]
+    assert shown[0]["paused_at"] == shown[1]["paused_at"] is not None
+    assert [each["mood"] for each in shown] == ["paused", "paused"]
+    # A second press keeps the first time.
+    table.hub.move(driver, cmd.Pause())
+    assert bar(table, driver)["paused_at"] == shown[0]["paused_at"]
+    table.hub.move(driver, cmd.Resume())
+    paused(table, value=False)
+    shown = bar(table, driver), bar(table, other)
+    assert [each["headline"] for each in shown] == ["On target", "On target"]
+    assert shown[0]["paused_at"] is None
+
+
+def test_server_pauses_after_a_person_has_paused(table: Staged) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.move(driver, cmd.Pause())
+    table.hub.gate.pause(Finding(Reason.DRIVER_SILENT, 0.3))
+    assert table.arm.holds == 1
+
+
+def test_pause_of_an_unknown_person_has_no_name(table: Staged) -> None:
+    """Show a pause that is older than this process."""
+    window = table.join(PAGES[0])
+    paused(table, value=True)
+    shown = bar(table, window)
+    assert (shown["headline"], shown["paused_at"]) == ("Paused", None)
+
+
+def test_pace_is_refused_with_a_reason_to_all_but_the_driver(table: Staged) -> None:
+    driver, other = (table.join(page, Role.OPERATOR) for page in PAGES)
+    assert bar(table, driver)["pace"] == bar(table, other)["pace"] == ""
+    table.touch(driver.person.key)
+    assert bar(table, driver)["pace"] == ""
+    assert bar(table, other)["pace"] == "Window 1 drives: ask for the arm."
+
+
+def test_viewer_may_not_pace(table: Staged) -> None:
+    window = table.join(PAGES[0], Role.VIEWER)
+    assert bar(table, window)["pace"] == "You may watch, not drive."
+
+
+def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.touch(window.person.key)
+    rest = table.arm.rest
+    table.arm.rest = replace(rest, motion=replace(rest.motion, qd=rest.motion.qd + 0.1))
+    table.stop("Anybody")
+    table.wait(0.2, window)
+    shown = bar(table, window)
+    assert (shown["stop"], shown["headline"]) == ("confirmed", "Stopping…")
+    table.arm.rest = rest
+    assert bar(table, window)["headline"] == "Stopped"
+
+
+def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -> None:
+    owner, other = (table.join(page) for page in PAGES)
+    table.plan(owner, "name: Nap\nsteps:\n  - wait: 30\n  - wait: 5\n")
+    table.programs.steer(owner, ProgramOrder.RUN)
+    table.wait(10.5, owner)
+    shown = bar(table, other)
+    assert shown["mood"] == "program"
+    assert shown["headline"] == "Nap: wait, step 1 of 2, 25 s left"
+    progress = table.programs.progress()
+    assert progress is not None
+    assert progress.seconds_left == pytest.approx(24.5, abs=0.2)
+    table.programs.steer(owner, ProgramOrder.PAUSE)
+    paused(table, value=True)
+    assert bar(table, owner)["headline"] == "Paused by you"
+    shown = bar(table, other)
+    assert (shown["mood"], shown["headline"]) == ("paused", "Paused by Window 1")
+    assert shown["why"].startswith("Nap: wait, step 1 of 2, 25 s left.")
+
+
+def test_remaining_time_counts_the_present_speed(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.plan(window, "steps:\n  - wait: 1\n  - joints: [20, -60, 80, 8, 0]\n")
+    program = table.programs.program
+    assert program is not None
+    table.programs.steer(window, ProgramOrder.RUN)
+    table.wait(0.5, window)
+    table.arm.rest = replace(table.arm.rest, speed=0.5)
+    table.wait(0.1, window)
+    progress = table.programs.progress()
+    assert progress is not None
+    assert progress.seconds_left == pytest.approx(0.4 + 2.0 * program.duration, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.2, "1 s"), (12.0, "12 s"), (99.0, "99 s"), (100.5, "1 min 41 s")]
+)
+def test_times_are_rounded_up(seconds: float, words: str) -> None:
+    assert duration(seconds) == words
