@@ -82,7 +82,7 @@ export class Welcome {
     this.#place();
   }
 
-  // Put the ring on the handle, wherever the camera shows it.
+  // Put the ring where the camera shows the handle.
   #place() {
     const { scene } = this.#page;
     const pixel = scene.contentDocument?.defaultView.katanaScene?.pixelOf(HANDLE);

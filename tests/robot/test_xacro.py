@@ -17,7 +17,7 @@ import katana450
 from katana450.arm.robot import xacro_file
 from katana450.arm.robot.description import checked
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.xacro_expression import RefusedError, evaluated
+from katana450.arm.robot.xacro_expression import UnsafeExpressionError, evaluated
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
 from tests.robot.public_arms import PX150, urdf
@@ -265,7 +265,7 @@ def test_plain_values_keep_their_methods() -> None:
     assert evaluated("text.replace('_', '-').split('-')", dict(symbols)) == ["a", "b"]
     assert evaluated("settings.left.x + len", symbols | {"len": 3}) == 5
     assert evaluated("sum([x.real for x in [1, 2]])", dict(symbols)) == 3
-    with pytest.raises(RefusedError, match="'_mapping' is not allowed"):
+    with pytest.raises(UnsafeExpressionError, match="'_mapping' is not allowed"):
         evaluated("settings._mapping", dict(symbols))
 
 

@@ -20,7 +20,7 @@ ATTRIBUTE = "attribute of"
 """Name of the function that reads an attribute; no expression can contain it."""
 
 
-class RefusedError(Exception):
+class UnsafeExpressionError(Exception):
     """An expression that is not evaluated, with the reason."""
 
 
@@ -33,7 +33,7 @@ def evaluated(text: str, symbols: dict[str, Any], names: Mapping[str, Any] | Non
         names: what its names mean first.
 
     Raises:
-        RefusedError: it uses a private name, or an attribute of anything but plain values.
+        UnsafeExpressionError: it uses a private name, or an attribute of anything but plain values.
         Exception: whatever the expression raises.
     """
     tree = _Guarded().visit(ast.parse(text.strip(), "<expression>", "eval"))
@@ -47,7 +47,7 @@ class _Guarded(ast.NodeTransformer):
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if node.id.startswith("__"):
-            raise RefusedError(f"the name {node.id!r} is not allowed")
+            raise UnsafeExpressionError(f"the name {node.id!r} is not allowed")
         return node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
@@ -62,5 +62,5 @@ def _attribute(value: object, name: str) -> object:
         return value[name]
     kind = next((kind for kind in PLAIN if isinstance(value, kind)), None)
     if kind is None or name.startswith("_") or name in REFUSED or not hasattr(kind, name):
-        raise RefusedError(f"the attribute {name!r} is not allowed, or does not exist")
+        raise UnsafeExpressionError(f"the attribute {name!r} is not allowed, or does not exist")
     return getattr(value, name)
