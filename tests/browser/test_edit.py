@@ -133,7 +133,7 @@ def test_undo_in_a_text_box_is_that_of_the_browser(page: ViserPage, truth: Truth
     start = np.array(truth.status()["goal"])
     page.drag_arrow(MOVE, "y", 0.1)
     truth.wait(10.0, moving=False)
-    box = page.number_box("Axis 1")
+    box = page.number_box("1 base turn")
     box.click()
     box.press("Control+z")
     page.page.wait_for_timeout(300)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -93,20 +92,18 @@ def test_joints_move_by_steps(sheet: ViserPage, truth: Truth) -> None:
 
 
 def test_gripper_opens_and_closes_by_buttons_and_keys(sheet: ViserPage, truth: Truth) -> None:
-    def wait_goal(sign: int, before: float) -> float:
+    def wait_goal(sign: int, act: Callable[[], None]) -> None:
+        before = truth.status()["gripper_goal"]
+        act()
         sheet.wait_until(
             lambda: sign * (truth.status()["gripper_goal"] - before) > 0.1, "the gripper's goal"
         )
-        return float(truth.status()["gripper_goal"])
 
-    sheet.page.locator("#gripper button", has_text="Open").click()
-    sheet.wait_until(lambda: not math.isnan(truth.status()["gripper_goal"]), "a state")
-    sheet.page.keyboard.press("KeyC")
-    closed = wait_goal(-1, 10.0)
-    sheet.page.keyboard.press("KeyO")
-    opened = wait_goal(1, closed)
-    sheet.page.locator("#gripper button", has_text="Close").click()
-    wait_goal(-1, opened)
+    # The arm begins with an open gripper.
+    wait_goal(-1, lambda: sheet.page.keyboard.press("KeyC"))
+    wait_goal(1, lambda: sheet.page.keyboard.press("KeyO"))
+    wait_goal(-1, lambda: sheet.page.locator("#gripper button", has_text="Close").click())
+    wait_goal(1, lambda: sheet.page.locator("#gripper button", has_text="Open").click())
 
 
 def test_gamepad_steps_and_grips_only_with_its_shoulder_button(
@@ -115,14 +112,14 @@ def test_gamepad_steps_and_grips_only_with_its_shoulder_button(
     sheet.page.evaluate(GAMEPAD)
     choose(sheet, "step", "1")
     start = tool(truth)
-    sheet.page.evaluate("() => { pad.axes[0] = -1; pad.buttons[3].pressed = true }")
+    sheet.page.evaluate("() => { pad.axes[0] = -1; pad.buttons[0].pressed = true }")
     sheet.page.wait_for_timeout(300)
     assert np.allclose(tool(truth), start, atol=EXACT)
     before = truth.status()["gripper_goal"]
-    sheet.page.evaluate("() => { pad.axes[0] = 0; pad.buttons[3].pressed = false }")
+    sheet.page.evaluate("() => { pad.axes[0] = 0; pad.buttons[0].pressed = false }")
     sheet.page.evaluate("() => { pad.buttons[4].pressed = true }")
     sheet.page.wait_for_timeout(150)
-    sheet.page.evaluate("() => { pad.axes[0] = -1; pad.buttons[3].pressed = true }")
+    sheet.page.evaluate("() => { pad.axes[0] = -1; pad.buttons[0].pressed = true }")
     wait_for(sheet, truth, np.add(start, (0.0, 0.001, 0.0)))
     sheet.page.wait_for_timeout(300)
     wait_for(sheet, truth, np.add(start, (0.0, 0.001, 0.0)))

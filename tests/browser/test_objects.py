@@ -49,8 +49,7 @@ def test_an_object_is_brought_moved_changed_and_removed(
         page.wait_ready((SHAPE,))
         np.testing.assert_allclose(place_of(page), (0.36, 0.0, 0.0), atol=1e-6)
 
-        for label in ("Show", "Objects"):
-            page.frame.get_by_text(label, exact=True).click()
+        page.open_tab("Scene")
         page.frame.get_by_text("Handles on objects", exact=True).click()
         page.wait_ready((HANDLE,))
         assert page.chosen("Object") == "ring"
@@ -67,7 +66,6 @@ def test_an_object_is_brought_moved_changed_and_removed(
         )
         np.testing.assert_allclose(place_of(page), moved, atol=1e-9)
 
-        page.open_tab("Scene")
         page.type_number("Scale", 0.15)
         page.wait_until(
             lambda: any(

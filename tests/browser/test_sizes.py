@@ -259,9 +259,9 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
         sky = np.median(page.scene_picture()[5:15].reshape(-1, 3), axis=0)
         assert sky.max() < max(DARK.floor) + 30
         # The panel is folded until a person opens it; the scene then gets the remaining height.
-        assert not in_view(page, "3D")
+        assert not in_view(page, "Home")
         page.frame.get_by_text("Katana450", exact=True).first.tap()
-        page.wait_until(lambda: in_view(page, "3D"), "the panel")
+        page.wait_until(lambda: in_view(page, "Home"), "the panel")
         wait_whole(page, "above the panel")
         page.keep(artefacts / "phone-panel.png")
         page.frame.get_by_text("Katana450", exact=True).first.tap()

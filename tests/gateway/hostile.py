@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -20,5 +21,10 @@ async def peers(url: str) -> AsyncIterator[tuple[Peer, Peer]]:
 
 
 async def moves_the_arm(good: Peer, degrees: float) -> list[dict[str, Any]]:
+    """Turn axis 1, and return what ``good`` hears of it until nothing more comes."""
     await good.set("1 base turn", value=degrees)
-    return await good.listen()
+    heard: list[dict[str, Any]] = []
+    async with asyncio.timeout(20.0):
+        while not any(each["type"] == "SetOrientationMessage" for each in heard):
+            heard += await good.listen()
+    return heard

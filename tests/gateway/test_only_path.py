@@ -12,7 +12,6 @@ PACKAGE = Path(katana450.__file__).parent
 DELIVERIES = {
     ("server/service/command_gate.py", "self.arm"),
     ("server/service/command_gate.py", "arm"),
-    ("server/service/command_gate.py", "self.present()"),
     # Behind the gate the handle passes commands on; the worker also adds the planned path.
     ("server/service/arm_handle.py", "self._sink"),
     ("arm/runtime/planning_worker.py", "self._arm"),

@@ -386,6 +386,7 @@ def test_client_stops_on_all_paths_and_clears_when_possible(
         assert state.stopped_at is not None
         assert time.time() - state.stopped_at > HOLD_OFF
     else:
-        assert "Clear the stop" in clear_too_early
+        # The slower paths may have stopped the arm once more.
+        assert "Clear the stop" in clear_too_early or "not confirmed" in clear_too_early
     program.clear_stop()
     assert program.query(answers.State).stopped is None

@@ -70,7 +70,7 @@ def ends(arm: ArmModel, session: Session) -> Iterator[Ends]:
     ends.loop.stop()
 
 
-def until(true: Callable[[], bool], seconds: float = 5.0) -> None:
+def until(true: Callable[[], bool], seconds: float = 20.0) -> None:
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end
