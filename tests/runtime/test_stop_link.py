@@ -38,6 +38,13 @@ def connected(link: StopLink) -> bool:
     return link.status is not None
 
 
+async def ended(link: StopLink) -> None:
+    """Wait until the thread of ``link`` has read the end of its connection."""
+    async with asyncio.timeout(TIMEOUT):
+        while link.running:
+            await asyncio.sleep(0.01)
+
+
 def _next(pipes: Iterator[Connection]) -> Connection:
     for pipe in pipes:
         return pipe
@@ -100,9 +107,7 @@ def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
         second.close()
         assert link.running
         pipes.put(None)
-        async with asyncio.timeout(TIMEOUT):
-            while link.running:
-                await asyncio.sleep(0.01)
+        await ended(link)
 
     asyncio.run(act())
 
@@ -118,6 +123,7 @@ def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
             link.press(press("one"))
             found = await link.executed(name, TIMEOUT if name == "one" else 0.3)
             assert (found is not None) == (name == "one")
+        await ended(link)
         pipe.close()
 
     asyncio.run(act())
@@ -139,6 +145,7 @@ def test_status_names_the_newest_drivers(arm: ArmModel, session: Session) -> Non
             await names(())
             drivers.append("oda")
             await names(("oda",))
+        await ended(link)
         pipe.close()
 
     asyncio.run(act())
