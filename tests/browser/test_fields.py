@@ -195,7 +195,7 @@ def test_pose_form_converts_units_and_copies_the_present_pose(page: ViserPage) -
     page.choose("Units", "cm")
     page.choose("Frame", "Base")
     page.wait_until(lambda: numbers("x, y, z") == [47.85, 0.0, 28.21], "the pose in cm and base")
-    assert page.text_of("[data-now=z]") == "28.21"
+    page.wait_until(lambda: page.text_of("[data-now=z]") == "28.21", "the read-out in cm")
     # A value beyond the arm's reach in the chosen unit is not sent.
     box = page.number_box("x, y, z")
     type_slowly(page, box, "101")

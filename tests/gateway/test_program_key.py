@@ -41,7 +41,9 @@ def test_program_key_is_secret_and_required() -> None:
             ask(f"{server.url}/api/v1/state", X_Program="Sorter", X_Name="Sorter")
             ask(f"{server.url}/api/v1/state", X_Program=secrets.token_hex(16))
             assert time.monotonic() < end
-        assert state["stopped"] == "Sorter fell silent while the arm moved."
+        # A starved machine says so in the sentence.
+        assert "Sorter" in state["stopped"]
+        assert "while the arm moved." in state["stopped"]
         assert state["q"][0] < FAR[0] - 0.2
         # Reads open no windows: only the two programs that posted have one.
         assert state["windows"] == 2
