@@ -42,8 +42,8 @@ HOP: Final = 0.1
 operator sees motion and no leap.
 """
 
-DRAG_STRIDE: Final = 0.02
-"""Step length [m] along the path of a fast drag: about a hop of the joints."""
+DRAG_STRIDE: Final = 0.01
+"""Step length [m] along the path of a fast drag: half a hop of the joints of a small arm."""
 
 MAX_PATH_LENGTH: Final = 32
 """Maximum number of strides along one drag; a longer drag takes longer strides."""
