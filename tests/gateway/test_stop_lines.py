@@ -55,6 +55,25 @@ def test_two_lines_stop_a_moving_arm(server: AppServer) -> None:
         program.ask(requests.ReleaseLease())
 
 
+@pytest.mark.parametrize("end", [b"\n", b""])
+def test_sender_that_ends_its_half_is_answered(server: AppServer, end: bytes) -> None:
+    host, port = server.stop_url.removeprefix("http://").split(":")
+    with connect(server.url, "Driver") as program:
+        under_way(program)
+        with socket.create_connection((host, int(port)), timeout=10.0) as line:
+            line.sendall(HELLO + STOP.rstrip() + end)
+            line.shutdown(socket.SHUT_WR)
+            with line.makefile("rb") as stream:
+                assert json.loads(stream.readline())["stop"] == "confirmed"
+        deadline = time.monotonic() + 5.0
+        # The main port hears of it from the arm, too.
+        while (stopped := program.query(answers.State).stopped) is None:
+            assert time.monotonic() < deadline
+        assert stopped == "Cell pressed STOP."
+        program.clear_stop()
+        program.ask(requests.ReleaseLease())
+
+
 @pytest.mark.parametrize(
     ("lines", "why"),
     [

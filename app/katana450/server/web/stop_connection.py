@@ -57,6 +57,12 @@ class StopConnection(asyncio.Protocol):
         if isinstance(event, h11.Request):
             self._task = asyncio.create_task(self._handle(event))
 
+    def eof_received(self) -> bool:
+        """Count a last line without its line feed; return whether an answer is still to come."""
+        if self._lines and self._task is None:
+            self._receive_lines(b"\n")
+        return self._task is not None
+
     def _receive_lines(self, data: bytes) -> None:
         """Receive JSON lines; no request of a browser begins with a brace."""
         self._lines += data
