@@ -9,6 +9,7 @@ from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.errors import InputError
 from katana450.server.service import status
+from katana450.server.service.hub import REMEMBERED
 from katana450.server.service.names import MAX_NAME, renamed
 from tests.gateway.test_hub import PAGES, Table
 
@@ -43,8 +44,14 @@ def test_new_name_is_seen_everywhere_and_the_driver_keeps_the_arm(table: Table) 
         ("", "The name is empty"),
         ("  ", "The name is empty"),
         ("x" * (MAX_NAME + 1), f"The maximum is {MAX_NAME}"),
-        ("window 2", "is taken"),
+        ("window 2", "not a name of one person"),
         ("a\u202eb", "cannot be shown"),
+        ("\u3164", "cannot be shown"),
+        ("a" + "\u0301\u0302\u0303\u0304", "cannot be shown"),
+        ("...", "not a name of one person"),
+        ("You", "not a name of one person"),
+        ("Window 261", "not a name of one person"),
+        ("\uff37indow 3", "not a name of one person"),
     ],
 )
 def test_unsuitable_name_is_refused_in_words(table: Table, name: str, why: str) -> None:
@@ -57,3 +64,32 @@ def test_unsuitable_name_is_refused_in_words(table: Table, name: str, why: str) 
 def test_name_of_an_access_link_stays() -> None:
     with pytest.raises(InputError, match="access link"):
         renamed(Person("key", "Anna", Role.OPERATOR, link="7"), "Ben", ())
+
+
+def test_name_of_somebody_who_is_away_stays_his(table: Table) -> None:
+    first, second = (table.join(page) for page in PAGES)
+    table.hub.rename(first, "Ann")
+    table.hub.leave(first)
+    with pytest.raises(InputError, match="is taken"):
+        table.hub.rename(second, "ann")
+    assert table.join(PAGES[0]).person.name == "Ann"
+    # Saved as it is.
+    table.hub.rename(second, "Window 2")
+
+
+def test_new_name_is_in_the_event_log(table: Table) -> None:
+    table.hub.recorder.enabled = True
+    window = table.join(PAGES[0])
+    table.hub.rename(window, "Ann")
+    notes = [table.hub.recorder.notes.get() for _ in range(table.hub.recorder.notes.qsize())]
+    (note,) = [each for each in notes if each is not None and each.kind == "rename"]
+    assert note.actor is not None
+    assert (note.actor.name, note.what) == ("Window 1", {"name": "Ann"})
+
+
+def test_connected_window_stays_known_among_many(table: Table) -> None:
+    window = table.join(PAGES[0])
+    for number in range(REMEMBERED + 5):
+        table.hub.leave(table.join(f"page-{number:032}"))
+    table.hub.rename(window, "Ann")
+    assert table.join(PAGES[0]).number == window.number

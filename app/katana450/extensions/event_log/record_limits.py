@@ -45,6 +45,7 @@ GROUPS = {
     "finding": "finding",
     "join": "session",
     "leave": "session",
+    "rename": "session",
     "sign-in": "session",
     "upload": "session",
     "refusal": "refusal",

@@ -142,9 +142,10 @@ class Hub:
 
     def rename(self, window: Window, name: str) -> None:
         """Give ``window`` the display name ``name``. Raises InputError; see ``names.renamed``."""
-        key, (_, number) = window.person.key, self._remembered[window.person.key]
-        person = renamed(window.person, name, (each.person for each in self.windows))
-        window.person, self._remembered[key] = person, (person, number)
+        person = renamed(window.person, name, self._known_people)
+        self.recorder.note("rename", window.actor, {"name": person.name})
+        window.person = person
+        self._remembered[person.key] = (person, window.number)
         self.gate.change(lambda lease, _: lease.renamed(person), window.actor)
 
     def leave(self, window: Window, *, for_good: bool = False) -> None:
@@ -399,8 +400,9 @@ class Hub:
         # A page that returns may have another address.
         known = replace(known[0], link=identity.link, address=identity.address), known[1]
         self._remembered[key] = known
-        while len(self._remembered) > REMEMBERED:
-            self._remembered.pop(next(iter(self._remembered)))
+        absent = [each for each in self._remembered if each not in self._windows and each != key]
+        for each in absent[: max(len(self._remembered) - REMEMBERED, 0)]:
+            del self._remembered[each]
         return known
 
     def _new_person(self, key: str, identity: Identity) -> tuple[Person, int]:
