@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,26 @@ def test_nothing_is_undone_past_a_change_of_driver(server: AppServer, program: C
     with pytest.raises(RefusedError, match="nothing to undo"):
         program.ask(requests.Undo())
     np.testing.assert_allclose(state(program).q, moved.q, atol=1e-6)
+
+
+def test_undo_that_began_before_a_stop_is_refused(program: Client) -> None:
+    before = program.nudge(1, 0.1).revocations
+    program.ask(requests.Stop())
+    program.clear_stop()
+    moved = program.nudge(1, 0.1)
+    with pytest.raises(RefusedError, match="Do it again"):
+        program.ask(requests.Undo(revocations=before))
+    np.testing.assert_allclose(state(program).q, moved.q, atol=1e-6)
+
+
+def test_undo_does_not_leap_over_a_stream(program: Client) -> None:
+    q = np.array(program.nudge(1, 0.1).q)
+    for _ in range(20):
+        q[0] += 0.005
+        program.tell(requests.Servo(q=q.tolist()))
+        time.sleep(0.02)
+    time.sleep(1.0)
+    streamed = state(program)
+    with pytest.raises(RefusedError, match="nothing to undo"):
+        program.ask(requests.Undo())
+    np.testing.assert_allclose(state(program).q, streamed.q, atol=1e-6)

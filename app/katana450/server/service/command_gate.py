@@ -93,15 +93,26 @@ class CommandGate:
                     granted = self._checked(command, actor)
                     # What follows from the command later is void after a revocation.
                     granted = replace(granted, seen=self.revocations)
-                    with self.undo.noted(arm := self.present(), command, granted):
+                    arm, before = self.present(), self.present().state
+                    with self.undo.noted(arm, command, granted):
                         ticket = arm.deliver(command, granted)
-                    self.last_pause = LastPause.after(self.last_pause, command, actor, arm.state)
+                    self.last_pause = LastPause.after(self.last_pause, command, actor, before)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise
             if isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
             self.recorder.command(command, granted, ticket)
+            return ticket
+
+    def undo_last(self, actor: Actor) -> int:
+        """Undo the last change of ``actor``; return the ticket. Raises as ``submit`` does."""
+        with self._lock:
+            state = self.check_runs().state
+            self.check_current(actor)
+            change, command = self.undo.inverse(actor.key, self.revocations, state)
+            ticket = self.submit(command, actor)
+            self.undo.forget(change)
             return ticket
 
     def _checked(self, command: cmd.Command, actor: Actor) -> Actor:
@@ -308,8 +319,7 @@ class CommandGate:
         return self._stop(cause, actor)
 
     def _stop(self, cause: StopCause, actor: Actor) -> int:
-        self._revoke()
-        self.on_stop()
+        self._end_gestures()
         actor = replace(actor, grounds=Grounds.SERVER if actor is SERVER else Grounds.SAFETY)
         self.recorder.stop(cause.why, actor, first=self.stopped is None)
         if self.stopped is None:
@@ -320,10 +330,15 @@ class CommandGate:
         self.stopped = self.stopped.requested(self.arm.deliver(cmd.Stop(cause), actor))
         return self.stopped.ticket or 0
 
-    def _adopt(self, cause: StopCause, arm: ArmInterface) -> None:
-        """Record a stop that the arm has executed and this gate has not sent."""
+    def _end_gestures(self) -> None:
+        """Void what was received and planned before a stop, which also ends a pause."""
         self._revoke()
         self.on_stop()
+        self.last_pause = None
+
+    def _adopt(self, cause: StopCause, arm: ArmInterface) -> None:
+        """Record a stop that the arm has executed and this gate has not sent."""
+        self._end_gestures()
         named, actor = self._named(cause)
         log.warning("Stopped: %s", named.why)
         self.recorder.stop(named.why, actor, first=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import nullcontext
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -112,7 +113,10 @@ class Dispatcher:
         if isinstance(request, hub.runner.request_types):
             return hub.runner.handle(window, request)
         if isinstance(request, requests.Undo):
-            return self._undo(window)
+            # Read before the undo: a stop in between is newer than the answer.
+            revocations = hub.gate.revocations
+            ticket = hub.gate.undo_last(replace(window.actor, seen=request.revocations))
+            return msgspec.structs.replace(_done(ticket, None), revocations=revocations)
         command = self._command(request)
         if command is None:
             self._change_lease(window, request)
@@ -145,15 +149,6 @@ class Dispatcher:
         except TimeoutError:
             return msgspec.structs.replace(pending, outcome=UNKNOWN)
         return serialize.concluded(pending, outcome)
-
-    def _undo(self, window: Window) -> answers.Answer:
-        """Undo the last change of ``window``."""
-        gate, hub = self._hub.gate, self._hub
-        state = gate.check_runs().state
-        change, command = gate.undo.inverse(window.person.key, gate.revocations, state)
-        ticket = hub.move(window, command, change.actor.seen)
-        gate.undo.forget(change)
-        return _done(ticket, None)
 
     def _change_lease(self, window: Window, request: requests.Request) -> None:
         """Execute a request about the lease."""

@@ -87,6 +87,9 @@ class UndoHistory:
             self._changes = ()
         found = _inverse(state, command)
         if found is None:
+            if any(each.traits.supersedes and not each.traits.protective for each in command.parts):
+                # Whatever came before this motion, its undoing would be another leap.
+                self._changes = ()
             return
         change = Change(*found, actor, self._clock())
         last = self._changes[-1] if self._changes else None
@@ -94,8 +97,9 @@ class UndoHistory:
         # A state without the last command does not show what this one changes.
         if last is not None and change.continues(last) and (one_gesture or not caught_up):
             self._changes = (*self._changes[:-1], replace(last, at=change.at))
-            return
-        if not isinstance(command, cmd.EndDrag):
+        elif not caught_up:
+            self._changes = ()
+        elif not isinstance(command, cmd.EndDrag):
             self._changes = (*self._changes, change)[-MAX_CHANGES:]
 
     def changes(self, key: str, revocations: int) -> tuple[Change, ...]:
@@ -110,7 +114,8 @@ class UndoHistory:
     def inverse(self, key: str, revocations: int, state: State) -> tuple[Change, cmd.Command]:
         """Return the newest change of the participant of ``key``, and the command that undoes it.
 
-        Raises InputError if there is none, or if the hand holds the object.
+        Raises InputError if there is none, if the hand holds the object, or if the hand would open
+        on the way.
         """
         changes = self.changes(key, revocations)
         if not changes:
@@ -120,6 +125,13 @@ class UndoHistory:
         now = None if name is None else named(state.objects, name)
         if now is not None and now.held:
             raise InputError(f"{now.name!r} is held: open the gripper first.")
+        holds = any(each.held for each in state.objects)
+        if isinstance(command, cmd.SetGripper) and holds and state.moving:
+            raise InputError("The hand holds an object and the arm moves: wait until it rests.")
+        if isinstance(command, cmd.PlaceObject) and now is not None:
+            # Its colour is no part of this change.
+            placed = replace(command.scene_object, appearance=now.appearance)
+            command = cmd.PlaceObject(placed)
         return changes[0], command
 
     def forget(self, change: Change) -> None:

@@ -178,8 +178,10 @@ class ProgramRunner(Runner):
                 self._run, commands = runner.stepping(self._run)
                 return self._send(*commands)
             case ProgramOrder.PAUSE:
+                paused = self.hub.present().state.paused
                 ticket = self._send(cmd.Pause())
-                self.hub.gate.last_pause = LastPause.by(window.actor)
+                if not paused:
+                    self.hub.gate.last_pause = LastPause.by(window.actor)
                 return ticket
             case ProgramOrder.END:
                 return self._end(f"{window.person.name} ended it.")
