@@ -19,8 +19,11 @@ MAX_MEMORY_BYTES = 1 << 30
 MAX_BYTES = 20_000_000
 """[bytes] Maximum size of the expanded text."""
 
-PASSED_ON = ("AMENT_", "COLCON_", "CMAKE_PREFIX_PATH", "LANG", "LC_", "PATH", "PYTHON", "ROS_")
+READABLE = ("AMENT_", "COLCON_", "CMAKE_PREFIX_PATH", "ROS_")
 """Beginnings of the names of environment variables that a file can read."""
+
+PASSED_ON = (*READABLE, "HOME", "LANG", "LC_", "PATH", "PYTHON", "USERPROFILE")
+"""Beginnings of the names of environment variables that the subprocess gets."""
 
 
 def expanded(path: Path) -> bytes:
