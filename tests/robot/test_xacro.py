@@ -200,6 +200,21 @@ def test_every_fault_is_reported_with_its_cause(
         load(path)
 
 
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("<link name=\"${'\\ud800'}\"/>", "line 2: .*a surrogate is not a character"),
+        ("<link name=\"$(eval '\\udfff')\"/>", "line 2: .*a surrogate is not a character"),
+        ('<material name="$(env ROS_NAME)"/>', "a surrogate is not a character"),
+    ],
+)
+def test_half_a_pair_of_surrogates_is_a_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, expected: str
+) -> None:
+    monkeypatch.setenv("ROS_NAME", "\udc80")
+    assert re.search(expected, refusal(templated(tmp_path, line)))
+
+
 def test_the_fault_of_an_included_file_names_that_file(package: Path) -> None:
     joints = package / "urdf" / "joints.xacro"
     text = joints.read_text()

@@ -97,6 +97,8 @@ class Expansion:
         try:
             document = xacro.process_file(str(self._path), mappings={}, verbosity=0)
             urdf = document.documentElement.toxml()
+            # Half of a surrogate pair is no character of a file.
+            urdf.encode()
         except Exception as error:
             return self._fault(error)
         if len(urdf) > MAX_BYTES:
@@ -115,7 +117,10 @@ class Expansion:
         self, text: str, symbols: dict[str, Any], names: Mapping[str, Any] | None = None
     ) -> object:
         try:
-            return evaluated(text, symbols, names)
+            value = evaluated(text, symbols, names)
+            if isinstance(value, str):
+                value.encode()
+            return value
         except Exception:
             # The innermost expression is at fault.
             self._at_fault = self._at_fault or text
@@ -164,7 +169,7 @@ class Expansion:
         elif self._at_fault:
             what = f"{_reason(cause)}, in the expression {self._at_fault!r}"
         else:
-            what = str(cause).strip().rstrip(".")
+            what = _reason(cause).rstrip(".")
             self._at_fault = what.rpartition("xacro:")[2]
         stack = [*xacro.filestack, *(macro.history[-1][-1] for macro in xacro.macrostack)]
         file = Path(stack[-1])
@@ -182,6 +187,8 @@ def _reason(error: Exception) -> str:
         return f"{error.name!r} is not defined" if error.name else str(error)
     if isinstance(error, KeyError):
         return f"there is no {error}"
+    if isinstance(error, UnicodeEncodeError):
+        return "a surrogate is not a character"
     if isinstance(error, SyntaxError):
         return "the syntax is wrong"
     return (str(error).strip() or type(error).__name__).splitlines()[0]
