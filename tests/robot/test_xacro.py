@@ -185,7 +185,7 @@ def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
         ('<xacro:include filename="arm.urdf.xacro"/>', "contain themselves"),
         ("<xacro:macro name='m' params='a'/><xacro:m/>", "Undefined parameters .a."),
         ('<link name="${10 ** 10 ** 10}"/>', "more than .* s or .* MiB"),
-        ("<link name=\"${'x' * 10 ** 12}\"/>", "line 2: .*MemoryError"),
+        ("<link name=\"${'x' * 10 ** 12}\"/>", "line 2: .*it needs too much memory, in"),
         ("<link name=\"${'x' * 3 * 10 ** 7}\"/>", "more than 20,000,000 characters"),
     ],
 )
@@ -213,6 +213,34 @@ def test_half_a_pair_of_surrogates_is_a_fault(
 ) -> None:
     monkeypatch.setenv("ROS_NAME", "\udc80")
     assert re.search(expected, refusal(templated(tmp_path, line)))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "<link name=\"${dict()['a' * 150000000]}\"/>",
+        "<link name=\"${xacro.fatal('\\x1b[31m' + 'a' * 3000)}\"/>",
+        "<xacro:include filename=\"${'\\x00' + 'a' * 3000}\"/>",
+        "<xacro:include filename=\"${'\\x1b' + 'a' * 3000}\"/>",
+    ],
+)
+def test_the_words_of_a_fault_are_few_and_printable(tmp_path: Path, line: str) -> None:
+    path = templated(tmp_path, line)
+    message = refusal(path)
+    assert message.startswith(f"{path}")
+    assert len(message) < len(str(path)) + 400
+    assert message.isprintable()
+
+
+def test_an_expansion_that_does_not_start_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "xacro.py").write_text("raise ImportError('a broken installation')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(
+        RobotDescriptionError, match=r"did not start: ImportError: a broken installation\.$"
+    ):
+        load(templated(tmp_path, '<link name="${1}"/>'))
 
 
 def test_the_fault_of_an_included_file_names_that_file(package: Path) -> None:

@@ -2,8 +2,8 @@
 
 ``expanded`` starts it as ``python -m katana450.arm.robot.xacro_process FILE``. Before it reads the
 file, it limits its memory and time and the files that it can open. It writes JSON to standard
-output: {"urdf": text}, or the fault as {"what", "file", "line"}; the line is null where it is
-unknown.
+output: {"urdf": text}, or the fault as {"what", "file", "line"}. The file is null if it is FILE,
+and the line if it is unknown.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import json
 import os
 import sys
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import redirect_stderr, suppress
 from pathlib import Path
 from typing import Any
 from xml.parsers.expat import ErrorString, ExpatError
@@ -35,6 +35,9 @@ LEGACY = ("include", "macro", "property")
 
 FORBIDDEN = ("os.exec", "os.posix_spawn", "os.system", "socket.connect", "subprocess.Popen")
 """Audit events of Python that no expansion causes."""
+
+MAX_WHAT = 300
+"""Maximum number of characters of a fault; an error of Python can quote a whole value."""
 
 ENDLESS = "its macros, properties or includes contain themselves"
 
@@ -172,17 +175,26 @@ class Expansion:
             what = _reason(cause).rstrip(".")
             self._at_fault = what.rpartition("xacro:")[2]
         stack = [*xacro.filestack, *(macro.history[-1][-1] for macro in xacro.macrostack)]
-        file = Path(stack[-1])
+        # An included file that could not be opened can be left on the stack.
+        file = next((Path(each) for each in reversed(stack) if os.path.isfile(each)), self._path)
         if line is None and self._at_fault:
             for each in (*reversed(stack), *xacro.all_includes):
                 line = _line(Path(each), self._at_fault)
                 if line is not None:
                     file = Path(each)
                     break
-        return {"what": what, "file": str(file), "line": line}
+        other = None if file == self._path else _shown(str(file))
+        return {"what": _shown(what), "file": other, "line": line}
+
+
+def _shown(text: str) -> str:
+    """Return the first MAX_WHAT characters of ``text``, each other than printable as "?"."""
+    return "".join(each if each.isprintable() else "?" for each in text[:MAX_WHAT])
 
 
 def _reason(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return "it needs too much memory"
     if isinstance(error, NameError):
         return f"{error.name!r} is not defined" if error.name else str(error)
     if isinstance(error, KeyError):
@@ -208,8 +220,14 @@ def main(path: Path) -> None:
     guard = FileGuard(path)
     for name in [each for each in os.environ if not each.startswith(READABLE)]:
         del os.environ[name]
-    sys.addaudithook(guard)
-    print(json.dumps(Expansion(path, guard.folders).run()))
+    # The messages of the file are dropped; standard error tells why this program did not start.
+    with Path(os.devnull).open("w") as null, redirect_stderr(null):
+        sys.addaudithook(guard)
+        try:
+            answer = json.dumps(Expansion(path, guard.folders).run())
+        except MemoryError as error:
+            answer = json.dumps({"what": _reason(error), "file": None, "line": None})
+    print(answer)
 
 
 if __name__ == "__main__":
