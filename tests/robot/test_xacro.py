@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from katana450.arm.robot import xacro_file
 from katana450.arm.robot.description import checked
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.xacro_expression import UnsafeExpressionError, evaluated
+from katana450.arm.robot.xacro_process import FORBIDDEN, FileGuard
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
 from tests.robot.public_arms import PX150, urdf
@@ -183,7 +185,7 @@ def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
         ('<xacro:include filename="arm.urdf.xacro"/>', "contain themselves"),
         ("<xacro:macro name='m' params='a'/><xacro:m/>", "Undefined parameters .a."),
         ('<link name="${10 ** 10 ** 10}"/>', "more than .* s or .* MiB"),
-        ("<link name=\"${'x' * 10 ** 12}\"/>", "line 2: .*MemoryError"),
+        ("<link name=\"${'x' * 10 ** 12}\"/>", "line 2: .*it needs too much memory, in"),
         ("<link name=\"${'x' * 3 * 10 ** 7}\"/>", "more than 20,000,000 characters"),
     ],
 )
@@ -196,6 +198,49 @@ def test_every_fault_is_reported_with_its_cause(
     assert message.startswith(str(path))
     with pytest.raises(RobotDescriptionError, match=expected):
         load(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("<link name=\"${'\\ud800'}\"/>", "line 2: .*a surrogate is not a character"),
+        ("<link name=\"$(eval '\\udfff')\"/>", "line 2: .*a surrogate is not a character"),
+        ('<material name="$(env ROS_NAME)"/>', "a surrogate is not a character"),
+    ],
+)
+def test_half_a_pair_of_surrogates_is_a_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, expected: str
+) -> None:
+    monkeypatch.setenv("ROS_NAME", "\udc80")
+    assert re.search(expected, refusal(templated(tmp_path, line)))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "<link name=\"${dict()['a' * 150000000]}\"/>",
+        "<link name=\"${xacro.fatal('\\x1b[31m' + 'a' * 3000)}\"/>",
+        "<xacro:include filename=\"${'\\x00' + 'a' * 3000}\"/>",
+        "<xacro:include filename=\"${'\\x1b' + 'a' * 3000}\"/>",
+    ],
+)
+def test_the_words_of_a_fault_are_few_and_printable(tmp_path: Path, line: str) -> None:
+    path = templated(tmp_path, line)
+    message = refusal(path)
+    assert message.startswith(f"{path}")
+    assert len(message) < len(str(path)) + 400
+    assert message.isprintable()
+
+
+def test_an_expansion_that_does_not_start_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "xacro.py").write_text("raise ImportError('a broken installation')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(
+        RobotDescriptionError, match=r"did not start: ImportError: a broken installation\.$"
+    ):
+        load(templated(tmp_path, '<link name="${1}"/>'))
 
 
 def test_the_fault_of_an_included_file_names_that_file(package: Path) -> None:
@@ -258,6 +303,89 @@ def test_the_environment_stays_private(tmp_path: Path, monkeypatch: pytest.Monke
         tmp_path, '<material name="$(optenv KATANA450_SECRET hidden) $(env ROS_DISTRO)"/>'
     )
     assert b"hidden jazzy" in checked(path)
+
+
+@pytest.mark.parametrize("name", ["PATH", "LANG", "HOME"])
+def test_only_variables_of_ros_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("LANG", "C.UTF-8")
+    path = templated(tmp_path, f'<link name="$(env {name})"/>')
+    assert f"line 2: this cannot be expanded: there is no environment variable '{name}'" in (
+        refusal(path)
+    )
+    path = templated(tmp_path, f'<material name="$(optenv {name} hidden)"/>')
+    assert b'"hidden"' in checked(path)
+
+
+OUTSIDE = r"secret\.xacro cannot be opened \(it is outside the packages of the robot\)"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "<link name=\"${xacro.load_yaml('FOLDER/secret.xacro')}\"/>",
+        "<link name=\"${xacro.load_yaml('FOLDER/sec' + 'ret.xacro')}\"/>",
+        '<xacro:include filename="FOLDER/secret.xacro"/>',
+        '<xacro:include filename="../secret.xacro"/>',
+        '<xacro:include filename="../*.xacro"/>',
+        '<xacro:include filename="linked/secret.xacro"/>',
+        '<xacro:include filename="$(find linked)/secret.xacro"/>',
+    ],
+)
+def test_files_outside_the_packages_are_not_read(tmp_path: Path, line: str) -> None:
+    outside = tmp_path / "outside"
+    (outside / "arm").mkdir(parents=True)
+    (outside / "secret.xacro").write_text(OPEN + "</robot>")
+    (outside / "arm" / "linked").symlink_to(outside)
+    path = templated(outside / "arm", line.replace("FOLDER", str(outside)))
+    expected = "no package 'linked'" if "$(find" in line else OUTSIDE
+    found = "" if "*" in line else "line 2: .*"
+    assert re.search(found + expected, refusal(path))
+
+
+def test_a_name_outside_the_packages_that_is_computed_is_refused(tmp_path: Path) -> None:
+    path = templated(tmp_path, "<xacro:include filename=\"/etc/${'host' + 'name'}\"/>")
+    assert "(it is outside the packages of the robot)" in refusal(path)
+
+
+def test_the_root_and_the_home_folder_are_no_places_of_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = tmp_path / "home"
+    (home / "arm").mkdir(parents=True)
+    (home / "letters").mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("USERPROFILE", str(home))
+    for name in ("etc", "home", "letters", tmp_path.name):
+        path = templated(home / "arm", f'<material name="$(find {name})"/>')
+        assert f"line 2: this cannot be expanded: there is no package {name!r}" in refusal(path)
+    (home / "letters" / "package.xml").write_text("<package><name>other</name></package>")
+    path = templated(home / "arm", '<material name="$(find letters)"/>')
+    assert str(home / "letters").encode() in checked(path)
+
+
+def test_a_package_installed_as_links_to_its_source_is_read(package: Path, tmp_path: Path) -> None:
+    installed = tmp_path / "share" / PACKAGE.name
+    for file in package.rglob("*"):
+        if file.is_file():
+            link = installed / file.relative_to(package)
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to(file)
+    assert load(installed / "urdf" / FILE.name).require_arm().chain.n == 5
+
+
+def test_a_package_without_a_manifest_is_found_by_its_folder(tmp_path: Path) -> None:
+    package = shutil.copytree(PACKAGE, tmp_path / PACKAGE.name)
+    (package / "package.xml").unlink()
+    assert load(package / "urdf" / FILE.name).require_arm().chain.n == 5
+
+
+def test_the_expansion_starts_nothing() -> None:
+    guard = FileGuard(FILE)
+    for event in FORBIDDEN:
+        with pytest.raises(Exception, match=f"it must not call {event}"):
+            guard(event, ())
 
 
 def test_plain_values_keep_their_methods() -> None:

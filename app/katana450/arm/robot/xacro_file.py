@@ -19,8 +19,11 @@ MAX_MEMORY_BYTES = 1 << 30
 MAX_BYTES = 20_000_000
 """[bytes] Maximum size of the expanded text."""
 
-PASSED_ON = ("AMENT_", "COLCON_", "CMAKE_PREFIX_PATH", "LANG", "LC_", "PATH", "PYTHON", "ROS_")
+READABLE = ("AMENT_", "COLCON_", "CMAKE_PREFIX_PATH", "ROS_")
 """Beginnings of the names of environment variables that a file can read."""
+
+PASSED_ON = (*READABLE, "HOME", "LANG", "LC_", "PATH", "PYTHON", "USERPROFILE")
+"""Beginnings of the names of environment variables that the subprocess gets."""
 
 
 def expanded(path: Path) -> bytes:
@@ -45,20 +48,25 @@ def expanded(path: Path) -> bytes:
             cwd=Path(__file__).resolve().parents[3],
             env=environment,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            capture_output=True,
             timeout=SECONDS,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
         raise _too_large(path) from error
-    if done.returncode:
+    # A negative code is the signal that ended it, at the limits or for want of memory.
+    if done.returncode < 0:
         raise _too_large(path)
+    if done.returncode:
+        why = done.stderr.decode(errors="replace").strip().rpartition("\n")[2].strip()
+        raise RobotDescriptionError(
+            f"{path} cannot be expanded: the program that expands xacro did not start: {why}."
+        )
     answer = json.loads(done.stdout)
     if "urdf" in answer:
         urdf: bytes = answer["urdf"].encode()
         return urdf
-    where = str(path) if Path(answer["file"]) == path.absolute() else f"{path}: {answer['file']}"
+    where = str(path) if answer["file"] is None else f"{path}: {answer['file']}"
     line = "" if answer["line"] is None else f", line {answer['line']}"
     raise RobotDescriptionError(f"{where}{line}: this cannot be expanded: {answer['what']}.")
 

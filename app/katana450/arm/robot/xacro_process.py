@@ -1,16 +1,19 @@
 """The subprocess that expands one xacro file.
 
-``expanded`` starts it as ``python -m katana450.arm.robot.xacro_process FILE``. It limits its memory
-and time before it reads the file, and writes JSON to standard output: {"urdf": text}, or the fault
-as {"what", "file", "line"}; the line is null where it is unknown.
+``expanded`` starts it as ``python -m katana450.arm.robot.xacro_process FILE``. Before it reads the
+file, it limits its memory and time and the files that it can open. It writes JSON to standard
+output: {"urdf": text}, or the fault as {"what", "file", "line"}. The file is null if it is FILE,
+and the line if it is unknown.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
 from collections.abc import Mapping
+from contextlib import redirect_stderr, suppress
 from pathlib import Path
 from typing import Any
 from xml.parsers.expat import ErrorString, ExpatError
@@ -18,9 +21,9 @@ from xml.parsers.expat import ErrorString, ExpatError
 import xacro
 from xacro import substitution_args
 
-from katana450.arm.robot.ros_package import package_folder
+from katana450.arm.robot import ros_package as ros
 from katana450.arm.robot.xacro_expression import evaluated
-from katana450.arm.robot.xacro_file import MAX_BYTES, MAX_MEMORY_BYTES, SECONDS
+from katana450.arm.robot.xacro_file import MAX_BYTES, MAX_MEMORY_BYTES, READABLE, SECONDS
 from katana450.platform_support import limit_resources
 
 HIDDEN = ("type", "vars")
@@ -30,6 +33,12 @@ LEGACY = ("include", "macro", "property")
 """Elements of xacro that older files have at their top without its prefix; a URDF has none there.
 """
 
+FORBIDDEN = ("os.exec", "os.posix_spawn", "os.system", "socket.connect", "subprocess.Popen")
+"""Audit events of Python that no expansion causes."""
+
+MAX_WHAT = 300
+"""Maximum number of characters of a fault; an error of Python can quote a whole value."""
+
 ENDLESS = "its macros, properties or includes contain themselves"
 
 
@@ -37,14 +46,41 @@ class _FaultError(Exception):
     """A fault that this module found, as a clause."""
 
 
+class FileGuard:
+    """An audit hook of Python that lets this process open only files of packages and of Python.
+
+    ``path`` is the xacro file. ``folders`` are the folders of its package, of those that the
+    environment names, and of Python.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.folders: set[Path] = set()
+        # Python loads some of its modules when they are first used.
+        python = map(Path, (sys.prefix, sys.base_prefix, *sys.path))
+        own = (ros.package_of(path), ros.package_of(path.resolve()))
+        for folder in (*own, *ros.workspaces(), *python):
+            self.folders |= ros.real_folders(folder)
+
+    def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
+        """Refuse the event by an exception, or do nothing."""
+        if event in FORBIDDEN:
+            raise _FaultError(f"it must not call {event}")
+        if event == "open" and not isinstance(arguments[0], int):
+            name = os.fsdecode(arguments[0])
+            real = Path(os.path.realpath(name))
+            if not any(real.is_relative_to(folder) for folder in self.folders):
+                raise PermissionError(errno.EACCES, "it is outside the packages of the robot", name)
+
+
 class Expansion:
-    """The expansion of the file at ``path``.
+    """The expansion of the file at ``path``; each package it finds is added to ``folders``.
 
     It replaces the parts of xacro that evaluate expressions and that ask ROS or the environment.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, folders: set[Path]) -> None:
         self._path = path
+        self._folders = folders
         self._at_fault = ""
         """Text in the line at fault."""
         for name in HIDDEN:
@@ -64,6 +100,8 @@ class Expansion:
         try:
             document = xacro.process_file(str(self._path), mappings={}, verbosity=0)
             urdf = document.documentElement.toxml()
+            # Half of a surrogate pair is no character of a file.
+            urdf.encode()
         except Exception as error:
             return self._fault(error)
         if len(urdf) > MAX_BYTES:
@@ -82,7 +120,10 @@ class Expansion:
         self, text: str, symbols: dict[str, Any], names: Mapping[str, Any] | None = None
     ) -> object:
         try:
-            return evaluated(text, symbols, names)
+            value = evaluated(text, symbols, names)
+            if isinstance(value, str):
+                value.encode()
+            return value
         except Exception:
             # The innermost expression is at fault.
             self._at_fault = self._at_fault or text
@@ -104,8 +145,9 @@ class Expansion:
         raise _FaultError(f"there is no environment variable {name!r} of ROS")
 
     def _eval_find(self, package: str) -> str:
-        folder = package_folder(package, self._path.parent)
+        folder = ros.package_folder(package, self._path.parent)
         if folder is not None:
+            self._folders |= ros.real_folders(folder)
             return str(folder)
         self._at_fault = f"find {package}"
         raise _FaultError(
@@ -125,29 +167,40 @@ class Expansion:
         elif isinstance(cause, _FaultError):
             what = str(cause)
         elif isinstance(cause, OSError):
-            self._at_fault = Path(str(cause.filename)).name
+            self._at_fault = self._at_fault or Path(str(cause.filename)).name
             what = f"{cause.filename} cannot be opened ({cause.strerror})"
         elif self._at_fault:
             what = f"{_reason(cause)}, in the expression {self._at_fault!r}"
         else:
-            what = str(cause).strip().rstrip(".")
+            what = _reason(cause).rstrip(".")
             self._at_fault = what.rpartition("xacro:")[2]
         stack = [*xacro.filestack, *(macro.history[-1][-1] for macro in xacro.macrostack)]
-        file = Path(stack[-1])
+        # An included file that could not be opened can be left on the stack.
+        file = next((Path(each) for each in reversed(stack) if os.path.isfile(each)), self._path)
         if line is None and self._at_fault:
             for each in (*reversed(stack), *xacro.all_includes):
                 line = _line(Path(each), self._at_fault)
                 if line is not None:
                     file = Path(each)
                     break
-        return {"what": what, "file": str(file), "line": line}
+        other = None if file == self._path else _shown(str(file))
+        return {"what": _shown(what), "file": other, "line": line}
+
+
+def _shown(text: str) -> str:
+    """Return the first MAX_WHAT characters of ``text``, each other than printable as "?"."""
+    return "".join(each if each.isprintable() else "?" for each in text[:MAX_WHAT])
 
 
 def _reason(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return "it needs too much memory"
     if isinstance(error, NameError):
         return f"{error.name!r} is not defined" if error.name else str(error)
     if isinstance(error, KeyError):
         return f"there is no {error}"
+    if isinstance(error, UnicodeEncodeError):
+        return "a surrogate is not a character"
     if isinstance(error, SyntaxError):
         return "the syntax is wrong"
     return (str(error).strip() or type(error).__name__).splitlines()[0]
@@ -155,14 +208,26 @@ def _reason(error: Exception) -> str:
 
 def _line(file: Path, text: str) -> int | None:
     """Return the number of the first line of ``file`` that contains ``text``, from 1."""
-    lines = file.read_text(errors="replace").splitlines() if file.is_file() else []
-    return next((number for number, line in enumerate(lines, start=1) if text in line), None)
+    with suppress(OSError):
+        lines = file.read_text(errors="replace").splitlines() if file.is_file() else []
+        return next((number for number, line in enumerate(lines, start=1) if text in line), None)
+    return None
 
 
 def main(path: Path) -> None:
     """Expand the file at ``path``. The process fails only at the limits of memory and time."""
     limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
-    print(json.dumps(Expansion(path).run()))
+    guard = FileGuard(path)
+    for name in [each for each in os.environ if not each.startswith(READABLE)]:
+        del os.environ[name]
+    # The messages of the file are dropped; standard error tells why this program did not start.
+    with Path(os.devnull).open("w") as null, redirect_stderr(null):
+        sys.addaudithook(guard)
+        try:
+            answer = json.dumps(Expansion(path, guard.folders).run())
+        except MemoryError as error:
+            answer = json.dumps({"what": _reason(error), "file": None, "line": None})
+    print(answer)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,10 @@ from katana450.server.view.controls import Listen, set_value
 from katana450.server.view.pose_display import BASE, SHOULDER, UNITS, PoseDisplay
 
 MAX_TYPED_POSITION = 1.0
-"""Maximum [m] of a typed coordinate, beyond any tool point of the arm."""
+"""Maximum [m] of a typed coordinate, beyond any tool point of the arm.
+
+It is more while a coordinate exceeds it, typed in another frame.
+"""
 
 ANGLE_DECIMALS = 1
 
@@ -112,10 +115,12 @@ class PoseForm:
         """Show the pose ``T`` (4, 4) in {S}."""
         unit = self.display.unit
         position, angles = self.display.numbers(T)
-        end = MAX_TYPED_POSITION * unit.per_metre
+        shown = _rounded(position, unit.decimals)
+        # The page sends all three numbers when one is edited, so each must be allowed.
+        end = max(MAX_TYPED_POSITION * unit.per_metre, *(abs(x) + unit.step for x in shown))
         self._position.min, self._position.max = (-end, -end, -end), (end, end, end)
         self._position.step, self._position.precision = unit.step, unit.decimals
-        set_value(self._position, _rounded(position, unit.decimals))
+        set_value(self._position, shown)
         set_value(self._angles, _rounded(angles, ANGLE_DECIMALS))
 
 

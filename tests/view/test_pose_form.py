@@ -1,0 +1,55 @@
+"""The numbers of the form of the tool pose stay between their limits in every frame and unit."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+import viser
+
+from katana450.arm.control.session import Session
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.server.view.controls import listener
+from katana450.server.view.pose_display import BASE, SHOULDER
+from katana450.server.view.pose_form import PoseForm
+from katana450.server.viser_bridge.guard import Guard
+from tests.view.gestures import RecordedGestures
+from tests.viser_bridge import internals
+
+
+@pytest.fixture
+def form(server: viser.ViserServer, arm: MountedArm, session: Session) -> PoseForm:
+    state = session.begin(session.ready, 0.0, 0.0)
+    return PoseForm(server.gui, arm, listener(RecordedGestures()), state)
+
+
+def control(server: viser.ViserServer, label: str) -> Any:
+    (found,) = (each for each in internals.controls(server) if each.label == label)
+    return found
+
+
+def choose_frame(server: viser.ViserServer, frame: str) -> None:
+    """Choose ``frame`` and wait until the numbers are converted."""
+    before = control(server, "x, y, z").value
+    control(server, "Frame").value = frame
+    end = time.monotonic() + 10.0
+    while control(server, "x, y, z").value == before:
+        assert time.monotonic() < end, "the numbers are not converted"
+        time.sleep(0.01)
+
+
+@pytest.mark.usefixtures("form")
+def test_a_position_beyond_the_limit_in_another_frame_can_be_edited(
+    server: viser.ViserServer,
+) -> None:
+    position, guard = control(server, "x, y, z"), Guard(server)
+    position.value = (0.0, 0.0, 1000.0)
+    choose_frame(server, BASE)
+    x, y, z = position.value
+    assert z > 1000.0
+    assert guard.objection(internals.value_change(position, (x + 400.0, y, z))) is None
+    assert guard.objection(internals.value_change(position, (x, y, z + 100.0))) is not None
+    choose_frame(server, SHOULDER)
+    assert position.value == pytest.approx((0.0, 0.0, 1000.0))
+    assert guard.objection(internals.value_change(position, (0.0, 0.0, 1002.0))) is not None
