@@ -39,6 +39,12 @@ const Jog = (() => {
     show();
   }
 
+  function release(code) {
+    if (!keys.delete(code)) return;
+    show();
+    sendJog();
+  }
+
   function show() {
     for (const kbd of document.querySelectorAll("#jog kbd"))
       kbd.classList.toggle("on", keys.has(`Key${kbd.textContent}`));
@@ -48,11 +54,12 @@ const Jog = (() => {
 
   // Return whether the key moves the arm or its gripper and was handled.
   function key(event) {
-    if (!open || event.ctrlKey || event.metaKey || event.altKey) return false;
+    if (!open) return false;
+    if (event.ctrlKey || event.metaKey || event.altKey) return quiet(), false;
     if (steps?.key(event, KEYS)) return true;
     if (!(event.code in KEYS)) return false;
-    if (event.type === "keydown") keys.add(event.code);
-    else keys.delete(event.code);
+    // What was held at a STOP counts again only after it was released.
+    if (event.type === "keydown" && !event.repeat) keys.add(event.code);
     show();
     sendJog();
     return true;
@@ -199,6 +206,7 @@ const Jog = (() => {
       navigator.hid.getDevices().then((known) => known.forEach(adopt)).catch(() => {});
     }
     document.addEventListener("visibilitychange", () => document.hidden && quiet());
+    byId("jog").addEventListener("change", quiet);
     setInterval(sendJog, EVERY);
   }
 
@@ -218,6 +226,7 @@ const Jog = (() => {
   return {
     begin,
     key,
+    release,
     quiet,
     show(shown) {
       open = shown;

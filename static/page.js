@@ -105,6 +105,8 @@
   // Called for keys in both documents. Space and Esc only stop the arm, whatever has the focus.
   function key(event) {
     const ends = event.key === " " || event.key === "Escape";
+    // Also in a text box, to which the focus may have moved.
+    if (event.type === "keyup") Jog.release(event.code);
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
       if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();

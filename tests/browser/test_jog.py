@@ -52,6 +52,25 @@ def test_a_held_key_moves_the_tool_along_one_axis(
     assert np.allclose(camera(page), looked, atol=1e-6)
 
 
+@pytest.mark.parametrize("between", ["Control", "#own-name"])
+def test_released_key_ends_its_jog_whatever_was_pressed_or_has_the_focus(
+    page: ViserPage, truth: Truth, between: str
+) -> None:
+    page.page.click("#jog-button")
+    page.page.click("#more-button")
+    page.page.evaluate("() => document.activeElement.blur()")
+    page.page.keyboard.down("KeyW")
+    truth.wait(moving=True)
+    if between == "Control":
+        page.page.keyboard.down(between)
+    else:
+        page.page.focus(between)
+    page.page.keyboard.up("KeyW")
+    page.page.keyboard.up("Control")
+    truth.wait(moving=False)
+    page.page.click("#more-button")
+
+
 def test_pads_and_buttons_move_while_they_are_held(
     page: ViserPage, truth: Truth, artefacts: Path
 ) -> None:

@@ -77,6 +77,17 @@ def test_one_press_is_one_step(sheet: ViserPage, truth: Truth, artefacts: Path) 
     truth.wait(10.0, moving=False)
 
 
+def test_key_held_while_a_step_is_chosen_is_released(sheet: ViserPage, truth: Truth) -> None:
+    sheet.page.keyboard.down("KeyA")
+    truth.wait(moving=True)
+    choose(sheet, "step", "1")
+    start = tool(truth)
+    sheet.page.keyboard.up("KeyA")
+    choose(sheet, "step", "0")
+    sheet.page.wait_for_timeout(300)
+    assert np.allclose(tool(truth), start, atol=EXACT)
+
+
 def test_joints_move_by_steps(sheet: ViserPage, truth: Truth) -> None:
     start = np.array(truth.status()["q"])
     choose(sheet, "frame", "joints")
