@@ -184,6 +184,24 @@ def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
         assert found["shown"] == 0
 
 
+@pytest.mark.parametrize("size", ["portrait", "landscape"])
+def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
+    server: AppServer, open_page: OpenPage, size: str
+) -> None:
+    page = open_page(server.url, window=SIZES[size], own_camera=True, script=FIRST_VISIT)
+    page.page.wait_for_selector("#welcome:not([hidden])")
+    # As before the scene is drawn, and with a poster that can be found by a pixel.
+    hit = page.page.evaluate(
+        """() => {
+            const poster = document.getElementById("poster");
+            poster.style.cssText = "opacity: 1; visibility: visible; pointer-events: auto";
+            const box = document.querySelector("#welcome li button").getBoundingClientRect();
+            return document.elementFromPoint(box.left + 20, box.top + 20).closest("#poster, #welcome").id;
+        }"""
+    )
+    assert hit == "welcome"
+
+
 @pytest.mark.parametrize("size", list(SIZES))
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_card_fits_every_size(
