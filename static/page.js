@@ -291,7 +291,10 @@
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
       // The message has only the changes.
+      const stood = status?.stopped;
       status = { ...status, ...data.heard };
+      // What is held when the stop is cleared must not move the arm, whoever stopped and cleared it.
+      if (stood || status.stopped) Jog.quiet();
       byId("gate").hidden = true;
       proven = null;
       draw();
