@@ -286,7 +286,7 @@
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
-    else if (data.heard && More.hear(data.heard)) return drawLink();
+    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard))) return drawLink();
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
@@ -358,7 +358,7 @@
   async function showWelcome() {
     const { Welcome } = await import("./welcome/welcome.js");
     if (welcome) welcome.show();
-    else welcome = new Welcome({ say, kept, scene });
+    else welcome = new Welcome({ say, kept, scene, name: () => status?.name });
   }
   byId("welcome-button").addEventListener("click", () => {
     help.close();

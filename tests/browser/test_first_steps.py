@@ -11,8 +11,15 @@ import trimesh
 from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth
+from tests.browser.session import MOVE, Truth, take
 from tests.gateway.slow_link import SlowLink
+
+WORKER = """
+    if (window === top) window.Worker = class extends Worker {
+        constructor(...options) { super(...options); window.worker = this; }
+    };
+"""
+"""Script that keeps the worker through which the page speaks to the server."""
 
 NIGHT = "rgb(20, 24, 29)"
 
@@ -112,7 +119,37 @@ def test_pouring_is_planned_with_progress_and_runs(
     assert truth.status()["water"]["basin_ml"] > 190.0
 
 
+def test_pouring_leaves_another_program_paused(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), script=f"{FIRST_VISIT}{WORKER}")
+    truth = Truth(server)
+    take(page)
+
+    def ask(**request: object) -> None:
+        page.page.evaluate("(say) => worker.postMessage({say})", request)
+
+    def status() -> str | None:
+        program = truth.status()["program"]
+        return program and f"{program['name']} {program['status']}"
+
+    ask(do="program", text="name: Mine\nsteps:\n  - joints: [40, -60, 100, 40, 0]\n  - home\n")
+    page.wait_until(lambda: status() == "Mine ready", "the plan", seconds=30.0)
+    ask(do="steer", order="run")
+    truth.wait(moving=True)
+    ask(do="steer", order="pause")
+    truth.wait(moving=False, status="paused")
+    press(page, "Watch it pour")
+    says = page.page.locator("#welcome [role=status]")
+    says.filter(has_text="It did not pour. A program is running. End it first.").wait_for()
+    page.page.wait_for_timeout(500)
+    assert truth.status()["status"] == "paused"
+    assert not done(page, "Watch it pour")
+    ask(do="steer", order="end")
+    page.wait_until(lambda: status() == "Mine stopped", "the end")
+
+
 def test_planning_is_shown_and_a_stop_ends_it(visit: ViserPage, server: AppServer) -> None:
+    # A failed look is repeated.
+    visit.page.route("**/api/v1/state", lambda route: route.abort(), times=1)
     press(visit, "Watch it pour")
     says = visit.page.locator("#welcome [role=status]")
     visit.wait_until(lambda: "Planning" in says.inner_text(), "the planning")
@@ -190,11 +227,11 @@ def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
 ) -> None:
     page = open_page(server.url, window=SIZES[size], own_camera=True, script=FIRST_VISIT)
     page.page.wait_for_selector("#welcome:not([hidden])")
-    # As before the scene is drawn, and with a poster that can be found by a pixel.
+    # The poster is shown as before the scene is drawn, and is found by a pixel.
     hit = page.page.evaluate(
         """() => {
             const poster = document.getElementById("poster");
-            poster.style.cssText = "opacity: 1; visibility: visible; pointer-events: auto";
+            poster.style.cssText = "visibility: visible; pointer-events: auto; transition: none";
             const box = document.querySelector("#welcome li button").getBoundingClientRect();
             return document.elementFromPoint(box.left + 20, box.top + 20).closest("#poster, #welcome").id;
         }"""
