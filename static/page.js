@@ -110,6 +110,8 @@
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
       if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();
+    } else if (event.key === "Enter" && event.repeat && event.target?.closest?.("button")) {
+      // A key that stays pressed is one click.
     } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
       if (!event.repeat) say({ do: "go" });
     } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event))) return;

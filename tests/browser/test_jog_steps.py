@@ -67,7 +67,9 @@ def test_one_press_is_one_step(sheet: ViserPage, truth: Truth, artefacts: Path) 
     wait_for(sheet, truth, np.add(start, (-0.001, 0.03, -0.001)))
     choose(sheet, "step", "0.1")
     sheet.page.get_by_role("button", name="x minus 0.1 mm").focus()
-    sheet.page.keyboard.press("Enter")
+    for _ in range(3):
+        sheet.page.keyboard.down("Enter")
+    sheet.page.keyboard.up("Enter")
     wait_for(sheet, truth, np.add(start, (-0.0011, 0.03, -0.001)))
     # Back at Hold, the pads are there again and the keys move while they are held.
     choose(sheet, "step", "0")
