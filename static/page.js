@@ -184,8 +184,28 @@
     list.setAttribute("aria-label", "Hand over to");
     list.add(new Option("Hand over to …", ""));
     for (const { number, name } of others) list.add(new Option(name, number));
-    list.addEventListener("change", () => list.value && say({ do: "give", to: Number(list.value) }));
+    // On a closed list, a key changes the choice at once; it is sent by Enter.
+    let byKeys = false;
+    const give = () => list.value && say({ do: "give", to: Number(list.value) });
+    list.addEventListener("pointerdown", () => (byKeys = false));
+    list.addEventListener("keydown", ({ key }) => {
+      if (key === "Enter") give();
+      byKeys = true;
+    });
+    list.addEventListener("change", () => byKeys || give());
+    list.addEventListener("blur", () => (list.value = ""));
     return list;
+  }
+
+  // Replace the controls in `group`. The focus, and the choice of a list, stay with the same label.
+  function keepingFocus(group, controls) {
+    /** @type {any} */
+    const old = document.activeElement;
+    const label = (each) => each.getAttribute("aria-label") ?? each.textContent;
+    const same = group.contains(old) && controls.find((each) => label(each) === label(old));
+    if ([...(same?.options ?? [])].some(({ value }) => value === old.value)) same.value = old.value;
+    group.replaceChildren(...controls);
+    if (same) same.focus();
   }
 
   let [drawnActs, drawnOrders] = ["", ""];
@@ -218,13 +238,13 @@
     const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
     if (key !== drawnActs) {
       drawnActs = key;
-      byId("acts").replaceChildren(...acts());
+      keepingFocus(byId("acts"), acts());
     }
     const orders = [status.planning, ...status.orders].join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
       const made = (order) => act(status.planning ? "Cancel" : "End", { do: "steer", order });
-      byId("orders").replaceChildren(...status.orders.map(made));
+      keepingFocus(byId("orders"), status.orders.map(made));
     }
     Pace.draw(up ? status : null);
     More.draw(status.name);
@@ -334,7 +354,7 @@
   More.begin({ say, toast, kept, view: () => window.katana.view });
   Jog.begin({ say, stop });
   Objects.begin({ say });
-  Edit.begin({ say, toast });
+  Edit.begin({ say, toast, connected: () => up });
   // Who is connected, for admins; loaded on first use.
   byId("people-button").addEventListener("click", async () => {
     help.close();
