@@ -155,6 +155,17 @@ def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> 
     assert np.allclose(truth.status()["q"], moved, atol=1e-6)
 
 
+def test_undo_is_on_the_letter_z_and_needs_a_connection(page: ViserPage) -> None:
+    press = """([code, key]) => document.body.dispatchEvent(
+        new KeyboardEvent("keydown", {code, key, ctrlKey: true, bubbles: true}))"""
+    # On a German keyboard, Y and Z have changed places.
+    page.page.evaluate(press, ["KeyZ", "y"])
+    page.page.wait_for_timeout(300)
+    assert "ndo" not in bar(page, "toast")
+    page.page.evaluate(press, ["KeyY", "z"])
+    page.wait_until(lambda: "ndo" in bar(page, "toast"), "the undo")
+
+
 def test_undo_in_a_text_box_is_that_of_the_browser(page: ViserPage, truth: Truth) -> None:
     start = np.array(truth.status()["goal"])
     page.drag_arrow(MOVE, "y", 0.1)
