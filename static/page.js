@@ -31,15 +31,19 @@
   let proven = null; // cause of a stop confirmed on another path
   let people = null;
 
-  // A reloaded page keeps its name; a second tab gets another.
+  // A reloaded page keeps its name; a second tab gets another. A browser may refuse to store it.
   function name() {
     /** @type {any[]} */
     const [entry] = performance.getEntriesByType("navigation");
     const again = entry?.type === "reload";
-    const old = again && sessionStorage.getItem("page");
     const fresh = randomName();
-    sessionStorage.setItem("page", old || fresh);
-    return old || fresh;
+    try {
+      const old = again && sessionStorage.getItem("page");
+      sessionStorage.setItem("page", old || fresh);
+      return old || fresh;
+    } catch {
+      return fresh;
+    }
   }
 
   function randomName() {
@@ -250,6 +254,7 @@
     More.draw(status.name);
     const simulated = status.silence_profile === "simulation";
     text("on-silence", simulated ? SIMULATION : "stops after a quarter of a second");
+    if (!up) unknown();
   }
 
   // Without a connection the state of the arm is unknown.

@@ -11,7 +11,7 @@ import trimesh
 from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth, take
+from tests.browser.session import MOVE, Truth, clear_stop, take
 from tests.gateway.slow_link import SlowLink
 
 WORKER = """
@@ -51,9 +51,10 @@ SETTINGS = """
 
 SIZES = {"wide": (1440, 900), "portrait": (390, 844), "landscape": (844, 390)}
 
-NO_STORAGE = """Object.defineProperty(window, "localStorage", {get() {
-    throw new DOMException("No storage in this window.", "SecurityError");
-}});"""
+NO_STORAGE = """for (const each of ["localStorage", "sessionStorage"])
+    Object.defineProperty(window, each, {get() {
+        throw new DOMException("No storage in this window.", "SecurityError");
+    }});"""
 
 
 @pytest.fixture(scope="module")
@@ -187,6 +188,11 @@ def test_window_without_storage_shows_the_card(server: AppServer, open_page: Ope
     page.page.wait_for_selector("#welcome:not([hidden])")
     page.page.get_by_role("button", name="Close for good").click()
     assert not page.page.locator("#welcome").is_visible()
+    page.page.keyboard.press("Space")
+    Truth(server).wait(mood="stopped")
+    page.page.wait_for_timeout(1100)
+    take(page)
+    clear_stop(page, Truth(server))
     assert page.errors == []
 
 
