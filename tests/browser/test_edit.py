@@ -114,7 +114,8 @@ def test_bar_of_an_object_at_the_edge_stays_below_stop(page: ViserPage, reader: 
         page.page.wait_for_timeout(400)
         on_top = page.page.evaluate(
             """() => {
-                const { left, right, top, bottom } = document.getElementById("stop").getBoundingClientRect();
+                const stop = document.getElementById("stop");
+                const { left, right, top, bottom } = stop.getBoundingClientRect();
                 const found = new Set();
                 for (let x = left + 5; x < right - 5; x += 10)
                     for (let y = top + 5; y < bottom - 5; y += 8)

@@ -239,7 +239,8 @@ def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
             const poster = document.getElementById("poster");
             poster.style.cssText = "visibility: visible; pointer-events: auto; transition: none";
             const box = document.querySelector("#welcome li button").getBoundingClientRect();
-            return document.elementFromPoint(box.left + 20, box.top + 20).closest("#poster, #welcome").id;
+            const found = document.elementFromPoint(box.left + 20, box.top + 20);
+            return found.closest("#poster, #welcome").id;
         }"""
     )
     assert hit == "welcome"
