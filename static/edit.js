@@ -5,13 +5,14 @@ const Edit = (() => {
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   const scene = byId("scene");
-  let page = null; // {say, toast}
+  let page = null; // {say, toast, connected}
   let undoable = []; // names of the changes that can be undone, the newest first
   let selection = null; // loaded with the first click into the scene
   let pressed = null;
   let leaving = null;
 
   function undo() {
+    if (!page.connected()) return page.toast("No connection to the arm.");
     if (undoable.length) page.toast(`Undo: ${undoable[0]}`);
     page.say({ do: "undo", id: "undo" });
   }
@@ -19,7 +20,9 @@ const Edit = (() => {
   // Return whether the key was handled.
   function key(event) {
     if (event.type !== "keydown" || event.altKey) return false;
-    if (event.code === "KeyZ" && (event.ctrlKey || event.metaKey) && !event.shiftKey) {
+    // The letter on the key, which is elsewhere on other keyboards; the place of the key if it has no such letter.
+    const isZ = /^[a-z]$/i.test(event.key) ? event.key.toLowerCase() === "z" : event.code === "KeyZ";
+    if (isZ && (event.ctrlKey || event.metaKey) && !event.shiftKey) {
       if (!event.repeat) undo();
       return true;
     }

@@ -97,10 +97,23 @@ const Fields = (() => {
     }
   });
 
+  // A draft of before a stop, or of before its end, must not be sent by a later click, whoever clears it.
+  function heed() {
+    let before = stopped();
+    new MutationObserver(() => {
+      if (stopped() === before) return;
+      before = !before;
+      if (box) restore(box);
+    }).observe(window.parent.document.body, { attributeFilter: ["data-mood"] });
+  }
+
   return {
     // Store the ranges and steps of the controls from messages of the server.
     hear: (messages) => Viser.keepControls(controls, messages),
     // `say` shows a sentence to the person.
-    begin: (say) => (tell = say),
+    begin(say) {
+      tell = say;
+      if (window.parent !== window) heed();
+    },
   };
 })();

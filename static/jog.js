@@ -8,6 +8,7 @@ const Jog = (() => {
   const DEAD = 0.12; // fraction of a stick's travel that counts as zero
   const MOUSE_FULL = 350; // value of a SpaceMouse at full deflection
   const MOUSE_FRESH = 150; // ms for which a report is valid; it reports all the time while held
+  const MOUSE_RESTS = 1000; // ms without a report after which it is at rest
   // x, y, z, pitch, roll
   const KEYS = {
     KeyW: [0, 1], KeyS: [0, -1], KeyA: [1, 1], KeyD: [1, -1], KeyR: [2, 1], KeyF: [2, -1],
@@ -22,7 +23,9 @@ const Jog = (() => {
   const keys = new Set();
   const pads = { plane: none(), lift: none() };
   const holds = new Set();
-  let mouse = { rates: none(), at: 0 };
+  let mouse = { rates: none(), at: -Infinity };
+  // Whether gamepad and SpaceMouse have to return to rest before they count.
+  const parked = { pad: true, mouse: false };
   let open = false;
   let steps = null; // steps and gripper, loaded when the sheet is first opened
   let loading = false;
@@ -35,8 +38,15 @@ const Jog = (() => {
     keys.clear();
     holds.clear();
     for (const pad of Object.keys(pads)) centre(byId(pad), pads[pad]);
-    mouse.at = 0;
+    parked.pad = true;
+    parked.mouse ||= mouse.rates.some(Boolean);
     show();
+  }
+
+  function release(code) {
+    if (!keys.delete(code)) return;
+    show();
+    sendJog();
   }
 
   function show() {
@@ -48,11 +58,12 @@ const Jog = (() => {
 
   // Return whether the key moves the arm or its gripper and was handled.
   function key(event) {
-    if (!open || event.ctrlKey || event.metaKey || event.altKey) return false;
+    if (!open) return false;
+    if (event.ctrlKey || event.metaKey || event.altKey) return quiet(), false;
     if (steps?.key(event, KEYS)) return true;
     if (!(event.code in KEYS)) return false;
-    if (event.type === "keydown") keys.add(event.code);
-    else keys.delete(event.code);
+    // What was held at a STOP counts again only after it was released.
+    if (event.type === "keydown" && !event.repeat) keys.add(event.code);
     show();
     sendJog();
     return true;
@@ -104,16 +115,18 @@ const Jog = (() => {
     if (pressed(1) && !stopHeld) stop();
     stopHeld = pressed(1);
     const held = pressed(4) || pressed(5);
-    steps?.grip(held && pressed(3), held && pressed(0));
-    if (!held) return none();
+    if (!held) parked.pad = false;
+    const counts = open && held && !parked.pad;
+    steps?.grip(counts && pressed(3), counts && pressed(0));
+    if (!counts) return none();
     const [x = 0, y = 0, u = 0, v = 0] = found.axes;
     return [-bent(y), -bent(x), -bent(v), Number(pressed(12)) - Number(pressed(13)), bent(u)];
   }
 
   function report({ reportId, data }) {
     const number = (at) => (data.byteLength >= at + 2 ? data.getInt16(at, true) / MOUSE_FULL : 0);
-    const old = performance.now() - mouse.at > MOUSE_FRESH;
-    const rates = old ? none() : mouse.rates;
+    const age = performance.now() - mouse.at;
+    const rates = age > MOUSE_FRESH ? none() : mouse.rates;
     if (reportId === 1) {
       // The axes of the device: x to the right, y towards the person, z down.
       [rates[0], rates[1], rates[2]] = [-number(2), -number(0), -number(4)].map(bent);
@@ -124,6 +137,7 @@ const Jog = (() => {
       return;
     } else return;
     mouse = { rates, at: performance.now() };
+    if (age > MOUSE_RESTS || !rates.some(Boolean)) parked.mouse = false;
     sendJog();
   }
 
@@ -139,8 +153,9 @@ const Jog = (() => {
   }
 
   function rates() {
-    if (!open) return none();
+    // Its button for STOP counts also with the sheet closed.
     const pad = gamepad();
+    if (!open) return none();
     steps?.deflect(steps.on ? pad : none());
     if (steps?.on) return none();
     const sum = none();
@@ -149,7 +164,7 @@ const Jog = (() => {
     for (const hold of holds) sum[HOLDS[hold][0]] += HOLDS[hold][1];
     Object.values(pads).forEach(add);
     add(pad);
-    if (performance.now() - mouse.at < MOUSE_FRESH) add(mouse.rates);
+    if (!parked.mouse && performance.now() - mouse.at < MOUSE_FRESH) add(mouse.rates);
     return sum.map((value, i) => Math.max(-1, Math.min(1, value)) * (i < 3 ? LINEAR : ANGULAR));
   }
 
@@ -199,6 +214,7 @@ const Jog = (() => {
       navigator.hid.getDevices().then((known) => known.forEach(adopt)).catch(() => {});
     }
     document.addEventListener("visibilitychange", () => document.hidden && quiet());
+    byId("jog").addEventListener("change", quiet);
     setInterval(sendJog, EVERY);
   }
 
@@ -218,6 +234,7 @@ const Jog = (() => {
   return {
     begin,
     key,
+    release,
     quiet,
     show(shown) {
       open = shown;

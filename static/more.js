@@ -14,6 +14,7 @@ const More = (() => {
   let kept = null;
   let wanted = ""; // name that was sent and not answered yet
   let known = ""; // name that the server shows
+  let chosen = ""; // name that the server has taken, if the browser stores none
 
   const refuse = (words) => {
     why.textContent = words;
@@ -83,10 +84,10 @@ const More = (() => {
   // Take the name in a status; use the kept one for a person whom the server has named.
   function draw(name) {
     if (name === known) return;
-    const first = known === "";
     known = name;
-    const own = kept?.getItem(NAME);
-    if (first && own && own !== name && /^Window \d+$/.test(name)) ask(own);
+    const own = kept?.getItem(NAME) ?? chosen;
+    // A server that was restarted has forgotten it.
+    if (own && own !== name && /^Window \d+$/.test(name)) ask(own);
   }
 
   // Take an answer; return whether it was for the menu.
@@ -96,7 +97,8 @@ const More = (() => {
       refuse(answer.why);
       if (!dialog.open) toast(answer.why);
     } else {
-      kept?.setItem(NAME, wanted.trim());
+      chosen = wanted.trim();
+      kept?.setItem(NAME, chosen);
       refuse("");
       if (dialog.open) dialog.close();
     }

@@ -1,7 +1,8 @@
 // Pause or Resume, and Speed: one set of controls in the bar for whatever moves, hand or program.
 "use strict";
 const Pace = (() => {
-  const FRESH = 500; // ms for which the slider keeps a value that the person has just set
+  // ms for which the slider keeps a value that the person has just set, and a press meant the order before
+  const FRESH = 500;
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   /** @type {HTMLInputElement} */
@@ -11,6 +12,7 @@ const Pace = (() => {
   const pause = byId("pause");
   let refusal = "";
   let order = "pause";
+  let turned = -FRESH; // time at which the order became another
   let own = false; // whether the order goes to a program of this window
   let set = -FRESH; // time of the last change by the person
 
@@ -23,6 +25,8 @@ const Pace = (() => {
   function begin({ say, toast }) {
     pause.addEventListener("click", () => {
       if (refusal) toast(refusal);
+      // The second click of two, or one that was meant to pause.
+      else if (order === "resume" && performance.now() - turned < FRESH) return;
       else say(own ? { do: "steer", order } : { do: order });
     });
     speed.addEventListener("input", () => {
@@ -38,7 +42,9 @@ const Pace = (() => {
   function draw(status) {
     refusal = status ? status.pace : "No connection to the arm.";
     const stopped = Boolean(status?.stopped);
-    order = status?.paused ? "resume" : "pause";
+    const next = status?.paused ? "resume" : "pause";
+    if (next !== order) turned = performance.now();
+    order = next;
     own = Boolean(status?.orders.length);
     const label = order === "resume" ? "Resume" : "Pause";
     const held = refusal || (stopped ? "The arm is stopped: clear the stop first." : "");

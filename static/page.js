@@ -31,15 +31,19 @@
   let proven = null; // cause of a stop confirmed on another path
   let people = null;
 
-  // A reloaded page keeps its name; a second tab gets another.
+  // A reloaded page keeps its name; a second tab gets another. A browser may refuse to store it.
   function name() {
     /** @type {any[]} */
     const [entry] = performance.getEntriesByType("navigation");
     const again = entry?.type === "reload";
-    const old = again && sessionStorage.getItem("page");
     const fresh = randomName();
-    sessionStorage.setItem("page", old || fresh);
-    return old || fresh;
+    try {
+      const old = again && sessionStorage.getItem("page");
+      sessionStorage.setItem("page", old || fresh);
+      return old || fresh;
+    } catch {
+      return fresh;
+    }
   }
 
   function randomName() {
@@ -105,9 +109,13 @@
   // Called for keys in both documents. Space and Esc only stop the arm, whatever has the focus.
   function key(event) {
     const ends = event.key === " " || event.key === "Escape";
+    // Also in a text box, to which the focus may have moved.
+    if (event.type === "keyup") Jog.release(event.code);
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
       if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();
+    } else if (event.key === "Enter" && event.repeat && event.target?.closest?.("button")) {
+      // A key that stays pressed is one click.
     } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
       if (!event.repeat) say({ do: "go" });
     } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event))) return;
@@ -180,8 +188,28 @@
     list.setAttribute("aria-label", "Hand over to");
     list.add(new Option("Hand over to …", ""));
     for (const { number, name } of others) list.add(new Option(name, number));
-    list.addEventListener("change", () => list.value && say({ do: "give", to: Number(list.value) }));
+    // On a closed list, a key changes the choice at once; it is sent by Enter.
+    let byKeys = false;
+    const give = () => list.value && say({ do: "give", to: Number(list.value) });
+    list.addEventListener("pointerdown", () => (byKeys = false));
+    list.addEventListener("keydown", ({ key }) => {
+      if (key === "Enter") give();
+      byKeys = true;
+    });
+    list.addEventListener("change", () => byKeys || give());
+    list.addEventListener("blur", () => (list.value = ""));
     return list;
+  }
+
+  // Replace the controls in `group`. The focus, and the choice of a list, stay with the same label.
+  function keepingFocus(group, controls) {
+    /** @type {any} */
+    const old = document.activeElement;
+    const label = (each) => each.getAttribute("aria-label") ?? each.textContent;
+    const same = group.contains(old) && controls.find((each) => label(each) === label(old));
+    if ([...(same?.options ?? [])].some(({ value }) => value === old.value)) same.value = old.value;
+    group.replaceChildren(...controls);
+    if (same) same.focus();
   }
 
   let [drawnActs, drawnOrders] = ["", ""];
@@ -214,18 +242,19 @@
     const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
     if (key !== drawnActs) {
       drawnActs = key;
-      byId("acts").replaceChildren(...acts());
+      keepingFocus(byId("acts"), acts());
     }
     const orders = [status.planning, ...status.orders].join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
       const made = (order) => act(status.planning ? "Cancel" : "End", { do: "steer", order });
-      byId("orders").replaceChildren(...status.orders.map(made));
+      keepingFocus(byId("orders"), status.orders.map(made));
     }
     Pace.draw(up ? status : null);
     More.draw(status.name);
     const simulated = status.silence_profile === "simulation";
     text("on-silence", simulated ? SIMULATION : "stops after a quarter of a second");
+    if (!up) unknown();
   }
 
   // Without a connection the state of the arm is unknown.
@@ -284,12 +313,15 @@
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
-    else if (data.heard && More.hear(data.heard)) return drawLink();
+    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard))) return drawLink();
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
       // The message has only the changes.
+      const stood = status?.stopped;
       status = { ...status, ...data.heard };
+      // What is held when the stop is cleared must not move the arm, whoever stopped and cleared it.
+      if (stood || status.stopped) Jog.quiet();
       byId("gate").hidden = true;
       proven = null;
       draw();
@@ -327,7 +359,7 @@
   More.begin({ say, toast, kept, view: () => window.katana.view });
   Jog.begin({ say, stop });
   Objects.begin({ say });
-  Edit.begin({ say, toast });
+  Edit.begin({ say, toast, connected: () => up });
   // Who is connected, for admins; loaded on first use.
   byId("people-button").addEventListener("click", async () => {
     help.close();
@@ -353,7 +385,7 @@
   async function showWelcome() {
     const { Welcome } = await import("./welcome/welcome.js");
     if (welcome) welcome.show();
-    else welcome = new Welcome({ say, kept, scene });
+    else welcome = new Welcome({ say, kept, scene, name: () => status?.name });
   }
   byId("welcome-button").addEventListener("click", () => {
     help.close();

@@ -7,9 +7,25 @@ const Theme = (() => {
   /** @type {(name: string) => void} */
   let follow = () => {};
 
-  if (new URLSearchParams(location.search).has("darkMode") && !sessionStorage.getItem(KEPT))
-    sessionStorage.setItem(KEPT, "Dark");
-  const name = () => sessionStorage.getItem(KEPT) ?? (system.matches ? "Dark" : "Light");
+  let chosen = null; // if the browser refuses to store it
+  const kept = () => {
+    try {
+      return sessionStorage.getItem(KEPT) ?? chosen;
+    } catch {
+      return chosen;
+    }
+  };
+  const keep = (theme) => {
+    chosen = theme;
+    try {
+      sessionStorage.setItem(KEPT, theme);
+    } catch {
+      // It lasts as long as this document.
+    }
+  };
+
+  if (new URLSearchParams(location.search).has("darkMode") && !kept()) keep("Dark");
+  const name = () => kept() ?? (system.matches ? "Dark" : "Light");
 
   function apply() {
     const html = document.documentElement;
@@ -25,8 +41,8 @@ const Theme = (() => {
 
   return {
     name,
-    choose(chosen) {
-      sessionStorage.setItem(KEPT, chosen);
+    choose(theme) {
+      keep(theme);
       apply();
     },
     // Call `listener` with the name of each theme from now on.

@@ -3,6 +3,7 @@ import { html, write } from "../instruments/shape.js";
 
 const EVERY = 100; // ms between two updates of the frame
 const MARGIN = 6; // px
+const EDGE = 4; // px between the bar and the edge of the scene
 const STYLE = new URL("selection.css", import.meta.url).href;
 
 // Return the corners [m], in the base frame, of the box round an object. Its own frame is in the
@@ -23,6 +24,7 @@ export class Selection {
   #timer = null;
   #name = html("b");
   #frame;
+  #bar;
 
   constructor(stage, scene, say) {
     this.#scene = scene;
@@ -32,8 +34,8 @@ export class Selection {
     const clear = html("button", { type: "button", "aria-label": "Deselect" }, "×");
     remove.addEventListener("click", () => this.remove());
     clear.addEventListener("click", () => this.#show(null));
-    const bar = html("div", { role: "group", "aria-label": "Selected object" }, this.#name, remove, clear);
-    this.#frame = html("div", { id: "selection", hidden: "" }, bar);
+    this.#bar = html("div", { role: "group", "aria-label": "Selected object" }, this.#name, remove, clear);
+    this.#frame = html("div", { id: "selection", hidden: "" }, this.#bar);
     stage.append(this.#frame);
   }
 
@@ -94,6 +96,17 @@ export class Selection {
     this.#frame.style.top = `${offsetTop + box.top}px`;
     this.#frame.style.width = `${box.right - box.left}px`;
     this.#frame.style.height = `${box.bottom - box.top}px`;
+    this.#keepInside();
+  }
+
+  // Move the bar so far that it lies in the scene, also at the edges.
+  #keepInside() {
+    const view = this.#scene.getBoundingClientRect();
+    this.#bar.style.translate = "";
+    const bar = this.#bar.getBoundingClientRect();
+    const shift = (start, end, from, to) => Math.max(from + EDGE - start, Math.min(0, to - EDGE - end));
+    const [x, y] = [shift(bar.left, bar.right, view.left, view.right), shift(bar.top, bar.bottom, view.top, view.bottom)];
+    this.#bar.style.translate = `${x}px ${y}px`;
   }
 
   // Return the rectangle round an object in viser's document; null behind the camera.

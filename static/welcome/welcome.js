@@ -9,6 +9,8 @@ const LOOK_EVERY = 400; // ms
 const PULSE_EVERY = 50; // ms
 const BEGINS = 5000; // ms within which the server takes up a program
 const READY_LOOKS = 5; // until a planned program counts as not run
+const ID = "pour"; // id of the requests of "Watch it pour"
+const POUR = "Pour"; // name of its program
 const ENDS = ["done", "stopped", "failed", "cancelled", "refused", "blocked"];
 const HANDLE = "/target/move";
 /** @type {(id: string) => any} */
@@ -23,9 +25,11 @@ export class Welcome {
   #pulse = html("i", { id: "pulse", hidden: "" });
   #dragging = null; // timer, while the handle pulses
   #pouring = false;
+  #accepted = false; // whether the server has taken the script
+  #refusal = ""; // why it has refused the script or the run
   #steps = {};
 
-  // page: {say, kept, scene}. The card is shown at once.
+  // page: {say, kept, scene, name}; `name` returns the name of the person. The card is shown at once.
   constructor(page) {
     this.#page = page;
     const style = html("link", { rel: "stylesheet", href: STYLE });
@@ -110,13 +114,15 @@ export class Welcome {
     if (this.#pouring) return;
     this.#still();
     this.#pouring = true;
+    [this.#accepted, this.#refusal] = [false, ""];
     try {
       const answer = await fetch(SCRIPT);
       if (!answer.ok) throw new Error(await answer.text());
       const text = await answer.text();
-      for (let at = 0; at < text.length; at += PART)
-        this.#page.say({ do: "program", text: text.slice(at, at + PART), more: at + PART < text.length });
-      this.#page.say({ do: "steer", order: "run" });
+      for (let at = 0; at < text.length; at += PART) {
+        const more = at + PART < text.length;
+        this.#page.say({ do: "program", text: text.slice(at, at + PART), more, ...(more ? {} : { id: ID }) });
+      }
       await this.#watch();
     } catch (error) {
       write(this.#says, `The program cannot be run: ${error.message}`);
@@ -125,24 +131,50 @@ export class Welcome {
     this.#pouring = false;
   }
 
-  // Follow the program to its end.
+  // Take an answer; return whether it was for the card.
+  hear(answer) {
+    if (answer.id !== ID) return false;
+    if (answer.is === "refused") this.#refusal = answer.why;
+    else this.#accepted = true;
+    return true;
+  }
+
+  // The state; null if it could not be fetched.
+  async #look() {
+    try {
+      const answer = await fetch("api/v1/state");
+      return answer.ok ? await answer.json() : null;
+    } catch {
+      return null;
+    }
+  }
+
+  // Run the program, which alone is our own, once it is planned, and follow it to its end.
   async #watch() {
     write(this.#says, "Planning …");
     const began = performance.now();
     let waits = 0; // looks in a row at which the program was planned and did not run
-    for (let active = false; ; await pause(LOOK_EVERY)) {
-      const { program, stopped } = await (await fetch("api/v1/state")).json();
-      waits = program?.status === "ready" ? waits + 1 : 0;
-      const ended = !program || stopped || waits > READY_LOOKS || ENDS.includes(program.status);
-      active ||= !ended;
-      if (!active && performance.now() - began < BEGINS) continue;
-      if (ended) {
-        const poured = active && program?.status === "done";
+    let ran = false;
+    for (; ; await pause(LOOK_EVERY)) {
+      const accepted = this.#accepted;
+      const state = await this.#look();
+      if (!state && !this.#refusal) continue;
+      const { program, stopped } = state ?? {};
+      const own = accepted && program?.name === POUR && program.by === this.#page.name();
+      waits = own && program.status === "ready" ? waits + 1 : 0;
+      const over = !own || stopped || waits > READY_LOOKS || ENDS.includes(program.status);
+      if (over && !ran && !stopped && !this.#refusal && performance.now() - began < BEGINS) continue;
+      if (over || this.#refusal) {
+        const poured = ran && own && program.status === "done";
         if (poured) this.#done("pour");
-        const reason = stopped || program?.why || program?.status || "";
+        const reason = this.#refusal || stopped || (own && (program.why || program.status)) || "";
         return write(this.#says, poured ? "Poured. The cup is back in its place." : `It did not pour. ${reason}`);
       }
       const planning = program.status === "planning";
+      if (!ran && (planning || program.status === "ready")) {
+        ran = true;
+        this.#page.say({ do: "steer", order: "run", id: ID });
+      }
       const words = planning
         ? `Planning ${Math.round(100 * program.fraction)} %`
         : `Step ${program.step} of ${program.steps}: ${program.task || program.status}`;

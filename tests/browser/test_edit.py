@@ -12,6 +12,7 @@ import trimesh
 
 from katana450.client import Client, connect
 from katana450.server.api import answers
+from tests.browser.camera import Camera
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
@@ -102,6 +103,32 @@ def test_clicked_object_is_removed_by_delete_and_returns(
     assert page.errors == []
 
 
+def test_bar_of_an_object_at_the_edge_stays_below_stop(page: ViserPage, reader: Client) -> None:
+    page.page.mouse.click(*pixel_of(page, reader, "cup"))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    found = next(each for each in reader.query(answers.Objects).objects if each.name == "cup")
+    x, y, z = np.array(found.T)[:3, 3]
+    # The object is at the top left of the scene, and then beyond it.
+    for beyond in (0.35, 0.6):
+        page.look_from(Camera((x, y - 0.8, z + 0.3), (x + beyond, y, z - 0.3)))
+        page.page.wait_for_timeout(400)
+        on_top = page.page.evaluate(
+            """() => {
+                const stop = document.getElementById("stop");
+                const { left, right, top, bottom } = stop.getBoundingClientRect();
+                const found = new Set();
+                for (let x = left + 5; x < right - 5; x += 10)
+                    for (let y = top + 5; y < bottom - 5; y += 8)
+                        found.add(document.elementFromPoint(x, y).id);
+                return [...found];
+            }"""
+        )
+        assert on_top == ["stop"]
+    page.page.get_by_role("button", name="Remove").click(trial=True)
+    page.page.get_by_role("button", name="Deselect").click()
+    assert page.errors == []
+
+
 def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> None:
     start = np.array(truth.status()["goal"])
     page.drag_arrow(MOVE, "y", 0.1)
@@ -127,6 +154,17 @@ def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> 
     page.page.keyboard.press("Control+z")
     page.wait_until(lambda: "nothing to undo" in bar(page, "toast"), "the refusal")
     assert np.allclose(truth.status()["q"], moved, atol=1e-6)
+
+
+def test_undo_is_on_the_letter_z_and_needs_a_connection(page: ViserPage) -> None:
+    press = """([code, key]) => document.body.dispatchEvent(
+        new KeyboardEvent("keydown", {code, key, ctrlKey: true, bubbles: true}))"""
+    # On a German keyboard, Y and Z have changed places.
+    page.page.evaluate(press, ["KeyZ", "y"])
+    page.page.wait_for_timeout(300)
+    assert "ndo" not in bar(page, "toast")
+    page.page.evaluate(press, ["KeyY", "z"])
+    page.wait_until(lambda: "ndo" in bar(page, "toast"), "the undo")
 
 
 def test_undo_in_a_text_box_is_that_of_the_browser(page: ViserPage, truth: Truth) -> None:

@@ -136,6 +136,23 @@ def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Tru
     assert np.allclose(truth.status()["q"], READY, atol=1e-9)
 
 
+def test_value_typed_before_a_stop_is_not_sent_after_it(page: ViserPage, truth: Truth) -> None:
+    box = page.number_box("1 base turn")
+    home, watch = box.input_value(), Watch(page)
+    type_slowly(page, box, "40")
+    # The focus stays in the box, as if somebody else stopped the arm and cleared the stop.
+    for button, mood in (("stop", "stopped"), ("clear-stop", "ok")):
+        page.page.evaluate("(id) => document.getElementById(id).click()", button)
+        truth.wait(mood=mood)
+        page.wait_until(lambda: box.input_value() == home, "the value of before")
+        if mood == "stopped":
+            type_slowly(page, box, "40")
+            page.page.wait_for_timeout(600)
+    box.press("Tab")
+    assert watch.sent == []
+    assert np.allclose(truth.status()["q"], READY, atol=1e-9)
+
+
 def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
     box = page.number_box("1 base turn")
     watch = Watch(page)

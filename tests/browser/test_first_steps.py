@@ -11,8 +11,15 @@ import trimesh
 from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth
+from tests.browser.session import MOVE, Truth, clear_stop, take
 from tests.gateway.slow_link import SlowLink
+
+WORKER = """
+    if (window === top) window.Worker = class extends Worker {
+        constructor(...options) { super(...options); window.worker = this; }
+    };
+"""
+"""Script that keeps the worker through which the page speaks to the server."""
 
 NIGHT = "rgb(20, 24, 29)"
 
@@ -44,9 +51,10 @@ SETTINGS = """
 
 SIZES = {"wide": (1440, 900), "portrait": (390, 844), "landscape": (844, 390)}
 
-NO_STORAGE = """Object.defineProperty(window, "localStorage", {get() {
-    throw new DOMException("No storage in this window.", "SecurityError");
-}});"""
+NO_STORAGE = """for (const each of ["localStorage", "sessionStorage"])
+    Object.defineProperty(window, each, {get() {
+        throw new DOMException("No storage in this window.", "SecurityError");
+    }});"""
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +120,37 @@ def test_pouring_is_planned_with_progress_and_runs(
     assert truth.status()["water"]["basin_ml"] > 190.0
 
 
+def test_pouring_leaves_another_program_paused(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), script=f"{FIRST_VISIT}{WORKER}")
+    truth = Truth(server)
+    take(page)
+
+    def ask(**request: object) -> None:
+        page.page.evaluate("(say) => worker.postMessage({say})", request)
+
+    def status() -> str | None:
+        program = truth.status()["program"]
+        return program and f"{program['name']} {program['status']}"
+
+    ask(do="program", text="name: Mine\nsteps:\n  - joints: [40, -60, 100, 40, 0]\n  - home\n")
+    page.wait_until(lambda: status() == "Mine ready", "the plan", seconds=30.0)
+    ask(do="steer", order="run")
+    truth.wait(moving=True)
+    ask(do="steer", order="pause")
+    truth.wait(moving=False, status="paused")
+    press(page, "Watch it pour")
+    says = page.page.locator("#welcome [role=status]")
+    says.filter(has_text="It did not pour. A program is running. End it first.").wait_for()
+    page.page.wait_for_timeout(500)
+    assert truth.status()["status"] == "paused"
+    assert not done(page, "Watch it pour")
+    ask(do="steer", order="end")
+    page.wait_until(lambda: status() == "Mine stopped", "the end")
+
+
 def test_planning_is_shown_and_a_stop_ends_it(visit: ViserPage, server: AppServer) -> None:
+    # A failed look is repeated.
+    visit.page.route("**/api/v1/state", lambda route: route.abort(), times=1)
     press(visit, "Watch it pour")
     says = visit.page.locator("#welcome [role=status]")
     visit.wait_until(lambda: "Planning" in says.inner_text(), "the planning")
@@ -150,6 +188,11 @@ def test_window_without_storage_shows_the_card(server: AppServer, open_page: Ope
     page.page.wait_for_selector("#welcome:not([hidden])")
     page.page.get_by_role("button", name="Close for good").click()
     assert not page.page.locator("#welcome").is_visible()
+    page.page.keyboard.press("Space")
+    Truth(server).wait(mood="stopped")
+    page.page.wait_for_timeout(1100)
+    take(page)
+    clear_stop(page, Truth(server))
     assert page.errors == []
 
 
@@ -182,6 +225,25 @@ def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
         # The panel shows them for a moment by itself.
         assert found["seen"] > 0
         assert found["shown"] == 0
+
+
+@pytest.mark.parametrize("size", ["portrait", "landscape"])
+def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
+    server: AppServer, open_page: OpenPage, size: str
+) -> None:
+    page = open_page(server.url, window=SIZES[size], own_camera=True, script=FIRST_VISIT)
+    page.page.wait_for_selector("#welcome:not([hidden])")
+    # The poster is shown as before the scene is drawn, and is found by a pixel.
+    hit = page.page.evaluate(
+        """() => {
+            const poster = document.getElementById("poster");
+            poster.style.cssText = "visibility: visible; pointer-events: auto; transition: none";
+            const box = document.querySelector("#welcome li button").getBoundingClientRect();
+            const found = document.elementFromPoint(box.left + 20, box.top + 20);
+            return found.closest("#poster, #welcome").id;
+        }"""
+    )
+    assert hit == "welcome"
 
 
 @pytest.mark.parametrize("size", list(SIZES))

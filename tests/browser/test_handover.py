@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from katana450.client import connect
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
-from tests.browser.session import Truth, bar
+from tests.browser.session import Truth, bar, take
 
 SCRIPT = """\
 name: Wave
@@ -36,6 +37,23 @@ def shown(page: ViserPage, *labels: str, within: str) -> None:
 def run(page: ViserPage) -> None:
     page.click_button("Run")
     page.wait_until(lambda: bar(page, "headline").startswith("Wave: "), "the program", seconds=60.0)
+
+
+def test_choice_of_the_next_driver_by_keys_is_sent_by_enter(
+    server: AppServer, open_page: OpenPage
+) -> None:
+    page, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
+    take(page)
+    page.page.focus("#acts select")
+    page.page.keyboard.press("ArrowDown")
+    # Another person comes, and the controls are drawn anew.
+    with connect(server.url, "Anna"):
+        page.page.wait_for_selector("#acts option:has-text('Anna')", state="attached")
+        assert page.page.evaluate("() => document.activeElement.tagName") == "SELECT"
+        assert bar(page, "holder") == "You drive"
+        page.page.keyboard.press("Enter")
+        other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
+    assert page.errors == []
 
 
 def test_program_is_ended_in_the_bar_and_its_owner_chooses_the_next_driver(

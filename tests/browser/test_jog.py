@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from katana450.client import connect
 from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop
 
 
@@ -50,6 +52,25 @@ def test_a_held_key_moves_the_tool_along_one_axis(
     page.wait_until(rests, "the tool to rest")
     # viser uses the same keys for its camera.
     assert np.allclose(camera(page), looked, atol=1e-6)
+
+
+@pytest.mark.parametrize("between", ["Control", "#own-name"])
+def test_released_key_ends_its_jog_whatever_was_pressed_or_has_the_focus(
+    page: ViserPage, truth: Truth, between: str
+) -> None:
+    page.page.click("#jog-button")
+    page.page.click("#more-button")
+    page.page.evaluate("() => document.activeElement.blur()")
+    page.page.keyboard.down("KeyW")
+    truth.wait(moving=True)
+    if between == "Control":
+        page.page.keyboard.down(between)
+    else:
+        page.page.focus(between)
+    page.page.keyboard.up("KeyW")
+    page.page.keyboard.up("Control")
+    truth.wait(moving=False)
+    page.page.click("#more-button")
 
 
 def test_pads_and_buttons_move_while_they_are_held(
@@ -115,6 +136,53 @@ def test_gamepad_moves_only_with_its_shoulder_button(page: ViserPage, truth: Tru
     clear_stop(page, truth)
 
 
+@pytest.mark.parametrize("by", ["key", "gamepad"])
+def test_what_is_held_when_a_stop_is_cleared_moves_nothing(
+    page: ViserPage, server: AppServer, truth: Truth, by: str
+) -> None:
+    page.page.evaluate(GAMEPAD)
+    page.page.click("#jog-button")
+    page.page.wait_for_timeout(200)
+    if by == "key":
+        page.page.keyboard.down("KeyA")
+    else:
+        page.page.evaluate("() => { pad.buttons[4].pressed = true; pad.axes[0] = -1 }")
+    truth.wait(moving=True)
+    # Another person stops the arm.
+    with connect(server.url, "Anna") as anna:
+        anna.stop()
+    truth.wait(mood="stopped")
+    page.page.wait_for_timeout(1100)
+    # The browser repeats a held key.
+    if by == "key":
+        page.page.keyboard.down("KeyA")
+    clear_stop(page, truth)
+    start = np.array(truth.status()["q"])
+    page.page.wait_for_timeout(400)
+    assert np.allclose(truth.status()["q"], start, atol=1e-6)
+    # At rest, it counts again.
+    page.page.keyboard.up("KeyA")
+    page.page.evaluate("() => { pad.buttons[4].pressed = false }")
+    page.page.wait_for_timeout(200)
+    if by == "key":
+        page.page.keyboard.down("KeyA")
+    page.page.evaluate("(by) => { pad.buttons[4].pressed = by === 'gamepad' }", by)
+    truth.wait(moving=True)
+    page.page.keyboard.up("KeyA")
+    page.page.evaluate("() => { pad.buttons[4].pressed = false }")
+    truth.wait(moving=False)
+    page.page.evaluate("() => { navigator.getGamepads = () => [] }")
+
+
+def test_gamepad_stops_the_arm_with_the_sheet_closed(page: ViserPage, truth: Truth) -> None:
+    page.page.evaluate(GAMEPAD)
+    page.page.evaluate("() => { pad.buttons[1].pressed = true }")
+    truth.wait(mood="stopped")
+    page.page.evaluate("() => { navigator.getGamepads = () => [] }")
+    page.page.wait_for_timeout(1100)
+    clear_stop(page, truth)
+
+
 SPACEMOUSE = """
   const device = Object.assign(new EventTarget(), {
     opened: false, productName: "Synthetic SpaceMouse", open: async () => { device.opened = true },
@@ -154,6 +222,20 @@ def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage
     # The cable is unplugged during a push, so no report announces the release.
     page.page.evaluate("() => clearInterval(held)")
     truth.wait(mood="ok")
+    # The cap stays pushed when the stop is cleared.
+    push = "() => { window.held = setInterval(() => device.push(1, [-350, 0, 0]), 16) }"
+    page.page.wait_for_timeout(1100)
+    page.page.evaluate(push)
+    truth.wait(moving=True)
     page.page.evaluate("() => device.press(1)")
     truth.wait(mood="stopped")
+    page.page.wait_for_timeout(1100)
     clear_stop(page, truth)
+    rests = np.array(truth.status()["q"])
+    page.page.wait_for_timeout(400)
+    assert np.allclose(truth.status()["q"], rests, atol=1e-6)
+    page.page.evaluate("() => { clearInterval(held); device.push(1, [0, 0, 0]) }")
+    page.page.evaluate(push)
+    truth.wait(moving=True)
+    page.page.evaluate("() => clearInterval(held)")
+    truth.wait(moving=False)

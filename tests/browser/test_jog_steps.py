@@ -67,7 +67,9 @@ def test_one_press_is_one_step(sheet: ViserPage, truth: Truth, artefacts: Path) 
     wait_for(sheet, truth, np.add(start, (-0.001, 0.03, -0.001)))
     choose(sheet, "step", "0.1")
     sheet.page.get_by_role("button", name="x minus 0.1 mm").focus()
-    sheet.page.keyboard.press("Enter")
+    for _ in range(3):
+        sheet.page.keyboard.down("Enter")
+    sheet.page.keyboard.up("Enter")
     wait_for(sheet, truth, np.add(start, (-0.0011, 0.03, -0.001)))
     # Back at Hold, the pads are there again and the keys move while they are held.
     choose(sheet, "step", "0")
@@ -75,6 +77,17 @@ def test_one_press_is_one_step(sheet: ViserPage, truth: Truth, artefacts: Path) 
     sheet.wait_until(lambda: truth.status()["T"][2][3] < start[2] - 0.02, "the tool to go down")
     sheet.page.keyboard.up("KeyF")
     truth.wait(10.0, moving=False)
+
+
+def test_key_held_while_a_step_is_chosen_is_released(sheet: ViserPage, truth: Truth) -> None:
+    sheet.page.keyboard.down("KeyA")
+    truth.wait(moving=True)
+    choose(sheet, "step", "1")
+    start = tool(truth)
+    sheet.page.keyboard.up("KeyA")
+    choose(sheet, "step", "0")
+    sheet.page.wait_for_timeout(300)
+    assert np.allclose(tool(truth), start, atol=EXACT)
 
 
 def test_joints_move_by_steps(sheet: ViserPage, truth: Truth) -> None:

@@ -40,6 +40,8 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         page.keep(artefacts / "gateway-lost.png")
         assert "Offline" in bar(page, "link")
         assert bar(page, "headline") == "No connection"
+        page.page.keyboard.press("Control+z")
+        assert bar(page, "toast") == "No connection to the arm."
         assert noticed < 1.0
         robot.since = time.time()
         server.restart()

@@ -12,7 +12,7 @@ import pytest
 
 from tests.browser.conftest import OpenPage
 from tests.browser.server import AppServer
-from tests.browser.session import bar
+from tests.browser.session import Truth, bar
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +61,19 @@ def test_person_chooses_a_name_and_saves_picture_and_link(
         assert found == pytest.approx(list(view[wanted]), abs=1e-3)
     assert page.errors == []
     assert other.errors == []
+
+
+def test_chosen_name_returns_with_a_restarted_server(open_page: OpenPage) -> None:
+    with AppServer() as server:
+        page = open_page(server.url, nodes=("/arm",))
+        page.page.click("#more-button")
+        page.page.get_by_label("Your name").fill("Anna")
+        page.page.keyboard.press("Enter")
+        page.wait_until(lambda: bar(page, "name").startswith("Anna"), "the name")
+        server.kill()
+        page.wait_lost()
+        page.wait_until(lambda: bar(page, "headline") == "No connection", "the loss")
+        server.restart()
+        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state", seconds=30.0)
+        page.press_in_bar("Take")
+        page.wait_until(lambda: Truth(server).status()["holder"] == "Anna", "the name")

@@ -47,8 +47,11 @@ def test_motion_by_hand_is_paused_resumed_and_slowed_in_the_bar(
     page.click_button("Go to zero")
     truth.wait(moving=True)
     before = page.page.locator("#pause").bounding_box()
-    page.press_in_bar("Pause")
+    # The second click of two does not resume.
+    page.page.dblclick("#pause", delay=50)
     truth.wait(moving=False, status="paused")
+    page.page.wait_for_timeout(500)
+    assert truth.status()["status"] == "paused"
     me = bar(page, "name").partition(",")[0]
     page.wait_until(lambda: bar(page, "headline").startswith("Paused by you, "), "the pause")
     other.wait_until(lambda: bar(other, "headline").startswith(f"Paused by {me}, "), "its name")
