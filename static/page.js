@@ -178,7 +178,10 @@
     }
     if (holder === null) return [act("Take", { do: "acquire" }, true)];
     if (requests.length) return buttons;
-    const free = [asked ? act("Withdraw", { do: "withdraw" }) : act("Request", { do: "ask" }, true)];
+    const free = [];
+    if (asked) free.push(act("Withdraw", { do: "withdraw" }));
+    // Nobody asks a program of their own.
+    else if (!status.own_program) free.push(act("Request", { do: "ask" }, true));
     if (role === "admin") free.push(act("Take over", { do: "take" }));
     return free;
   }
@@ -233,13 +236,13 @@
     const { mine, holder, windows, asking: requests } = status;
     const names = requests.map(({ name }) => name).join(", ");
     const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
-    text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
+    text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : status.own_program ? "Your program drives" : `${holder} drives`);
     // Programs are included.
     const connected = windows > 1 ? `, ${windows} connected` : "";
     byId("people-help").hidden = status.role !== "admin";
     text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
     byId("acts").classList.toggle("asked", requests.length > 0);
-    const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
+    const key = JSON.stringify([mine, holder, status.own_program, status.asked, requests, status.others]);
     if (key !== drawnActs) {
       drawnActs = key;
       keepingFocus(byId("acts"), acts());

@@ -66,6 +66,8 @@ def test_program_is_ended_in_the_bar_and_its_owner_chooses_the_next_driver(
     owner.choose("Script", "Wave")
     run(owner)
     shown(owner, "End", within="orders")
+    shown(owner, "Take over", within="acts")
+    assert bar(owner, "holder") == "Your program drives"
     shown(other, within="orders")
     other.press_in_bar("Request")
     shown(owner, "Allow", "Refuse", within="acts")

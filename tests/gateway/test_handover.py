@@ -60,7 +60,8 @@ def test_owner_of_a_running_program_decides_about_requests(server: AppServer) ->
             controlling(server.url, enter(server.url)) as other,
         ):
             await run_program(server, owner)
-            await owner.wait(orders=["end"], pace="", planning=False, asking=[])
+            await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
+            assert not other.status["own_program"]
             await other.say("ask")
             await other.wait(asked=True)
             (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]

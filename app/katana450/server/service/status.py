@@ -130,6 +130,7 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
         "name": person.name,
         "role": person.role.value,
         "mine": mine,
+        "own_program": decides and not mine,
         "asked": person in lease.waiting,
         "asking": [
             {"number": each.number, "name": each.person.name}
