@@ -97,7 +97,7 @@ const Fields = (() => {
     }
   });
 
-  // A draft of before a stop, or of before its end, must not be sent by a later click, whoever clears it.
+  // A draft of before a stop, or of before its end, must not be sent by a later click, also where another person clears it.
   function heed() {
     let before = stopped();
     new MutationObserver(() => {

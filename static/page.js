@@ -323,7 +323,7 @@
       // The message has only the changes.
       const stood = status?.stopped;
       status = { ...status, ...data.heard };
-      // What is held when the stop is cleared must not move the arm, whoever stopped and cleared it.
+      // What is held when the stop is cleared must not move the arm, also where other people stopped and cleared it.
       if (stood || status.stopped) Jog.quiet();
       byId("gate").hidden = true;
       proven = null;
