@@ -282,9 +282,17 @@ def test_arm_stops_before_the_table_with_reason_and_warning_colour(
     robot.page.wait_until(lambda: "mm apart" in robot.text(), "the reason", seconds=20.0)
     reason = robot.text()
     assert "finger and table" in reason
-    finger = "left" if "Left" in reason else "right"
-    coat = f"{robot.path[f'finger_{finger}_link']}/contact0"
-    robot.page.node_pose(coat)
+    coats = [f"{robot.path[f'finger_{side}_link']}/contact0" for side in ("left", "right")]
+
+    def shown() -> list[str]:
+        return [
+            each
+            for each in coats
+            if not robot.page.frame.evaluate("(name) => harness.missing([name])", each)
+        ]
+
+    robot.page.wait_until(shown, "the warning colour")
+    coat = shown()[0]
     robot.page.wait_drawn()
     robot.page.keep(artefacts / "app-contact.png")
     go_home(robot)

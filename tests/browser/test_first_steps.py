@@ -11,7 +11,7 @@ import trimesh
 from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth, clear_stop, take
+from tests.browser.session import MOVE, Truth, clear_stop, prepare, take
 from tests.gateway.slow_link import SlowLink
 
 WORKER = """
@@ -123,7 +123,7 @@ def test_pouring_is_planned_with_progress_and_runs(
 def test_pouring_leaves_another_program_paused(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=("/arm", MOVE), script=f"{FIRST_VISIT}{WORKER}")
     truth = Truth(server)
-    take(page)
+    prepare(page, truth)
 
     def ask(**request: object) -> None:
         page.page.evaluate("(say) => worker.postMessage({say})", request)
