@@ -74,7 +74,7 @@ TILE = (880, 800)
 
 def gallery(page: ViserPage) -> None:
     """Make one picture per theme, with a row for each pose and a column for each camera."""
-    page.page.set_viewport_size({"width": 1300, "height": 920})
+    page.page.set_viewport_size({"width": 1300, "height": 980})
     for theme in ("Light", "Dark"):
         page.open_tab("Scene")
         page.click_button(theme)
