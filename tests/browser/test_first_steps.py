@@ -129,7 +129,7 @@ def test_pouring_leaves_another_program_paused(server: AppServer, open_page: Ope
         page.page.evaluate("(say) => worker.postMessage({say})", request)
 
     def status() -> str | None:
-        program = truth.status()["program"]
+        program = truth.status().get("program")
         return program and f"{program['name']} {program['status']}"
 
     ask(do="program", text="name: Mine\nsteps:\n  - joints: [40, -60, 100, 40, 0]\n  - home\n")

@@ -48,7 +48,10 @@ def test_silent_program_causes_a_stop(server: AppServer) -> None:
                 while (await watcher.query(answers.State)).stopped is None:
                     await asyncio.sleep(0.02)
             state = await watcher.query(answers.State)
-            assert state.stopped == "Frozen fell silent while the arm moved."
+            # A starved machine says so in the sentence.
+            assert state.stopped is not None
+            assert "Frozen" in state.stopped
+            assert "while the arm moved." in state.stopped
             await _freed(watcher)
             await watcher.clear_stop()
             await watcher.go(requests.Home())
