@@ -27,17 +27,6 @@ DROP = """async ([name, bytes]) => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture
-def truth(server: AppServer) -> Truth:
-    return Truth(server)
-
-
 @pytest.fixture
 def page(server: AppServer, open_page: OpenPage, truth: Truth) -> ViserPage:
     page = open_page(server.url, nodes=("/arm", MOVE))

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 from katana450.client import connect
 from katana450.server.api import requests
@@ -13,12 +10,6 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import Truth, bar, clear_stop, take
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 def slider(page: ViserPage) -> str:
@@ -38,7 +29,7 @@ def test_motion_by_hand_is_paused_resumed_and_slowed_in_the_bar(
     page.page.locator("#speed input").fill("10")
     truth.wait(speed=0.1)
     other.wait_until(lambda: slider(other) == "10", "the speed at the other page")
-    # The other page is told why not.
+    # A page that does not drive says why its press changes nothing.
     for each in ("#pause", "#speed"):
         assert "drives: ask for the arm." in (other.page.get_attribute(each, "title") or "")
     other.page.click("#pause", force=True)
@@ -62,7 +53,9 @@ def test_motion_by_hand_is_paused_resumed_and_slowed_in_the_bar(
     page.wait_until(lambda: bar(page, "headline") == "Moving to the target", "the motion")
     page.press_in_bar("STOP")
     page.wait_until(lambda: bar(page, "headline") == "Stopped", "the stop")
-    assert page.page.get_attribute("#pause", "aria-disabled") == "true"
+    page.wait_until(
+        lambda: page.page.get_attribute("#pause", "aria-disabled") == "true", "no Pause"
+    )
     clear_stop(page, truth)
     page.page.locator("#speed input").fill("100")
     truth.wait(speed=1.0)
