@@ -100,7 +100,7 @@ class Expansion:
         try:
             document = xacro.process_file(str(self._path), mappings={}, verbosity=0)
             urdf = document.documentElement.toxml()
-            # Half of a surrogate pair is no character of a file.
+            # Text with one half of a surrogate pair cannot be encoded in UTF-8.
             urdf.encode()
         except Exception as error:
             return self._fault(error)

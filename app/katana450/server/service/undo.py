@@ -129,7 +129,7 @@ class UndoHistory:
         if isinstance(command, cmd.SetGripper) and holds and state.moving:
             raise InputError("The hand holds an object and the arm moves: wait until it rests.")
         if isinstance(command, cmd.PlaceObject) and now is not None:
-            # Its colour is no part of this change.
+            # Colour and opacity stay: they were not changed together with the place.
             placed = replace(command.scene_object, appearance=now.appearance)
             command = cmd.PlaceObject(placed)
         return changes[0], command
