@@ -38,8 +38,9 @@ TICK = 0.01
 DRAGS = 10_000 if LONG else 40
 """Number of drags of each arm; `make test-long` runs all."""
 
-CLOSE_DRAG = 1703
-"""Number of a drag along which strides of 20 mm lose the pitch of the SO-101."""
+HARD_DRAGS = (1703, 4081, 6817)
+"""Numbers of drags that failed once: strides of 20 mm lost the pitch of the SO-101, and detours of
+the SO-101 and of the Katana ended one rounding beyond a limit."""
 
 MAX_TICKS = 6000
 
@@ -191,7 +192,7 @@ def settled(session: Session, state: State) -> State:
 
 def test_random_drags_arrive_or_offer_every_detour(dragged: Session) -> None:
     regions, seen = Regions(dragged.require_arm().chain), Counter[str]()
-    for number in (*range(DRAGS), CLOSE_DRAG):
+    for number in (*range(DRAGS), *HARD_DRAGS):
         check_drag(dragged, regions, number, seen)
     print(dict(seen))
     assert seen["clear way"] > 0

@@ -164,3 +164,12 @@ def test_the_length_of_the_circle_is_that_of_a_circle(
 ) -> None:
     found = plan([paths["circle"]], bounds)
     assert found.length == pytest.approx(0.2 * np.pi, rel=1e-5)
+
+
+def test_a_plan_to_a_limit_never_exceeds_it_by_rounding(arm: ArmModel, bounds: Bounds) -> None:
+    chain = arm.chain
+    for number in range(20):
+        start = np.random.default_rng(number).uniform(chain.lower, chain.upper)
+        made = plan([JointPath(chain, np.array([start, chain.upper]))], bounds)
+        close = made.span - np.geomspace(1e-9, 1e-2, 50)
+        assert (np.array([made.q(tau) for tau in close.tolist()]) <= chain.upper).all()

@@ -58,6 +58,8 @@ class Segment:
         q, q1, q2 = (
             np.array(each) for each in zip(*(j.derivatives()[:3] for j in joints), strict=True)
         )
+        # A path that touches a limit exceeds it by rounding, and such a setpoint is refused.
+        q = self.path.chain.clamp(q)
         return PathMotion(frozen(q), q1 * pace.first, q2 * pace.first**2 + q1 * pace.second)
 
     @cached_property
