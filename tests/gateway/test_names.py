@@ -9,7 +9,7 @@ from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.errors import InputError
 from katana450.server.service import status
-from katana450.server.service.hub import REMEMBERED
+from katana450.server.service.known_pages import MAX_PAGES
 from katana450.server.service.names import MAX_NAME, renamed
 from tests.gateway.test_hub import PAGES, Table
 
@@ -89,7 +89,7 @@ def test_new_name_is_in_the_event_log(table: Table) -> None:
 
 def test_connected_window_stays_known_among_many(table: Table) -> None:
     window = table.join(PAGES[0])
-    for number in range(REMEMBERED + 5):
+    for number in range(MAX_PAGES + 5):
         table.hub.leave(table.join(f"page-{number:032}"))
     table.hub.rename(window, "Ann")
     assert table.join(PAGES[0]).number == window.number

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
-from katana450.arm.control.lease import Lease, Person, Role
+from katana450.arm.control.lease import Lease, Person
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import CAUSES, Finding
 from katana450.arm.control.stop_cause import StopCause, pressed
@@ -21,9 +21,8 @@ from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.last_pause import LastPause
-from katana450.server.service.participants import is_same_person
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.stop_state import ClearBy, StopRecord
+from katana450.server.service.stop_state import ClearBy, ClearRights, StopRecord
 from katana450.server.service.undo import UndoHistory
 
 log = logging.getLogger(__name__)
@@ -204,21 +203,10 @@ class CommandGate:
         with self._lock:
             self._stop(StopCause(why, at=time.time()), SERVER)
 
-    def may_clear_stop(self, person: Person) -> bool:
-        """Return whether ``person`` may clear the present stop, once that is possible."""
-        if self._by_presser:
-            assert self.stopped is not None
-            own = is_same_person(person.key, self.stopped.cause.key)
-            return own or person.role is Role.ADMIN
-        return person.role.may_drive and self.lease.driver in (None, person)
-
     @property
-    def clears(self) -> str:
-        """Name of the persons who may clear the present stop, other than by ``may_clear_stop``."""
-        if self._by_presser:
-            assert self.stopped is not None
-            return f"{self.stopped.cause.by} or an admin"
-        return "an operator" if self.lease.driver is None else self.lease.driver.name
+    def clear_rights(self) -> ClearRights:
+        """Rights to clear the present stop."""
+        return ClearRights(self._clear_by, self.stopped, self.lease)
 
     @property
     def clear_refusal(self) -> str:
@@ -372,15 +360,16 @@ class CommandGate:
         """
         # The arm may have been stopped on another path just now.
         self.reconcile()
-        may = self.may_clear_stop(actor.person)
+        rights = self.clear_rights
+        may = rights.allow(actor.person)
         if may and self.clear_refusal:
             raise LeaseError(self.clear_refusal)
-        if not self._by_presser:
+        if not rights.by_presser:
             granted = self._granted(actor, pacing=False)
         elif may:
             granted = replace(actor, grounds=Grounds.PRESSER)
         else:
-            raise LeaseError(f"Only {self.clears} may clear this stop.")
+            raise LeaseError(f"Only {rights.names} may clear this stop.")
         ticket = 0
         if self.arm is not None:
             # A stop that has not come back from the arm yet is not cleared.
@@ -389,13 +378,6 @@ class CommandGate:
             ticket = self.arm.deliver(cmd.ClearStop(known), granted)
         self.stopped, self._cleared = None, ticket
         return granted, ticket
-
-    @property
-    def _by_presser(self) -> bool:
-        """True if only the presser of the present stop, or an admin, may clear it."""
-        stopped = self.stopped
-        pressed_by_person = stopped is not None and stopped.cause.by is not None
-        return self._clear_by is ClearBy.PRESSER and pressed_by_person
 
     def _revoke(self) -> None:
         """Void every gesture received so far."""

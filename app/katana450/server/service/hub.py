@@ -26,8 +26,9 @@ from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface, MeasuresAge
+from katana450.server.service.known_pages import KnownPages
 from katana450.server.service.mutes import MutedError
-from katana450.server.service.names import free_name, renamed
+from katana450.server.service.names import renamed
 from katana450.server.service.participants import Takeover, Window, key_of, presser_of, session_of
 from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
@@ -39,9 +40,6 @@ from katana450.settings import Settings
 
 TICK = 0.02
 """Interval of the checks for silence [s]."""
-
-REMEMBERED = 256
-"""Number of pages that are recognised when they return."""
 
 
 class Hub:
@@ -75,8 +73,7 @@ class Hub:
         self.scenes = Scenes(self.meshes)
         self._windows: dict[str, Window] = {}
         self._pictures: dict[MeasuresAge, str] = {}
-        self._remembered: dict[str, tuple[Person, int]] = {}
-        self._numbers = 0
+        self._known = KnownPages()
         self._takeover: Takeover | None = None
         self._ticked = clock()
         self._driver_watch = DriverWatch(self.gate, self._ticked)
@@ -133,7 +130,7 @@ class Hub:
         channel of its commands.
         """
         key = key_of(identity, page)
-        person, number = self._known(key, identity)
+        person, number = self._known.recognise(key, identity, self._windows)
         window = Window(person, number, notify, heartbeat or LastHeartbeat(self.clock), channel)
         self._windows[key] = window
         self._note_presence("join", window)
@@ -142,10 +139,10 @@ class Hub:
 
     def rename(self, window: Window, name: str) -> None:
         """Give ``window`` the display name ``name``. Raises InputError; see ``names.renamed``."""
-        person = renamed(window.person, name, self._known_people)
+        person = renamed(window.person, name, self._known.people)
         self.recorder.note("rename", window.actor, {"name": person.name})
         window.person = person
-        self._remembered[person.key] = (person, window.number)
+        self._known.rename(person, window.number)
         self.gate.change(lambda lease, _: lease.renamed(person), window.actor)
 
     def leave(self, window: Window, *, for_good: bool = False) -> None:
@@ -161,7 +158,7 @@ class Hub:
         self.gate.change(lambda lease, _: lease.leave(person))
         if not for_good:
             return
-        self._remembered.pop(person.key, None)
+        self._known.forget(person.key)
         self.runner.leave(window)
         if self.lease.holder == person:
             if self.stopped is None and self.gate.moves():
@@ -178,7 +175,7 @@ class Hub:
 
         The page keeps the lease if it returns before another person takes it, as on a reload.
         """
-        person, _ = self._remembered.get(key_of(identity, page), (None, 0))
+        person = self._known.find(key_of(identity, page))
         if person is not None and self.lease.holder == person:
             if self.stopped is None and self.gate.moves():
                 self._driver_watch.brake_left(person)
@@ -383,30 +380,9 @@ class Hub:
 
     def person_of(self, identity: Identity, page: str) -> Person:
         """Return the person at ``page``, whether or not its control socket is open now."""
-        return self._known(key_of(identity, page), identity)[0]
+        key = key_of(identity, page)
+        return self._known.recognise(key, identity, self._windows)[0]
 
     def _presser_of(self, cause: StopCause) -> Actor | None:
         """Return the participant that pressed STOP on the port of STOP; None for a watchdog."""
-        return presser_of(cause, self._known_people, links=self.people.links is not None)
-
-    @property
-    def _known_people(self) -> list[Person]:
-        # A copy: other threads add people.
-        return [person for person, _ in list(self._remembered.values())]
-
-    def _known(self, key: str, identity: Identity) -> tuple[Person, int]:
-        """Return person and number of the page of ``key``; a new page gets new ones."""
-        known = self._remembered.pop(key, None) or self._new_person(key, identity)
-        # A page that returns may have another address.
-        known = replace(known[0], link=identity.link, address=identity.address), known[1]
-        self._remembered[key] = known
-        absent = [each for each in self._remembered if each not in self._windows and each != key]
-        for each in absent[: max(len(self._remembered) - REMEMBERED, 0)]:
-            del self._remembered[each]
-        return known
-
-    def _new_person(self, key: str, identity: Identity) -> tuple[Person, int]:
-        self._numbers += 1
-        number = self._numbers
-        name = free_name(identity.name, number, self._known_people)
-        return identity.person(key, name), number
+        return presser_of(cause, self._known.people, links=self.people.links is not None)

@@ -120,8 +120,9 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     taker = hub.taken_by(window)
     age = hub.age(window)
     own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
-    clears = hub.gate.may_clear_stop(person)
-    until = "Clear stop is pressed" if clears else f"{hub.gate.clears} clears the stop"
+    rights = hub.gate.clear_rights
+    clears = rights.allow(person)
+    until = "Clear stop is pressed" if clears else f"{rights.names} clears the stop"
     return {
         **(state_line(hub, person)._asdict() if own_pause else {}),
         "pace": pace_refusal(hub, window),

@@ -1,4 +1,4 @@
-"""Cause of a stop, whether the arm has confirmed it, and who may clear it."""
+"""Cause of a stop, whether the arm has confirmed it, and the rights to clear it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Self
 
+from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.runtime.state_publisher import Snapshot
+from katana450.server.service.participants import is_same_person
 
 
 class ClearBy(Enum):
@@ -52,3 +54,37 @@ class StopRecord:
         if self.confirmed or self.ticket is None or snapshot.ticket < self.ticket:
             return self
         return self if snapshot.state.stopped is None else replace(self, confirmed=True)
+
+
+@dataclass(frozen=True)
+class ClearRights:
+    """Rights to clear a stop, once that is possible.
+
+    Attributes:
+        rule: Rule of the server.
+        stopped: The stop; None without one.
+        lease: Lease of the arm.
+    """
+
+    rule: ClearBy
+    stopped: StopRecord | None
+    lease: Lease
+
+    @property
+    def by_presser(self) -> bool:
+        """True if only the person who pressed STOP, or an admin, may clear it."""
+        pressed_by_person = self.stopped is not None and self.stopped.cause.by is not None
+        return self.rule is ClearBy.PRESSER and pressed_by_person
+
+    def allow(self, person: Person) -> bool:
+        """Return whether ``person`` may clear the stop."""
+        if self.stopped is not None and self.by_presser:
+            return is_same_person(person.key, self.stopped.cause.key) or person.role is Role.ADMIN
+        return person.role.may_drive and self.lease.driver in (None, person)
+
+    @property
+    def names(self) -> str:
+        """Name of the persons who may clear the stop."""
+        if self.stopped is not None and self.by_presser:
+            return f"{self.stopped.cause.by} or an admin"
+        return "an operator" if self.lease.driver is None else self.lease.driver.name
