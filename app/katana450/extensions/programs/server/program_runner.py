@@ -26,7 +26,7 @@ from katana450.extensions.programs.server.program_owner import (
     program_identity,
 )
 from katana450.extensions.programs.server.program_planning import Planning
-from katana450.extensions.programs.source import MAX_BYTES
+from katana450.extensions.programs.server.script_parts import ScriptParts
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
@@ -53,7 +53,7 @@ class ProgramRunner(Runner):
         super().__init__(hub, options)
         allowed = not options.no_unattended
         self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
-        self._parts: dict[str, str] = {}
+        self._parts = ScriptParts()
         self._planning: Planning | None = None
         self._then: ProgramOrder | None = None
         self._participant: Window | None = None
@@ -109,12 +109,8 @@ class ProgramRunner(Runner):
         The last plan is kept if it is of the same script and nothing has changed since. Raises
         LeaseError while another program runs or is planned, and InputError for too long a script.
         """
-        key = window.person.key
-        text = self._parts.pop(key, "") + text
-        if len(text.encode()) > MAX_BYTES:
-            raise InputError(f"A script has at most {MAX_BYTES // 1024} KB.")
-        if more:
-            self._parts[key] = text
+        script = self._parts.add(window.person.key, text, more=more)
+        if script is None:
             return
         if self.running:
             raise LeaseError("A program is running. End it first.")
@@ -125,14 +121,14 @@ class ProgramRunner(Runner):
         before = self._planning
         if before is not None and before.busy:
             before.cancel(self._owner.superseded_by(window))
-        if before is not None and before.fits(text, speed, arm.state):
+        if before is not None and before.fits(script, speed, arm.state):
             before.refused, before.note = None, ""
             self._own(window)
             return
         changed = ""
-        if before is not None and (before.text, before.speed) == (text, speed) and before.program:
+        if before is not None and (before.text, before.speed) == (script, speed) and before.program:
             changed = before.changed_to(arm.state)
-        self._plan(window, text, speed, changed)
+        self._plan(window, script, speed, changed)
 
     def _plan(self, window: Window, text: str, speed: float, changed: str) -> None:
         """Plan ``text`` from the present state; ``changed``: why an earlier plan is void."""
@@ -217,7 +213,7 @@ class ProgramRunner(Runner):
 
     def leave(self, window: Window) -> None:
         """Forget ``window``; end its program, or the run that waits for its planning."""
-        self._parts.pop(window.person.key, None)
+        self._parts.forget(window.person.key)
         if not self.owns(window):
             return
         self._forget_run(f"{window.person.name} left")
