@@ -27,7 +27,7 @@ Matrix = NDArray[np.floating[Any]]
 Pixel = tuple[float, float]
 Axis = Literal["x", "y", "z"]
 
-SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("record.js", "scene.js"))
+SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("record.js", "scene.js", "visit.js"))
 # Large enough for viser to dock its panel beside the scene.
 WINDOW = (1280, 800)
 READY_SECONDS = 60.0  # a software renderer compiles shaders for up to 22 s
@@ -35,9 +35,6 @@ POLL_MILLISECONDS = 20.0
 THROTTLE_MILLISECONDS = 50.0
 DRAG_STEPS = 8
 FIRST_VISIT = "window.firstVisit = true;"
-DISMISSED = """try {
-    if (!window.firstVisit) localStorage.setItem("katana450.welcome", "done");
-} catch {}"""
 COARSE = 0.5  # drawn pixels per pixel of the window: a software renderer is four times as fast
 
 
@@ -71,8 +68,7 @@ class ViserPage:
 
         `nodes` must exist in addition to the nodes that the server has sent by then. With
         `own_camera` the page uses its own initial camera. `script` runs first in both documents;
-        with FIRST_VISIT the first steps are shown;
-        `context_options` are Playwright's.
+        with FIRST_VISIT the first steps are shown. `context_options` are Playwright's.
         """
         camera = camera or Camera()
         width, height = window
@@ -82,7 +78,7 @@ class ViserPage:
         best = drawing is Drawing.BEST
         options = json.dumps({"draws": drawing is Drawing.ALWAYS, "fullQuality": best})
         scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
-        context.add_init_script(f"window.harness = {options};\n{scripts}\n{script}\n{DISMISSED}")
+        context.add_init_script(f"window.harness = {options};\n{script}\n{scripts}")
         page = context.new_page()
         errors: list[str] = []
         page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
