@@ -6,15 +6,20 @@ request on a connection, the acceptor keeps it open. All others may be closed to
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import Role
+from katana450.errors import InputError
 from katana450.server.api.fields import STOP_PATHS
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.participants import actor_of
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
@@ -28,6 +33,9 @@ REQUESTS, REQUESTS_EACH, RESERVED_REQUESTS = 128, 16, 8
 driver and for each admin."""
 
 TOO_MANY = 429
+
+TOO_MANY_SOCKETS = "You have too many open connections. Close some windows or programs."
+TOO_MANY_REQUESTS = "You sent too many requests at once. Wait for their answers."
 
 LIMIT_CLOSE_CODE = 4429
 """Close code of a websocket whose client exceeds a limit."""
@@ -111,9 +119,11 @@ class Admission:
                     await self._app(scope, receive, send)
                 return
             self._hub.people.refused(who.session)
+            error = TOO_MANY_SOCKETS if socket else TOO_MANY_REQUESTS
+            what = "connection" if socket else "request"
+            actor = actor_of(replace(who, address=address_of(connection)), CommandChannel.HTTP)
+            self._hub.recorder.refuse(what, actor, InputError(error))
             if socket:
-                why = "You have too many open connections. Close some windows or programs."
-                await refuse(WebSocket(scope, receive, send), why)
+                await refuse(WebSocket(scope, receive, send), error)
             else:
-                why = "You sent too many requests at once. Wait for their answers."
-                await PlainTextResponse(why, TOO_MANY, RETRY)(scope, receive, send)
+                await PlainTextResponse(error, TOO_MANY, RETRY)(scope, receive, send)

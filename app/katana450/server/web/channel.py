@@ -178,6 +178,7 @@ class Channel(ABC):
             except BusyError as error:
                 if error.gone:
                     log.warning("%s exceeds its budget: disconnected.", window.person.name)
+                    self.hub.recorder.refuse("any", window.actor, error)
                     await self._disconnect(LIMIT_CLOSE_CODE, str(error))
                     return
                 self.refuse(str(error), request.id, retry=error.retry)

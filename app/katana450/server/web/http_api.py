@@ -131,6 +131,7 @@ class Api:
                     return as_json(self._dispatcher.query(at))
             except (BusyError, MutedError) as error:
                 self._refused(request)
+                self._note_flood(identity, error)
                 return await _too_much(error)
             except LeaseError as error:
                 raise HTTPException(RETRY_STATUS, str(error)) from error
@@ -167,6 +168,7 @@ class Api:
             return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
         except (BusyError, MutedError) as error:
             self._refused(request)
+            self._note_flood(identity, error)
             return await _too_much(error, requests.id_of(body))
         except InputError as error:
             self._refused(request)
@@ -181,6 +183,9 @@ class Api:
     def _refused(self, request: Request) -> None:
         """Count a refused request of the sender."""
         self._hub.people.refused(identity(self._authenticator, request) or address_of(request))
+
+    def _note_flood(self, identity: Identity, error: BusyError | MutedError) -> None:
+        self._hub.recorder.refuse("any", actor_of(identity, CommandChannel.HTTP), error)
 
     def _budget(self, request: Request) -> Budget:
         return self._budgets.of(identity(self._authenticator, request) or address_of(request))

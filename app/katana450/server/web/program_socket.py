@@ -26,7 +26,7 @@ from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Window, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
@@ -246,6 +246,9 @@ class LineServer:
                 await _serve(self._hub, self._authenticator, budget, line, program)
             else:
                 why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
+                if found is not None:
+                    actor = actor_of(replace(found, address=client[0]), CommandChannel.TCP)
+                    self._hub.recorder.refuse("connection", actor, InputError(why))
                 await line.close(0, why)
 
     async def _hello(self, line: _TcpLine) -> requests.Hello | None:
