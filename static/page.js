@@ -233,12 +233,12 @@
     clear.disabled = status.wait !== "";
     clear.title = status.wait;
     byId("go").hidden = !mayGo();
-    const { mine, holder, windows, asking: requests } = status;
+    const { mine, holder, participants, asking: requests } = status;
     const names = requests.map(({ name }) => name).join(", ");
     const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : status.own_program ? "Your program drives" : `${holder} drives`);
     // Programs are included.
-    const connected = windows > 1 ? `, ${windows} connected` : "";
+    const connected = participants > 1 ? `, ${participants} connected` : "";
     byId("people-help").hidden = status.role !== "admin";
     text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
     byId("acts").classList.toggle("asked", requests.length > 0);

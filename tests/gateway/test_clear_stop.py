@@ -18,7 +18,7 @@ from katana450.errors import LeaseError
 from katana450.server.service import status
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Window, key_of, presser_of
+from katana450.server.service.participants import Participant, key_of, presser_of
 from katana450.server.service.recorder import Note
 from katana450.server.service.stop_state import ClearBy
 from tests.gateway.test_hub import PAGES, FakeArm, Table
@@ -69,7 +69,7 @@ class ClearingTable(Table):
         self.stoppable = StoppableArm(state)
         self.arm = self.hub.gate.arm = self.stoppable
 
-    def person(self, name: str, role: Role) -> Window:
+    def person(self, name: str, role: Role) -> Participant:
         return self.hub.join(Identity(name, name, role), PAGES[0], lambda _notice: None)
 
 

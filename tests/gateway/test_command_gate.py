@@ -21,7 +21,7 @@ from katana450.arm.control.state import Finding, Reason
 from katana450.errors import LeaseError
 from katana450.server.service import serialize
 from katana450.server.service.hub import TICK
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from katana450.server.view.controls import listener
 from katana450.server.viser_bridge.frames import FrameSlot
 from katana450.server.viser_bridge.gestures import Gestures, _Browser
@@ -177,12 +177,12 @@ def test_no_gesture_of_another_thread_passes_a_stop(table: Table) -> None:
 class Hooked:
     """The hook of viser for one browser of a window, without the gateway's end of its socket."""
 
-    def __init__(self, table: Table, server: viser.ViserServer, window: Window) -> None:
+    def __init__(self, table: Table, server: viser.ViserServer, participant: Participant) -> None:
         self.gate = table.hub.gate
         self.gestures = Gestures(server, Guard(server), table.hub)
         self.corrections: list[Any] = []
         self.refusals: list[str] = []
-        self.slot = FrameSlot(window.person.key, self.refusals.append)
+        self.slot = FrameSlot(participant.person.key, self.refusals.append)
         connection: Any = SimpleNamespace(queue_message=self.corrections.append)
         self.gestures._browsers[CLIENT] = _Browser(connection, self.slot)
         client: Any = SimpleNamespace(add_notification=lambda *_, **__: None)

@@ -72,12 +72,12 @@ def test_detour_is_recorded_with_the_person_who_dragged(
 def test_no_detour_is_taken_after_a_stop_or_a_released_lease(
     table: Table, offer: Callable[[], None], stops: bool
 ) -> None:
-    (window,) = table.hub.windows
+    (participant,) = table.hub.participants
     if stops:
         table.stop("Vera")
-        table.hub.move(window, cmd.ClearStop())
+        table.hub.move(participant, cmd.ClearStop())
     else:
-        table.hub.release_lease(window)
+        table.hub.release_lease(participant)
     holder = table.hub.lease.holder
     offer()
     assert next_note(table, cmd.Go).kind == "refusal"

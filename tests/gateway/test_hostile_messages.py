@@ -210,15 +210,15 @@ def test_attack_without_the_guard_would_do_harm() -> None:
 def test_invalid_request_changes_nothing(server: AppServer, text: str | bytes) -> None:
     async def attack() -> None:
         async with controlling(server.url) as watching, controlling(server.url) as control:
-            await watching.wait(windows=2, mood="ok", holder=None)
+            await watching.wait(participants=2, mood="ok", holder=None)
             before = watching.status
             for _ in range(10):
                 with suppress(ConnectionClosed):
                     await control.socket.send(text)
             async with asyncio.timeout(5.0):
                 await control.socket.wait_closed()
-            after = await watching.wait(windows=1)
-            assert before | {"windows": 1, "others": []} == after | {"others": []}
+            after = await watching.wait(participants=1)
+            assert before | {"participants": 1, "others": []} == after | {"others": []}
 
     asyncio.run(attack())
 

@@ -31,7 +31,7 @@ from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.nodes import Nodes
-from katana450.server.service.participants import Window, actor_of, key_of
+from katana450.server.service.participants import Participant, actor_of, key_of
 from katana450.server.service.runner import Runner
 from katana450.settings import Settings
 
@@ -140,7 +140,7 @@ class Table:
         role: Role = Role.ADMIN,
         name: str | None = None,
         heartbeat: LastHeartbeat | None = None,
-    ) -> Window:
+    ) -> Participant:
         notices = self.notices_of.setdefault(page, [])
         return self.hub.join(Identity("session", name, role), page, notices.append, heartbeat)
 
@@ -153,13 +153,13 @@ class Table:
         """Press STOP as a participant of ``name``."""
         self.hub.stop(actor_of(Identity("anybody", name, Role.VIEWER), CommandChannel.PAGE), press)
 
-    def wait(self, seconds: float, *alive: Window) -> None:
+    def wait(self, seconds: float, *alive: Participant) -> None:
         """Advance the clock, with heartbeats of the windows ``alive``."""
         end = self.t + seconds
         while self.t < end - 1e-9:
             self.t += min(TICK, end - self.t)
-            for window in alive:
-                self.hub.heartbeat(window)
+            for participant in alive:
+                self.hub.heartbeat(participant)
             self.hub.tick()
 
 
@@ -187,11 +187,11 @@ def test_first_window_to_use_a_control_gets_the_lease(table: Table) -> None:
 
 
 def test_window_without_control_socket_cannot_drive(table: Table) -> None:
-    window = table.join(PAGES[0])
-    table.touch(window.person.key)
-    table.hub.leave(window)
+    participant = table.join(PAGES[0])
+    table.touch(participant.person.key)
+    table.hub.leave(participant)
     with pytest.raises(LeaseError, match="start page"):
-        table.touch(window.person.key)
+        table.touch(participant.person.key)
 
 
 def test_viewer_role_can_only_stop(table: Table) -> None:
@@ -308,7 +308,7 @@ def test_silent_driver_at_rest_loses_the_lease_without_a_stop(table: Table) -> N
     ids=["handed over", "taken", "given up"],
 )
 def test_new_driver_gets_an_arm_without_targets(
-    table: Table, change: Callable[[Hub, Window, Window], None]
+    table: Table, change: Callable[[Hub, Participant, Participant], None]
 ) -> None:
     driver, other = (table.join(page) for page in PAGES)
     drag = table.touch(driver.person.key)
@@ -329,7 +329,7 @@ def test_reloaded_page_keeps_its_identity(table: Table) -> None:
     # The old socket ends after the new one has begun.
     fresh = table.join(PAGES[0])
     table.hub.leave(again)
-    assert table.hub.window(fresh.person.key) is fresh
+    assert table.hub.participant(fresh.person.key) is fresh
 
 
 def test_two_browsers_with_one_link_are_two_people(table: Table) -> None:
@@ -381,9 +381,9 @@ def test_age_is_that_of_the_windows_own_picture(table: Table) -> None:
 
 def test_no_lease_before_the_arm_is_ready() -> None:
     hub = Hub(lambda: 0.0)
-    window = hub.join(Identity("session", None, Role.ADMIN), PAGES[0], lambda _: None)
+    participant = hub.join(Identity("session", None, Role.ADMIN), PAGES[0], lambda _: None)
     with pytest.raises(LeaseError, match="not ready yet"):
-        hub.gate.claim(window.actor)
+        hub.gate.claim(participant.actor)
     hub.tick()
-    hub.stop(window.actor)
-    hub.move(window, cmd.ClearStop())
+    hub.stop(participant.actor)
+    hub.move(participant, cmd.ClearStop())

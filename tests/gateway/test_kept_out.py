@@ -19,7 +19,7 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web import http_api
 from katana450.server.web.access_links import AccessFile
@@ -47,7 +47,7 @@ class House:
         self.api = Api(self.hub, authenticator, self.budgets)
         self.ada = self.join("ada", "Ada", Role.ADMIN)
 
-    def join(self, session: str, name: str, role: Role) -> Window:
+    def join(self, session: str, name: str, role: Role) -> Participant:
         return self.hub.join(Identity(session, name, role, session, name), "page", lambda _: None)
 
     def ask(self, request: requests.Request) -> object:

@@ -23,7 +23,7 @@ from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import STOP_INTERVAL, MutedError
-from katana450.server.service.participants import Window, actor_of
+from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import Note, Recorder
 from tests.gateway.test_hub import FakeArm
@@ -42,16 +42,16 @@ class Room:
         self.arm = self.hub.gate.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
         self.vera, self.oda = (self.join(each) for each in (VERA, ODA))
 
-    def join(self, identity: Identity) -> Window:
+    def join(self, identity: Identity) -> Participant:
         return self.hub.join(identity, "a-page-of-this-person", lambda _: None)
 
     def clear(self) -> None:
         self.hub.move(self.oda, cmd.ClearStop())
 
-    def stops(self, window: Window, press: str | None = None) -> bool:
-        """Press STOP in ``window``; return whether the arm is stopped."""
+    def stops(self, participant: Participant, press: str | None = None) -> bool:
+        """Press STOP in ``participant``; return whether the arm is stopped."""
         try:
-            self.hub.stop(window.actor, press)
+            self.hub.stop(participant.actor, press)
         except MutedError:
             assert self.hub.stopped is None
             return False

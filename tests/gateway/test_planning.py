@@ -23,7 +23,7 @@ from katana450.extensions.programs.server import program_planning
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.server.service import status
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import SCRIPT, Staged
 
@@ -60,60 +60,62 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
     slow.released.set()
 
 
-def ask(table: Staged, window: Window, then: ProgramOrder | None = ProgramOrder.RUN) -> None:
+def ask(
+    table: Staged, participant: Participant, then: ProgramOrder | None = ProgramOrder.RUN
+) -> None:
     """Request ``SCRIPT`` as the panel of the page does."""
-    table.panel.plan(SCRIPT, then, window.actor)
-    table.wait(0.1, window)
+    table.panel.plan(SCRIPT, then, participant.actor)
+    table.wait(0.1, participant)
 
 
-def finish(table: Staged, window: Window, slow: Slow) -> None:
+def finish(table: Staged, participant: Participant, slow: Slow) -> None:
     slow.released.set()
     due = time.monotonic() + 20.0
     while table.status == "planning" and time.monotonic() < due:
         time.sleep(0.005)
-    table.wait(0.2, window)
+    table.wait(0.2, participant)
 
 
 def followed(table: Staged) -> bool:
     return any(isinstance(command, cmd.Follow) for command in table.arm.commands)
 
 
-def bar(table: Staged, window: Window) -> dict[str, Any]:
-    return status.common(table.hub) | status.of(table.hub, window)
+def bar(table: Staged, participant: Participant) -> dict[str, Any]:
+    return status.common(table.hub) | status.of(table.hub, participant)
 
 
 def test_pause_during_planning_starts_the_program_paused(table: Staged, slow: Slow) -> None:
-    window = table.join(PAGES[0])
-    ask(table, window)
-    table.programs.steer(window, ProgramOrder.PAUSE)
+    participant = table.join(PAGES[0])
+    ask(table, participant)
+    table.programs.steer(participant, ProgramOrder.PAUSE)
     assert isinstance(table.arm.commands[-1], cmd.Pause)
     table.arm.rest = replace(table.arm.rest, paused=True)
-    shown = bar(table, window)
+    shown = bar(table, participant)
     assert shown["headline"] == "Planning Wave 20 %"
     assert shown["why"].startswith("Paused by you. Step 1 of 2: timing paths.")
     assert shown["why"].endswith("Then it waits for Resume.")
     assert (shown["paused"], shown["pace"], shown["orders"]) == (True, "", ["end"])
-    finish(table, window, slow)
+    finish(table, participant, slow)
     assert table.status == "paused"
-    shown = bar(table, window)
+    shown = bar(table, participant)
     assert (shown["mood"], shown["headline"]) == ("paused", "Paused by you")
     assert shown["why"].startswith("Wave: speed, step 1 of 2")
     assert not any(isinstance(command, cmd.Resume) for command in table.arm.commands)
-    table.wait(60.0, window)
+    table.wait(60.0, participant)
     assert not followed(table)
-    table.programs.steer(window, ProgramOrder.RESUME)
+    table.programs.steer(participant, ProgramOrder.RESUME)
     assert isinstance(table.arm.commands[-1], cmd.Resume)
     table.arm.rest = replace(table.arm.rest, paused=False)
-    table.wait(0.1, window)
+    table.wait(0.1, participant)
     assert table.status == "running"
 
 
 def test_run_of_a_finished_plan_does_not_end_a_pause(table: Staged) -> None:
-    window = table.join(PAGES[0])
-    table.plan(window)
+    participant = table.join(PAGES[0])
+    table.plan(participant)
     table.arm.rest = replace(table.arm.rest, paused=True)
-    table.programs.steer(window, ProgramOrder.RUN)
-    table.wait(60.0, window)
+    table.programs.steer(participant, ProgramOrder.RUN)
+    table.wait(60.0, participant)
     assert table.status == "paused"
     assert not followed(table)
 
@@ -121,11 +123,11 @@ def test_run_of_a_finished_plan_does_not_end_a_pause(table: Staged) -> None:
 def test_other_commands_during_planning_keep_the_program_from_running(
     table: Staged, slow: Slow
 ) -> None:
-    window = table.join(PAGES[0])
-    ask(table, window)
+    participant = table.join(PAGES[0])
+    ask(table, participant)
     table.programs.redirected()
-    assert "does not start by itself" in bar(table, window)["why"]
-    finish(table, window, slow)
+    assert "does not start by itself" in bar(table, participant)["why"]
+    finish(table, participant, slow)
     progress = table.programs.progress()
     assert progress is not None
     assert progress.status == "ready"
@@ -134,47 +136,47 @@ def test_other_commands_during_planning_keep_the_program_from_running(
 
 
 def test_run_requested_during_a_stop_is_refused(table: Staged, slow: Slow) -> None:
-    window = table.join(PAGES[0])
-    ask(table, window, None)
+    participant = table.join(PAGES[0])
+    ask(table, participant, None)
     table.stop("Anybody")
     program_runner = table.programs
     with pytest.raises(LeaseError, match="clear the stop first"):
-        program_runner.steer(window, ProgramOrder.RUN)
+        program_runner.steer(participant, ProgramOrder.RUN)
     with pytest.raises(LeaseError, match="clear the stop first"):
-        table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
-    finish(table, window, slow)
+        table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
+    finish(table, participant, slow)
     q = table.arm.rest.setpoint + 0.01
     motion = replace(table.arm.rest.motion, q=q)
     table.arm.rest = replace(table.arm.rest, q=q, goal=q, motion=motion)
     with pytest.raises(LeaseError, match="clear the stop first"):
-        program_runner.steer(window, ProgramOrder.RUN)
-    table.hub.move(window, cmd.ClearStop())
-    table.wait(1.0, window)
+        program_runner.steer(participant, ProgramOrder.RUN)
+    table.hub.move(participant, cmd.ClearStop())
+    table.wait(1.0, participant)
     assert table.status == "ready"
     assert not program_runner.running
 
 
 def test_run_request_during_planning_takes_effect_afterwards(table: Staged, slow: Slow) -> None:
-    window, other = (table.join(page, Role.OPERATOR) for page in PAGES)
-    ask(table, window, None)
-    assert bar(table, window)["orders"] == ["end"]
+    participant, other = (table.join(page, Role.OPERATOR) for page in PAGES)
+    ask(table, participant, None)
+    assert bar(table, participant)["orders"] == ["end"]
     assert bar(table, other)["orders"] == []
     for order in ProgramOrder:
         with pytest.raises(LeaseError, match="belongs to Window 1"):
             table.programs.steer(other, order)
-    table.programs.steer(window, ProgramOrder.RUN)
-    finish(table, window, slow)
+    table.programs.steer(participant, ProgramOrder.RUN)
+    finish(table, participant, slow)
     assert table.status == "running"
 
 
 def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, slow: Slow) -> None:
-    window, other = (table.join(page) for page in PAGES)
-    ask(table, window)
+    participant, other = (table.join(page) for page in PAGES)
+    ask(table, participant)
     job = table.programs._planning
     assert job is not None
     with pytest.raises(LeaseError, match="being planned"):
         table.programs.script(other, SCRIPT, more=False, speed=1.0)
-    table.programs.steer(window, ProgramOrder.END)
+    table.programs.steer(participant, ProgramOrder.END)
     assert table.status == "cancelled"
     table.programs.script(other, SCRIPT, more=False, speed=1.0)
     assert table.status == "planning"
@@ -186,9 +188,9 @@ def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, s
 
 
 def test_planning_of_a_departed_owner_is_cancelled(table: Staged, slow: Slow) -> None:
-    window, other = (table.join(page) for page in PAGES)
-    ask(table, window)
-    table.hub.leave(window)
+    participant, other = (table.join(page) for page in PAGES)
+    ask(table, participant)
+    table.hub.leave(participant)
     table.wait(2.0, other)
     assert not table.programs.waits
     table.programs.script(other, SCRIPT, more=False, speed=1.0)
@@ -200,26 +202,26 @@ def test_planning_of_a_departed_owner_is_cancelled(table: Staged, slow: Slow) ->
 
 def test_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) -> None:
     slow.released.set()
-    window = table.join(PAGES[0])
-    ask(table, window, None)
-    finish(table, window, slow)
+    participant = table.join(PAGES[0])
+    ask(table, participant, None)
+    finish(table, participant, slow)
     before = table.programs.program
-    ask(table, window)
+    ask(table, participant)
     assert table.status == "running"
     assert table.programs.program is before
     assert slow.begun == 1
-    table.programs.steer(window, ProgramOrder.END)
-    table.programs.script(window, SCRIPT, more=False, speed=0.5)
-    finish(table, window, slow)
+    table.programs.steer(participant, ProgramOrder.END)
+    table.programs.script(participant, SCRIPT, more=False, speed=0.5)
+    finish(table, participant, slow)
     assert slow.begun == 2
 
 
 @pytest.mark.parametrize("moved", ["arm", "scene", "gripper"])
 def test_change_causes_new_planning_with_the_reason(table: Staged, slow: Slow, moved: str) -> None:
     slow.released.set()
-    window = table.join(PAGES[0])
-    ask(table, window, None)
-    finish(table, window, slow)
+    participant = table.join(PAGES[0])
+    ask(table, participant, None)
+    finish(table, participant, slow)
     rest = table.arm.rest
     match moved:
         case "arm":
@@ -232,36 +234,36 @@ def test_change_causes_new_planning_with_the_reason(table: Staged, slow: Slow, m
             box = SceneObject("box", Shape.BOX, (0.05, 0.05, 0.05), T)
             table.arm.rest = replace(rest, objects=(box,))
     slow.released.clear()
-    table.programs.steer(window, ProgramOrder.RUN)
+    table.programs.steer(participant, ProgramOrder.RUN)
     progress = table.programs.progress()
     assert progress is not None
     assert progress.status == "planning"
     assert moved in progress.why
-    assert moved in bar(table, window)["why"]
-    finish(table, window, slow)
+    assert moved in bar(table, participant)["why"]
+    finish(table, participant, slow)
     assert (table.status, slow.begun) == ("running", 2)
 
 
 def test_bar_shows_the_progress_of_planning(table: Staged, slow: Slow) -> None:
-    window = table.join(PAGES[0])
-    ask(table, window, None)
+    participant = table.join(PAGES[0])
+    ask(table, participant, None)
     due = time.monotonic() + 10.0
     # The planning thread may not have started yet.
-    while (shown := bar(table, window))["headline"] == "Planning the script 0 %":
+    while (shown := bar(table, participant))["headline"] == "Planning the script 0 %":
         assert time.monotonic() < due
         time.sleep(0.005)
     assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20 %")
     assert shown["why"] == "Step 1 of 2: timing paths. It does not start by itself."
     table.arm.moves = True
-    shown = bar(table, window)
+    shown = bar(table, participant)
     assert (shown["mood"], shown["headline"]) == ("moving", "Moving to the target")
     assert shown["why"].startswith("Planning Wave. Step 1 of 2")
     table.arm.moves = False
     table.stop("Anybody")
-    assert bar(table, window)["mood"] == "stopped"
-    table.hub.move(window, cmd.ClearStop())
-    finish(table, window, slow)
-    assert bar(table, window)["headline"] == "On target"
+    assert bar(table, participant)["mood"] == "stopped"
+    table.hub.move(participant, cmd.ClearStop())
+    finish(table, participant, slow)
+    assert bar(table, participant)["headline"] == "On target"
 
 
 def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
@@ -287,12 +289,12 @@ def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
 
 
 def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> None:
-    window = table.join(PAGES[0])
-    table.plan(window, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
-    table.programs.steer(window, ProgramOrder.RUN)
-    table.wait(0.5, window)
+    participant = table.join(PAGES[0])
+    table.plan(participant, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
+    table.programs.steer(participant, ProgramOrder.RUN)
+    table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, speed=0.3)
-    table.wait(3.0, window)
+    table.wait(3.0, participant)
     speeds = [each.value for each in table.arm.commands if isinstance(each, cmd.SpeedScale)]
     assert speeds == [1.0, 0.3]
     assert table.status == "done"

@@ -46,4 +46,4 @@ def test_program_key_is_secret_and_required() -> None:
         assert "while the arm moved." in state["stopped"]
         assert state["q"][0] < FAR[0] - 0.2
         # Reads open no windows: only the two programs that posted have one.
-        assert state["windows"] == 2
+        assert state["participants"] == 2

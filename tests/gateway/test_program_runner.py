@@ -20,7 +20,7 @@ from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.panel_access import PanelAccess
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES, Table
 
 NOBODY = Person("nobody", "Nobody", Role.ADMIN)
@@ -49,9 +49,9 @@ class Staged(Table):
         progress = self.programs.progress()
         return "" if progress is None else progress.status
 
-    def plan(self, window: Window, script: str = SCRIPT) -> None:
+    def plan(self, participant: Participant, script: str = SCRIPT) -> None:
         """Plan ``script`` and wait for the planning thread."""
-        self.programs.script(window, script, more=False, speed=1.0)
+        self.programs.script(participant, script, more=False, speed=1.0)
         due = time.monotonic() + 10.0
         while self.status == "planning" and time.monotonic() < due:
             time.sleep(0.005)
@@ -63,47 +63,47 @@ def table(session: Session) -> Staged:
 
 
 def test_program_holds_the_lease_under_its_own_name(table: Staged) -> None:
-    window = table.join(PAGES[0])
-    table.touch(window.person.key)
-    table.plan(window)
+    participant = table.join(PAGES[0])
+    table.touch(participant.person.key)
+    table.plan(participant)
     assert table.status == "ready"
-    table.programs.steer(window, ProgramOrder.RUN)
+    table.programs.steer(participant, ProgramOrder.RUN)
     holder = table.hub.lease.holder
     assert holder is not None
     assert (holder.name, holder.role) == ("Wave", Role.OPERATOR)
-    table.wait(1.0, window)
+    table.wait(1.0, participant)
     assert table.hub.lease.holder == holder
     assert any(isinstance(command, cmd.SpeedScale) for command in table.arm.commands)
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        table.touch(window.person.key)
+        table.touch(participant.person.key)
 
 
 def test_program_time_passes_while_the_state_is_unchanged(table: Staged) -> None:
     """Use an arm at rest, whose state is unchanged, its time included."""
-    window = table.join(PAGES[0])
-    table.plan(window)
-    table.programs.steer(window, ProgramOrder.RUN)
-    table.wait(29.0, window)
+    participant = table.join(PAGES[0])
+    table.plan(participant)
+    table.programs.steer(participant, ProgramOrder.RUN)
+    table.wait(29.0, participant)
     assert not any(isinstance(command, cmd.Follow) for command in table.arm.commands)
-    table.wait(2.0, window)
+    table.wait(2.0, participant)
     assert any(isinstance(command, cmd.Follow) for command in table.arm.commands)
 
 
 def test_pause_does_not_count_towards_the_timeout(table: Staged) -> None:
-    window = table.join(PAGES[0])
-    table.plan(window, "steps:\n  - gripper: open\n")
-    table.programs.steer(window, ProgramOrder.RUN)
+    participant = table.join(PAGES[0])
+    table.plan(participant, "steps:\n  - gripper: open\n")
+    table.programs.steer(participant, ProgramOrder.RUN)
     rest = table.arm.rest
     table.arm.rest = replace(rest, gripper_goal=rest.gripper_goal + 0.5)
-    table.wait(0.1, window)
+    table.wait(0.1, participant)
     # The fingers rest on their path, and no new state comes before ``resume``.
     table.arm.rest = replace(table.arm.rest, paused=True)
-    table.wait(2.0 * ACTION_TIMEOUT, window)
+    table.wait(2.0 * ACTION_TIMEOUT, participant)
     assert table.status == "paused"
     table.arm.rest = replace(table.arm.rest, t=rest.t + 2.0 * ACTION_TIMEOUT + 0.1, paused=False)
-    table.wait(0.1, window)
+    table.wait(0.1, participant)
     assert table.status == "running"
-    table.wait(ACTION_TIMEOUT, window)
+    table.wait(ACTION_TIMEOUT, participant)
     assert table.status == "failed"
 
 
@@ -115,11 +115,11 @@ def test_others_may_steer_a_program_only_if_they_may_take_the_lease(table: Stage
         program_runner.script(viewer, SCRIPT, more=False, speed=1.0)
     table.plan(owner)
     program_runner.steer(owner, ProgramOrder.RUN)
-    for window, reason in ((viewer, "watch"), (other, "belongs to Window 1")):
+    for participant, reason in ((viewer, "watch"), (other, "belongs to Window 1")):
         with pytest.raises(LeaseError, match=reason):
-            program_runner.check_may_touch(window.actor)
+            program_runner.check_may_touch(participant.actor)
         with pytest.raises(LeaseError, match=reason):
-            program_runner.steer(window, ProgramOrder.END)
+            program_runner.steer(participant, ProgramOrder.END)
     with pytest.raises(LeaseError, match="End it first"):
         table.plan(other)
     program_runner.check_may_touch(admin.actor)
@@ -134,22 +134,22 @@ def test_program_does_not_take_the_lease_from_a_driver(table: Staged) -> None:
     table.touch(other.person.key)
     with pytest.raises(LeaseError, match="Window 2 holds the arm"):
         table.programs.steer(owner, ProgramOrder.RUN)
-    assert len(table.hub.windows) == 2
+    assert len(table.hub.participants) == 2
     assert table.hub.lease.holder == other.person
 
 
 def test_stop_and_a_closed_page_end_a_program(table: Staged) -> None:
-    window = table.join(PAGES[0])
-    table.plan(window)
-    table.programs.steer(window, ProgramOrder.RUN)
+    participant = table.join(PAGES[0])
+    table.plan(participant)
+    table.programs.steer(participant, ProgramOrder.RUN)
     table.stop("Somebody")
-    table.wait(0.1, window)
+    table.wait(0.1, participant)
     assert table.status == "stopped"
-    table.hub.move(window, cmd.ClearStop())
-    table.hub.release_lease(window)
-    table.programs.steer(window, ProgramOrder.RUN)
-    table.wait(0.5, window)
-    table.hub.leave(window)
+    table.hub.move(participant, cmd.ClearStop())
+    table.hub.release_lease(participant)
+    table.programs.steer(participant, ProgramOrder.RUN)
+    table.wait(0.5, participant)
+    table.hub.leave(participant)
     table.wait(0.5)
     assert table.status == "running"
     table.wait(1.0)
@@ -158,26 +158,26 @@ def test_stop_and_a_closed_page_end_a_program(table: Staged) -> None:
 
 
 def test_panel_request_is_executed_after_planning(table: Staged) -> None:
-    window = table.join(PAGES[0])
+    participant = table.join(PAGES[0])
     with pytest.raises(LeaseError, match="start page"):
-        table.panel.plan(SCRIPT, ProgramOrder.RUN, replace(window.actor, person=NOBODY))
-    table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
+        table.panel.plan(SCRIPT, ProgramOrder.RUN, replace(participant.actor, person=NOBODY))
+    table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
     with pytest.raises(LeaseError, match="being planned"):
-        table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
+        table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
     due = time.monotonic() + 10.0
     while table.status in ("planning", "ready") and time.monotonic() < due:
-        table.wait(0.02, window)
+        table.wait(0.02, participant)
         time.sleep(0.005)
     assert table.status == "running"
 
 
 def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:
-    window = table.join(PAGES[0])
+    participant = table.join(PAGES[0])
     program_runner = table.programs
-    table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
-    clicked = table.hub.at_scene(window.person.key, table.hub.gate.revocations)
+    table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
+    clicked = table.hub.at_scene(participant.person.key, table.hub.gate.revocations)
     table.stop("Anybody")
-    table.hub.move(window, cmd.ClearStop())
+    table.hub.move(participant, cmd.ClearStop())
     # A click that waited in the socket meanwhile.
     with pytest.raises(LeaseError, match="Do it again"):
         table.panel.plan(SCRIPT, ProgramOrder.RUN, clicked)
@@ -186,7 +186,7 @@ def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> N
     due = time.monotonic() + 10.0
     while table.status == "planning" and time.monotonic() < due:
         time.sleep(0.005)
-    table.wait(1.0, window)
+    table.wait(1.0, participant)
     assert table.status == "ready"
     assert not program_runner.running
 

@@ -22,7 +22,7 @@ from katana450.server.service import status
 from katana450.server.service.command_gate import SETTLE_TIME
 from katana450.server.service.hub import TICK
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, SIMULATION_APP, AppServer
 from tests.gateway.test_hub import PAGES, Table, moves
@@ -39,7 +39,7 @@ def table(session: Session) -> Table:
 
 
 @pytest.fixture
-def driver(table: Table) -> Window:
+def driver(table: Table) -> Participant:
     """Return a driver whose arm moves."""
     driver = table.join(PAGES[0])
     table.touch(driver.person.key)
@@ -48,7 +48,9 @@ def driver(table: Table) -> Window:
     return driver
 
 
-def test_simulated_arm_pauses_and_the_next_command_moves_it(table: Table, driver: Window) -> None:
+def test_simulated_arm_pauses_and_the_next_command_moves_it(
+    table: Table, driver: Participant
+) -> None:
     drag = table.touch(driver.person.key)
     table.wait(Settings.silence - TICK)
     assert moves(table)
@@ -71,7 +73,7 @@ def test_simulated_arm_pauses_and_the_next_command_moves_it(table: Table, driver
 
 
 def test_paused_arm_does_not_move_for_a_driver_without_heartbeats(
-    table: Table, driver: Window
+    table: Table, driver: Participant
 ) -> None:
     table.wait(1.0)
     assert not moves(table)
@@ -85,7 +87,7 @@ def test_paused_arm_does_not_move_for_a_driver_without_heartbeats(
     table.touch(driver.person.key)
 
 
-def test_pause_becomes_a_stop_after_longer_silence(table: Table, driver: Window) -> None:
+def test_pause_becomes_a_stop_after_longer_silence(table: Table, driver: Participant) -> None:
     table.wait(PAUSE_TIMEOUT - 5 * TICK)
     assert table.arm.stops == 0
     table.wait(6 * TICK)
@@ -121,7 +123,7 @@ def test_late_server_is_blamed_instead_of_the_line(table: Table, profile: Silenc
         assert "silent" not in table.hub.stopped.why
 
 
-def test_pause_by_the_arm_voids_older_gestures(table: Table, driver: Window) -> None:
+def test_pause_by_the_arm_voids_older_gestures(table: Table, driver: Participant) -> None:
     drag = table.touch(driver.person.key)
     table.arm.cause, table.arm.moves = Finding(Reason.LOOP_LATE, 0.3), False
     with pytest.raises(LeaseError, match="just paused"):
@@ -136,7 +138,7 @@ def test_pause_by_the_arm_voids_older_gestures(table: Table, driver: Window) -> 
 
 @pytest.mark.parametrize("profile", SilenceProfile)
 def test_closed_window_brakes_and_frees_the_arm(
-    table: Table, driver: Window, profile: SilenceProfile
+    table: Table, driver: Participant, profile: SilenceProfile
 ) -> None:
     table.arm.profile = profile
     table.hub.close(Identity("session", None, Role.ADMIN), PAGES[0])
@@ -159,7 +161,7 @@ def test_closed_window_brakes_and_frees_the_arm(
     assert driver.person != other.person
 
 
-def test_reloaded_page_keeps_the_arm_that_nobody_took(table: Table, driver: Window) -> None:
+def test_reloaded_page_keeps_the_arm_that_nobody_took(table: Table, driver: Participant) -> None:
     table.arm.moves = False
     table.hub.close(Identity("session", None, Role.ADMIN), PAGES[0])
     table.hub.leave(driver)

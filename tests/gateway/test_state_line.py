@@ -14,7 +14,7 @@ from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.state_line import duration
 from katana450.server.service import status
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import Staged
 
@@ -24,8 +24,8 @@ def table(session: Session) -> Staged:
     return Staged(session)
 
 
-def bar(table: Staged, window: Window) -> dict[str, Any]:
-    return status.common(table.hub) | status.of(table.hub, window)
+def bar(table: Staged, participant: Participant) -> dict[str, Any]:
+    return status.common(table.hub) | status.of(table.hub, participant)
 
 
 def paused(table: Staged, *, value: bool) -> None:
@@ -59,9 +59,9 @@ def test_server_pauses_after_a_person_has_paused(table: Staged) -> None:
 
 def test_pause_of_an_unknown_person_has_no_name(table: Staged) -> None:
     """Show a pause that is older than this process."""
-    window = table.join(PAGES[0])
+    participant = table.join(PAGES[0])
     paused(table, value=True)
-    shown = bar(table, window)
+    shown = bar(table, participant)
     assert (shown["headline"], shown["paused_at"]) == ("Paused", None)
 
 
@@ -74,21 +74,21 @@ def test_pace_is_refused_with_a_reason_to_all_but_the_driver(table: Staged) -> N
 
 
 def test_viewer_may_not_pace(table: Staged) -> None:
-    window = table.join(PAGES[0], Role.VIEWER)
-    assert bar(table, window)["pace"] == "You may watch, not drive."
+    participant = table.join(PAGES[0], Role.VIEWER)
+    assert bar(table, participant)["pace"] == "You may watch, not drive."
 
 
 def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:
-    window = table.join(PAGES[0])
-    table.touch(window.person.key)
+    participant = table.join(PAGES[0])
+    table.touch(participant.person.key)
     rest = table.arm.rest
     table.arm.rest = replace(rest, motion=replace(rest.motion, qd=rest.motion.qd + 0.1))
     table.stop("Anybody")
-    table.wait(0.2, window)
-    shown = bar(table, window)
+    table.wait(0.2, participant)
+    shown = bar(table, participant)
     assert (shown["stop"], shown["headline"]) == ("confirmed", "Stopping…")
     table.arm.rest = rest
-    assert bar(table, window)["headline"] == "Stopped"
+    assert bar(table, participant)["headline"] == "Stopped"
 
 
 def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -> None:
@@ -111,14 +111,14 @@ def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -
 
 
 def test_remaining_time_counts_the_present_speed(table: Staged) -> None:
-    window = table.join(PAGES[0])
-    table.plan(window, "steps:\n  - wait: 1\n  - joints: [20, -60, 80, 8, 0]\n")
+    participant = table.join(PAGES[0])
+    table.plan(participant, "steps:\n  - wait: 1\n  - joints: [20, -60, 80, 8, 0]\n")
     program = table.programs.program
     assert program is not None
-    table.programs.steer(window, ProgramOrder.RUN)
-    table.wait(0.5, window)
+    table.programs.steer(participant, ProgramOrder.RUN)
+    table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, speed=0.5)
-    table.wait(0.1, window)
+    table.wait(0.1, participant)
     progress = table.programs.progress()
     assert progress is not None
     assert progress.seconds_left == pytest.approx(0.4 + 2.0 * program.duration, abs=0.1)

@@ -24,7 +24,7 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Window, actor_of
+from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import Staged
@@ -38,7 +38,7 @@ def table(session: Session) -> Staged:
     return Staged(session)
 
 
-def run(table: Staged, owner: Window, *, unattended: bool = True) -> None:
+def run(table: Staged, owner: Participant, *, unattended: bool = True) -> None:
     table.plan(owner)
     table.programs.handle(owner, Steer(order=ProgramOrder.RUN, unattended=unattended))
     assert table.status == "running"

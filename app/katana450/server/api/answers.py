@@ -180,7 +180,7 @@ class State(Answer, frozen=True, kw_only=True):
             stops until the stop is cleared; "simulation" pauses until the next command, and stops
             after 5 s of silence.
         age: Time since the arm's process last answered [s]. From 0.3 s the state counts as unknown.
-        windows: Number of open pages and programs.
+        participants: Number of connected pages and programs.
         water: Water of the cup; null without one.
         program: Program that is being planned, is running, or ran last.
         fields: Values of the watched fields of the VRML world.
@@ -220,7 +220,7 @@ class State(Answer, frozen=True, kw_only=True):
     revocations: int
     silence_profile: str
     age: float
-    windows: int
+    participants: int
     water: Water | None
     program: Progress | None = None
     fields: tuple[Value, ...] = ()

@@ -23,7 +23,7 @@ from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.object_requests import ObjectRequests
-from katana450.server.service.participants import Window, session_of
+from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.people_requests import PeopleRequests
 
 COMMANDS: dict[type[requests.Request], cmd.Command] = {
@@ -45,10 +45,10 @@ OUTCOME_SECONDS = 1.0
 """Timeout [s] for the outcome of a command from the arm's process; a tick takes 10 ms."""
 
 
-def driver_key(hub: Hub, window: Window) -> str:
-    """Return the key of ``window`` if it drives or owns the running program, else ``""``."""
-    holder, key = hub.lease.holder, window.person.key
-    return key if holder == window.person or hub.gate.program == (holder, key) else ""
+def driver_key(hub: Hub, participant: Participant) -> str:
+    """Return the key of ``participant`` if it drives or owns the running program, else ``""``."""
+    holder, key = hub.lease.holder, participant.person.key
+    return key if holder == participant.person or hub.gate.program == (holder, key) else ""
 
 
 class Dispatcher:
@@ -63,8 +63,10 @@ class Dispatcher:
         self._objects = ObjectRequests(hub)
         self._people = PeopleRequests(hub)
 
-    def handle(self, window: Window, request: requests.Request, budget: Budget) -> answers.Answer:
-        """Execute ``request`` and return its answer. Counts as a heartbeat of ``window``.
+    def handle(
+        self, participant: Participant, request: requests.Request, budget: Budget
+    ) -> answers.Answer:
+        """Execute ``request`` and return its answer. Counts as a heartbeat of ``participant``.
 
         The outcome of a command may still be pending, see ``is_pending``.
 
@@ -72,29 +74,29 @@ class Dispatcher:
         ``free`` request and a command of the driver cost nothing. Raises MutedError for a request
         of a muted identity that does not count.
         """
-        question, driver = request.traits.question, driver_key(self._hub, window)
-        admin = request.traits.admin and window.person.role is Role.ADMIN
+        question, driver = request.traits.question, driver_key(self._hub, participant)
+        admin = request.traits.admin and participant.person.role is Role.ADMIN
         free = request.traits.free or admin or (driver and not question)
         try:
             with nullcontext() if free else budget.charged(driver, question=question):
-                self._check_muted(window, request)
-                return msgspec.structs.replace(self._execute(window, request), id=request.id)
+                self._check_muted(participant, request)
+                return msgspec.structs.replace(self._execute(participant, request), id=request.id)
         except KatanaError as error:
             if not question or isinstance(error, BusyError):
-                self._hub.recorder.refuse(request, window.actor, error)
+                self._hub.recorder.refuse(request, participant.actor, error)
             raise
 
-    def _check_muted(self, window: Window, request: requests.Request) -> None:
+    def _check_muted(self, participant: Participant, request: requests.Request) -> None:
         """Raise MutedError if ``request`` does not count. ``Hub.stop`` counts the STOPs."""
-        session = session_of(window.person.key)
+        session = session_of(participant.person.key)
         counted = not isinstance(request, requests.Stop | requests.Heartbeat)
         if counted and session not in self._hub.drivers:
             self._hub.people.mutes.count_request(session)
 
-    def _execute(self, window: Window, request: requests.Request) -> answers.Answer:
+    def _execute(self, participant: Participant, request: requests.Request) -> answers.Answer:
         hub = self._hub
-        hub.heartbeat(window)
-        if request.traits.admin and window.person.role is not Role.ADMIN:
+        hub.heartbeat(participant)
+        if request.traits.admin and participant.person.role is not Role.ADMIN:
             raise LeaseError("Only an admin may do this.")
         match request:
             case requests.Heartbeat(n=n):
@@ -106,24 +108,24 @@ class Dispatcher:
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
             case requests.Stop(press=press):
                 # Answered at once: later states confirm the stop.
-                return _done(hub.stop(window.actor, press), REQUESTED)
-        about_people = self._people.answer(window, request)
+                return _done(hub.stop(participant.actor, press), REQUESTED)
+        about_people = self._people.answer(participant, request)
         if about_people is not None:
             return about_people
         if isinstance(request, hub.runner.request_types):
-            return hub.runner.handle(window, request)
+            return hub.runner.handle(participant, request)
         if isinstance(request, requests.Undo):
             # Read before the undo: a stop in between is newer than the answer.
             revocations = hub.gate.revocations
-            ticket = hub.gate.undo_last(replace(window.actor, seen=request.revocations))
+            ticket = hub.gate.undo_last(replace(participant.actor, seen=request.revocations))
             return msgspec.structs.replace(_done(ticket, None), revocations=revocations)
         command = self._command(request)
         if command is None:
-            self._change_lease(window, request)
+            self._change_lease(participant, request)
             return answers.Done()
         # Read before the move: a stop in between is newer than the answer.
         revocations = hub.gate.revocations
-        ticket = hub.move(window, command, request.revocations)
+        ticket = hub.move(participant, command, request.revocations)
         # A stream does not wait for its answers. A command that is planned first has no ticket yet.
         at_once = request.traits.stream or command.traits.planned or not ticket
         done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))
@@ -150,26 +152,26 @@ class Dispatcher:
             return msgspec.structs.replace(pending, outcome=UNKNOWN)
         return serialize.concluded(pending, outcome)
 
-    def _change_lease(self, window: Window, request: requests.Request) -> None:
+    def _change_lease(self, participant: Participant, request: requests.Request) -> None:
         """Execute a request about the lease."""
         hub = self._hub
         match request:
             case requests.Acquire():
-                hub.acquire(window)
+                hub.acquire(participant)
             case requests.Take():
-                hub.take(window)
+                hub.take(participant)
             case requests.Ask():
-                hub.request(window)
+                hub.request(participant)
             case requests.Withdraw():
-                hub.withdraw(window)
+                hub.withdraw(participant)
             case requests.ReleaseLease():
-                hub.release_lease(window)
+                hub.release_lease(participant)
             case requests.Give(to=number):
-                hub.hand_over(window, number)
+                hub.hand_over(participant, number)
             case requests.Decline(to=number):
-                hub.decline(window, number)
+                hub.decline(participant, number)
             case requests.Rename(name=name):
-                hub.rename(window, name)
+                hub.rename(participant, name)
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of ``request``; None for a request about the lease."""

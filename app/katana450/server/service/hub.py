@@ -29,7 +29,13 @@ from katana450.server.service.interfaces import ArmInterface, MeasuresAge
 from katana450.server.service.known_pages import KnownPages
 from katana450.server.service.mutes import MutedError
 from katana450.server.service.names import renamed
-from katana450.server.service.participants import Takeover, Window, key_of, presser_of, session_of
+from katana450.server.service.participants import (
+    Participant,
+    Takeover,
+    key_of,
+    presser_of,
+    session_of,
+)
 from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import Runner, guarded
@@ -71,7 +77,7 @@ class Hub:
         self.gate.on_stop = guarded(self.runner.stopped)
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
-        self._windows: dict[str, Window] = {}
+        self._participants: dict[str, Participant] = {}
         self._pictures: dict[MeasuresAge, str] = {}
         self._known = KnownPages()
         self._takeover: Takeover | None = None
@@ -123,52 +129,53 @@ class Hub:
         notify: Callable[[dict[str, Any]], None],
         heartbeat: LastHeartbeat | None = None,
         channel: CommandChannel = CommandChannel.PAGE,
-    ) -> Window:
+    ) -> Participant:
         """Add a page or program; a page that returns keeps its person and number.
 
         ``heartbeat``: its newest heartbeat; without one, calls of ``heartbeat`` count. ``channel``:
         channel of its commands.
         """
         key = key_of(identity, page)
-        person, number = self._known.recognise(key, identity, self._windows)
-        window = Window(person, number, notify, heartbeat or LastHeartbeat(self.clock), channel)
-        self._windows[key] = window
-        self._note_presence("join", window)
-        self.heartbeat(window)
-        return window
+        person, number = self._known.recognise(key, identity, self._participants)
+        newest = heartbeat or LastHeartbeat(self.clock)
+        participant = Participant(person, number, notify, newest, channel)
+        self._participants[key] = participant
+        self._note_presence("join", participant)
+        self.heartbeat(participant)
+        return participant
 
-    def rename(self, window: Window, name: str) -> None:
-        """Give ``window`` the display name ``name``. Raises InputError; see ``names.renamed``."""
-        person = renamed(window.person, name, self._known.people)
-        self.recorder.note("rename", window.actor, {"name": person.name})
-        window.person = person
-        self._known.rename(person, window.number)
-        self.gate.change(lambda lease, _: lease.renamed(person), window.actor)
+    def rename(self, participant: Participant, name: str) -> None:
+        """Give ``participant`` the name ``name``. Raises InputError; see ``names.renamed``."""
+        person = renamed(participant.person, name, self._known.people)
+        self.recorder.note("rename", participant.actor, {"name": person.name})
+        participant.person = person
+        self._known.rename(person, participant.number)
+        self.gate.change(lambda lease, _: lease.renamed(person), participant.actor)
 
-    def leave(self, window: Window, *, for_good: bool = False) -> None:
-        """Remove ``window``, whose control socket is closed.
+    def leave(self, participant: Participant, *, for_good: bool = False) -> None:
+        """Remove ``participant``, whose control socket is closed.
 
         ``for_good``: the participant is a program, which does not return.
         """
-        person = window.person
-        if self._windows.get(person.key) is not window:
+        person = participant.person
+        if self._participants.get(person.key) is not participant:
             return
-        del self._windows[person.key]
-        self._note_presence("leave", window)
+        del self._participants[person.key]
+        self._note_presence("leave", participant)
         self.gate.change(lambda lease, _: lease.leave(person))
         if not for_good:
             return
         self._known.forget(person.key)
-        self.runner.leave(window)
+        self.runner.leave(participant)
         if self.lease.holder == person:
             if self.stopped is None and self.gate.moves():
                 self.gate.protect(f"{person.name} left while the arm moved.")
-            self.release_lease(window)
+            self.release_lease(participant)
 
-    def _note_presence(self, kind: str, window: Window) -> None:
+    def _note_presence(self, kind: str, participant: Participant) -> None:
         # A program on the server is noted where it begins and ends.
-        if window.channel is not CommandChannel.PROGRAM:
-            self.recorder.note(kind, window.actor, {"number": window.number})
+        if participant.channel is not CommandChannel.PROGRAM:
+            self.recorder.note(kind, participant.actor, {"number": participant.number})
 
     def close(self, identity: Identity, page: str) -> None:
         """Free the arm of the page whose window was closed, and brake the arm.
@@ -185,9 +192,9 @@ class Hub:
         """Return the arm. Raises LeaseError until it is ready."""
         return self.gate.present()
 
-    def window(self, key: str) -> Window | None:
+    def participant(self, key: str) -> Participant | None:
         """Return the window of ``key``; None unless its control socket is open."""
-        return self._windows.get(key)
+        return self._participants.get(key)
 
     def at_scene(self, key: str, seen: int) -> Actor:
         """Return the actor of a gesture at viser's controls. For any thread.
@@ -195,10 +202,10 @@ class Hub:
         ``key``: key of the window. ``seen``: number of revocations at the receipt of the gesture.
         Raises LeaseError if the window has no control socket.
         """
-        window = self._windows.get(key)
-        if window is None:
+        participant = self._participants.get(key)
+        if participant is None:
             raise LeaseError("Open the start page to drive the arm.")
-        return Actor(window.person, CommandChannel.SCENE, seen)
+        return Actor(participant.person, CommandChannel.SCENE, seen)
 
     def show(self, key: str, picture: MeasuresAge) -> None:
         """Add the connection of a page to viser. ``picture`` measures the age of its picture."""
@@ -213,20 +220,20 @@ class Hub:
         """Number of browsers that get pictures."""
         return len(self._pictures)
 
-    def age(self, window: Window) -> float:
+    def age(self, participant: Participant) -> float:
         """Return the age of the picture that the window shows [s]."""
-        pictures = [each for each, key in self._pictures.items() if key == window.person.key]
+        pictures = [each for each, key in self._pictures.items() if key == participant.person.key]
         return pictures[-1].age(self.clock()) if pictures else 0.0
 
     @property
-    def windows(self) -> list[Window]:
+    def participants(self) -> list[Participant]:
         """All open windows, the oldest first."""
-        return sorted(self._windows.values(), key=lambda window: window.number)
+        return sorted(self._participants.values(), key=lambda participant: participant.number)
 
     def announce(self, why: str) -> None:
         """Send all windows the reason for which a request is refused. For any thread."""
-        for window in self.windows:
-            window.notify({"is": "refused", "why": why})
+        for participant in self.participants:
+            participant.notify({"is": "refused", "why": why})
 
     # Requests
 
@@ -260,67 +267,66 @@ class Hub:
         owner = (program.owner,) if program is not None and program.person == holder else ()
         return tuple(session_of(key) for key in (holder.key, *owner))
 
-    def acquire(self, window: Window) -> None:
-        """Acquire the free lease for ``window``. Raises LeaseError if another holds it."""
-        self.gate.acquire(window.actor)
+    def acquire(self, participant: Participant) -> None:
+        """Acquire the free lease for ``participant``. Raises LeaseError if another holds it."""
+        self.gate.acquire(participant.actor)
 
-    def take(self, window: Window) -> None:
-        """Take the lease from its holder for ``window``. Raises LeaseError if not allowed."""
-        keys = frozenset(w.person.key for w in self.windows if self.giver(w) == self.lease.holder)
-        self.gate.change(lambda lease, t: lease.take(window.person, t), window.actor)
-        self._takeover = Takeover(window.person, keys)
+    def take(self, participant: Participant) -> None:
+        """Take the lease from its holder for ``participant``. Raises LeaseError if not allowed."""
+        drove = [each for each in self.participants if self.giver(each) == self.lease.holder]
+        self.gate.change(lambda lease, t: lease.take(participant.person, t), participant.actor)
+        self._takeover = Takeover(participant.person, frozenset(each.person.key for each in drove))
 
-    def request(self, window: Window) -> None:
-        """Request the lease from its holder for ``window``. Raises LeaseError."""
-        self.gate.change(lambda lease, _: lease.request(window.person), window.actor)
+    def request(self, participant: Participant) -> None:
+        """Request the lease from its holder for ``participant``. Raises LeaseError."""
+        self.gate.change(lambda lease, _: lease.request(participant.person), participant.actor)
 
-    def withdraw(self, window: Window) -> None:
-        """Withdraw the request of ``window`` for the lease."""
-        self.gate.change(lambda lease, _: lease.withdraw(window.person), window.actor)
+    def withdraw(self, participant: Participant) -> None:
+        """Withdraw the request of ``participant`` for the lease."""
+        self.gate.change(lambda lease, _: lease.withdraw(participant.person), participant.actor)
 
-    def taken_by(self, window: Window) -> str | None:
-        """Return the name of the person who took the lease from ``window`` and still holds it."""
+    def taken_by(self, participant: Participant) -> str | None:
+        """Return who took the lease from ``participant`` and still holds it; None if nobody."""
         took = self._takeover
-        if took is None or window.person.key not in took.drivers or self.lease.holder != took.taker:
-            return None
-        return took.taker.name
+        return None if took is None else took.taker_from(participant.person, self.lease.holder)
 
-    def release_lease(self, window: Window) -> None:
-        """Release the lease of ``window``. Raises LeaseError if another holds it."""
-        self.gate.change(lambda lease, _: lease.release(window.person), window.actor)
+    def release_lease(self, participant: Participant) -> None:
+        """Release the lease of ``participant``. Raises LeaseError if another holds it."""
+        self.gate.change(lambda lease, _: lease.release(participant.person), participant.actor)
         self._takeover = None
 
-    def hand_over(self, window: Window, number: int) -> None:
-        """Hand the lease to the window of ``number``; a running program of ``window`` ends."""
-        giver, taker = self.giver(window), self._numbered(number).person
-        self.gate.change(lambda lease, t: lease.hand_over(giver, taker, t), window.actor)
+    def hand_over(self, participant: Participant, number: int) -> None:
+        """Hand the lease to the window of ``number``; a running program of ``participant`` ends."""
+        giver, taker = self.giver(participant), self._numbered(number).person
+        self.gate.change(lambda lease, t: lease.hand_over(giver, taker, t), participant.actor)
 
-    def decline(self, window: Window, number: int) -> None:
+    def decline(self, participant: Participant, number: int) -> None:
         """Decline the request of the window of ``number`` for the lease, and notify it."""
-        giver, requester = self.giver(window), self._numbered(number)
-        self.gate.change(lambda lease, _: lease.decline(giver, requester.person), window.actor)
-        requester.notify({"is": "refused", "why": f"{window.person.name} declined your request."})
+        giver, requester = self.giver(participant), self._numbered(number)
+        self.gate.change(lambda lease, _: lease.decline(giver, requester.person), participant.actor)
+        why = f"{participant.person.name} declined your request."
+        requester.notify({"is": "refused", "why": why})
 
-    def giver(self, window: Window) -> Person:
-        """Return the person as which ``window`` may hand over: its running program, or itself."""
+    def giver(self, participant: Participant) -> Person:
+        """Return the person as which ``participant`` hands over: its running program or itself."""
         program = self.gate.program
-        owns = program is not None and program.owner == window.person.key
-        return program.person if program is not None and owns else window.person
+        owns = program is not None and program.owner == participant.person.key
+        return program.person if program is not None and owns else participant.person
 
-    def _numbered(self, number: int) -> Window:
-        found = next((each for each in self.windows if each.number == number), None)
+    def _numbered(self, number: int) -> Participant:
+        found = next((each for each in self.participants if each.number == number), None)
         if found is None:
             raise LeaseError("That window or program is no longer connected.")
         return found
 
-    def heartbeat(self, window: Window) -> None:
-        """Count a message of ``window`` as a heartbeat at the time of its receipt."""
-        window.heartbeat.note()
+    def heartbeat(self, participant: Participant) -> None:
+        """Count a message of ``participant`` as a heartbeat at the time of its receipt."""
+        participant.heartbeat.note()
         self._update_lease()
 
-    def move(self, window: Window, command: cmd.Command, seen: int | None = None) -> int:
-        """Submit ``command`` of ``window``; return its ticket. ``seen``: see ``Actor``."""
-        return self.gate.submit(command, replace(window.actor, seen=seen))
+    def move(self, participant: Participant, command: cmd.Command, seen: int | None = None) -> int:
+        """Submit ``command`` of ``participant``; return its ticket. ``seen``: see ``Actor``."""
+        return self.gate.submit(command, replace(participant.actor, seen=seen))
 
     # Watch
 
@@ -346,10 +352,10 @@ class Hub:
     def _update_lease(self) -> None:
         """Renew the lease by the newest heartbeat of the driver, at the time of its receipt."""
         holder = self.lease.holder
-        window = None if holder is None else self._windows.get(holder.key)
-        if window is not None:
-            newest = window.heartbeat.newest
-            self.gate.change(lambda lease, _: lease.hear(window.person, newest))
+        participant = None if holder is None else self._participants.get(holder.key)
+        if participant is not None:
+            newest = participant.heartbeat.newest
+            self.gate.change(lambda lease, _: lease.hear(participant.person, newest))
 
     def _watch(self, arm: ArmInterface) -> None:
         """Stop an arm whose process does not answer; it stops once the process answers again."""
@@ -369,19 +375,19 @@ class Hub:
         silence = self.lease.silence(t)
         silent = silence >= self._hold_after
         if silent and self.stopped is None and self.gate.moves():
-            self._driver_watch.brake(holder, silence, t, connected=holder.key in self._windows)
+            self._driver_watch.brake(holder, silence, t, connected=holder.key in self._participants)
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
 
     def _heard(self, person: Person) -> float:
         """Return the time of the newest heartbeat of ``person`` [s]."""
-        window = self._windows.get(person.key)
-        return -math.inf if window is None else window.heartbeat.newest
+        participant = self._participants.get(person.key)
+        return -math.inf if participant is None else participant.heartbeat.newest
 
     def person_of(self, identity: Identity, page: str) -> Person:
         """Return the person at ``page``, whether or not its control socket is open now."""
         key = key_of(identity, page)
-        return self._known.recognise(key, identity, self._windows)[0]
+        return self._known.recognise(key, identity, self._participants)[0]
 
     def _presser_of(self, cause: StopCause) -> Actor | None:
         """Return the participant that pressed STOP on the port of STOP; None for a watchdog."""

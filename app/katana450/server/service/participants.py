@@ -17,7 +17,7 @@ SHARED_SESSION = "programs"
 
 
 @dataclass(eq=False)
-class Window:
+class Participant:
     """The record of one connected page or program.
 
     Attributes:
@@ -41,10 +41,15 @@ class Window:
 
 
 class Takeover(NamedTuple):
-    """The newest take-over of the lease. ``drivers``: keys of the windows that drove before."""
+    """The newest take-over of the lease. ``drivers``: keys of those that drove before."""
 
     taker: Person
     drivers: frozenset[str]
+
+    def taker_from(self, person: Person, holder: Person | None) -> str | None:
+        """Return the name of the taker if it drove ``person`` out and is still the ``holder``."""
+        took = person.key in self.drivers and holder == self.taker
+        return self.taker.name if took else None
 
 
 def actor_of(identity: Identity, channel: CommandChannel) -> Actor:

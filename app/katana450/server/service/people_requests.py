@@ -12,7 +12,7 @@ from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Window, session_of
+from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.people import Connection, ConnectionKind
 
 log = logging.getLogger(__name__)
@@ -29,32 +29,32 @@ class PeopleRequests:
         self._hub = hub
         self._people = hub.people
 
-    def answer(self, window: Window, request: requests.Request) -> answers.Answer | None:
+    def answer(self, participant: Participant, request: requests.Request) -> answers.Answer | None:
         """Execute ``request`` and return its answer; None for a request about something else."""
         match request:
             case requests.ListPeople():
-                return answers.People(people=self._list(session_of(window.person.key)))
+                return answers.People(people=self._list(session_of(participant.person.key)))
             case requests.Kick(person=number):
-                self._kick(window, self._person(number), request)
+                self._kick(participant, self._person(number), request)
             case requests.Mute(person=number, seconds=seconds):
-                self._mute(window, self._person(number), seconds)
+                self._mute(participant, self._person(number), seconds)
             case requests.Unmute(person=number):
                 found = self._person(number)
-                self._note("unmute", window, found)
+                self._note("unmute", participant, found)
                 self._people.mutes.remove(found.session)
-                self._store_mute(window, found, None)
-                log.warning("%s ended the mute of %s.", window.person.name, self._name(found))
+                self._store_mute(participant, found, None)
+                log.warning("%s ended the mute of %s.", participant.person.name, self._name(found))
             case _:
                 return None
         return answers.Done()
 
-    def _kick(self, window: Window, person: Identity, request: requests.Kick) -> None:
-        by, name, people = window.person.name, self._name(person), self._people
+    def _kick(self, participant: Participant, person: Identity, request: requests.Kick) -> None:
+        by, name, people = participant.person.name, self._name(person), self._people
         links = people.links
-        if person.session == session_of(window.person.key):
+        if person.session == session_of(participant.person.key):
             raise InputError("You cannot disconnect yourself. Close your windows instead.")
         if not request.revoke:
-            self._note("kick", window, person, seconds=request.seconds)
+            self._note("kick", participant, person, seconds=request.seconds)
             if request.seconds:
                 log.warning("%s disconnected %s for %g s.", by, name, request.seconds)
                 self._remove(person, request.seconds)
@@ -66,19 +66,21 @@ class PeopleRequests:
                 until = time.time() + request.seconds if request.seconds else 0.0
                 people.write(
                     lambda: links.keep_out(person.session, until),
-                    lambda why: _report(window, f"The port of STOP does not know this. {why}"),
+                    lambda why: _report(participant, f"The port of STOP does not know this. {why}"),
                 )
             return
         if links is None:
             raise InputError("This server has no links that could be revoked.")
         if person.role is Role.ADMIN:
             raise LeaseError("Revoke the link of an admin with `katana450 access revoke`.")
-        self._note("revoke", window, person)
+        self._note("revoke", participant, person)
         self._remove(person, math.inf)
         log.warning("%s revoked the link of %s.", by, name)
         people.write(
             lambda: links.revoke(person.session),
-            lambda why: _report(window, f"The link of {name} works again after a restart. {why}"),
+            lambda why: _report(
+                participant, f"The link of {name} works again after a restart. {why}"
+            ),
         )
 
     def _remove(self, person: Identity, seconds: float) -> None:
@@ -86,26 +88,30 @@ class PeopleRequests:
         self._people.kick(person, seconds)
         self._hub.runner.removed(person.session)
 
-    def _mute(self, window: Window, person: Identity, seconds: float) -> None:
+    def _mute(self, participant: Participant, person: Identity, seconds: float) -> None:
         if person.role is Role.ADMIN:
             raise LeaseError("An admin cannot be muted.")
         self._people.mutes.add(person.session, seconds)
         name = self._name(person)
-        self._note("mute", window, person, seconds=seconds)
-        log.warning("%s muted %s: one STOP per %g s.", window.person.name, name, seconds)
-        self._store_mute(window, person, seconds)
+        self._note("mute", participant, person, seconds=seconds)
+        log.warning("%s muted %s: one STOP per %g s.", participant.person.name, name, seconds)
+        self._store_mute(participant, person, seconds)
 
-    def _note(self, kind: str, window: Window, person: Identity, **values: float) -> None:
+    def _note(self, kind: str, participant: Participant, person: Identity, **values: float) -> None:
         """Note for the event log what an admin did to ``person``."""
         what = {"person": self._name(person), "link": person.link, **values}
-        self._hub.recorder.note(kind, window.actor, what, always=True)
+        self._hub.recorder.note(kind, participant.actor, what, always=True)
 
-    def _store_mute(self, window: Window, person: Identity, interval: float | None) -> None:
+    def _store_mute(
+        self, participant: Participant, person: Identity, interval: float | None
+    ) -> None:
         links = self._people.links
         if links is not None:
             self._people.write(
                 lambda: links.mute(person.session, interval),
-                lambda why: _report(window, f"The server forgets this when it restarts. {why}"),
+                lambda why: _report(
+                    participant, f"The server forgets this when it restarts. {why}"
+                ),
             )
 
     def _person(self, number: int) -> Identity:
@@ -153,23 +159,25 @@ class PeopleRequests:
         if identity.link_name:
             return identity.link_name
         for each in self._people.connections.get(identity.session, ()):
-            window = self._hub.window(each.key)
-            if window is not None:
-                return window.person.name
+            participant = self._hub.participant(each.key)
+            if participant is not None:
+                return participant.person.name
         return identity.name or "Somebody"
 
     def _connection(self, connection: Connection) -> answers.PersonConnection:
-        window = self._hub.window(connection.key)
+        participant = self._hub.participant(connection.key)
         scene = connection.kind is ConnectionKind.SCENE
         return answers.PersonConnection(
             kind=connection.kind.value,
-            name=(connection.identity.name or "") if window is None else window.person.name,
-            number=None if window is None or scene else window.number,
+            name=(connection.identity.name or "")
+            if participant is None
+            else participant.person.name,
+            number=None if participant is None or scene else participant.number,
             address=connection.address,
             since=datetime.fromtimestamp(connection.since, UTC).isoformat(timespec="seconds"),
         )
 
 
-def _report(window: Window, why: str) -> None:
-    """Show ``why`` in ``window`` as the reason of a refusal."""
-    window.notify({"is": "refused", "why": why})
+def _report(participant: Participant, why: str) -> None:
+    """Show ``why`` in ``participant`` as the reason of a refusal."""
+    participant.notify({"is": "refused", "why": why})

@@ -14,7 +14,7 @@ from katana450.server.api.fields import Request
 
 if TYPE_CHECKING:
     from katana450.server.service.hub import Hub
-    from katana450.server.service.participants import Window
+    from katana450.server.service.participants import Participant
 
 log = logging.getLogger(__name__)
 
@@ -46,7 +46,7 @@ class Runner:
         """Create a runner for ``hub``. ``options``: those of ``katana450 serve``."""
         self.hub = hub
 
-    def handle(self, window: Window, request: Request) -> answers.Answer:  # noqa: ARG002
+    def handle(self, participant: Participant, request: Request) -> answers.Answer:  # noqa: ARG002
         """Execute ``request``, one of ``request_types``, and return its answer.
 
         Raises LeaseError and InputError with the reason for a refusal.
@@ -69,8 +69,8 @@ class Runner:
     def redirected(self) -> None:
         """Note a command that supersedes a run that waits to begin. Called in any thread."""
 
-    def leave(self, window: Window) -> None:
-        """Note that ``window`` is closed and will not return."""
+    def leave(self, participant: Participant) -> None:
+        """Note that ``participant`` is closed and will not return."""
 
     def removed(self, session: str) -> None:
         """Note that an admin has disconnected the person of ``session``. End what it runs."""
@@ -85,8 +85,8 @@ class Runner:
         """
         return line
 
-    def orders(self, window: Window) -> tuple[str, ...]:  # noqa: ARG002
-        """Return the orders that the bar of the page offers to ``window``.
+    def orders(self, participant: Participant) -> tuple[str, ...]:  # noqa: ARG002
+        """Return the orders that the bar of the page offers to ``participant``.
 
         Pause and Resume are not among them: the bar always has them.
         """

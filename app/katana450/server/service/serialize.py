@@ -76,7 +76,7 @@ def state(hub: Hub) -> answers.State:
         clearable=stopped is not None and not hub.gate.clear_refusal,
         revocations=hub.gate.revocations,
         age=arm.age,
-        windows=len(hub.windows),
+        participants=len(hub.participants),
         program=hub.runner.progress(),
     )
 
@@ -120,7 +120,7 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         revocations=0,
         silence_profile=arm.profile.value,
         age=0.0,
-        windows=0,
+        participants=0,
         water=water(arm.pouring, now),
         program=None,
     )

@@ -9,7 +9,7 @@ from katana450.arm.control.messages import headline, mood, sentence
 from katana450.arm.control.state import State, Status
 from katana450.arm.runtime.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from katana450.server.service.runner import StatusLine
 
 FIRST = (Status.FAULT, Status.STOPPED, Status.BLOCKED)
@@ -74,14 +74,14 @@ def paused_headline(hub: Hub, reader: Person | None) -> str:
     return f"Paused by {'you' if reader is not None and pause.key == reader.key else pause.name}"
 
 
-def pace_refusal(hub: Hub, window: Window) -> str:
-    """Return why ``window`` may not pause, resume or slow down the arm; empty if allowed."""
-    driver, program, person = hub.lease.driver, hub.gate.program, window.person
+def pace_refusal(hub: Hub, participant: Participant) -> str:
+    """Return why ``participant`` may not pause, resume or slow down the arm; empty if allowed."""
+    driver, program, person = hub.lease.driver, hub.gate.program, participant.person
     if not person.role.may_drive:
         return "You may watch, not drive."
     if driver is None or driver == person:
         return ""
-    if program is not None and program.person == driver and hub.runner.orders(window):
+    if program is not None and program.person == driver and hub.runner.orders(participant):
         return ""
     return f"{driver.name} drives: ask for the arm."
 
@@ -105,27 +105,27 @@ def common(hub: Hub) -> dict[str, Any]:
         "detour": state is not None and state.detour is not None and age is None,
         "speed": 1.0 if state is None else state.speed,
         "paused": state is not None and state.paused,
-        "windows": len(hub.windows),
+        "participants": len(hub.participants),
     }
 
 
-def of(hub: Hub, window: Window) -> dict[str, Any]:
-    """Return the part of the status that is for ``window`` alone."""
-    person, lease = window.person, hub.lease
+def of(hub: Hub, participant: Participant) -> dict[str, Any]:
+    """Return the part of the status that is for ``participant`` alone."""
+    person, lease = participant.person, hub.lease
     mine = lease.holder == person
     # While a program drives, its owner decides on requests for the lease.
-    decides = hub.giver(window) == lease.holder
+    decides = hub.giver(participant) == lease.holder
     program = hub.runner.progress()
     planning = program is not None and program.status == "planning"
-    taker = hub.taken_by(window)
-    age = hub.age(window)
+    taker = hub.taken_by(participant)
+    age = hub.age(participant)
     own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
     rights = hub.gate.clear_rights
     clears = rights.allow(person)
     until = "Clear stop is pressed" if clears else f"{rights.names} clears the stop"
     return {
         **(state_line(hub, person)._asdict() if own_pause else {}),
-        "pace": pace_refusal(hub, window),
+        "pace": pace_refusal(hub, participant),
         "may_clear_stop": clears,
         "until": "" if hub.stopped is None else f"Nothing moves until {until}.",
         "name": person.name,
@@ -135,18 +135,18 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
         "asked": person in lease.waiting,
         "asking": [
             {"number": each.number, "name": each.person.name}
-            for each in hub.windows
+            for each in hub.participants
             if decides and each.person in lease.waiting
         ],
         "others": [
             {"number": each.number, "name": each.person.name}
-            for each in hub.windows
+            for each in hub.participants
             if mine and each.person != person and each.person.role.may_drive
         ],
         "taken": "" if taker is None else f"{taker} took over from you.",
         "planning": planning,
         "fraction": round(program.fraction, 2) if program is not None and planning else 0.0,
-        "orders": list(hub.runner.orders(window)) if hub.arm is not None else [],
+        "orders": list(hub.runner.orders(participant)) if hub.arm is not None else [],
         "undo": [each.name for each in hub.gate.undo.changes(person.key, hub.gate.revocations)],
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
     }

@@ -167,8 +167,8 @@ class _Line:
 
     async def _up(self, upstream: ClientConnection) -> None:
         """Pass the messages of the browser to viser that the message filter admits."""
-        window = self._hub.window(self._key)
-        who = window.person.name if window is not None else "a window without our page"
+        participant = self._hub.participant(self._key)
+        who = participant.person.name if participant is not None else "a window without our page"
         message_filter = MessageFilter(self._guard, who, self._hub.clock())
         while True:
             # At most one message per turn of the event loop, so that other tasks can run.
@@ -195,10 +195,10 @@ class _Line:
 
     def _refuse(self, why: str) -> None:
         """Show in the browser's window why its gesture was refused."""
-        window, t = self._hub.window(self._key), self._hub.clock()
-        if window is not None and t - self._refused_at >= REFUSAL_INTERVAL:
+        participant, t = self._hub.participant(self._key), self._hub.clock()
+        if participant is not None and t - self._refused_at >= REFUSAL_INTERVAL:
             self._refused_at = t
-            window.notify({"is": "refused", "why": why})
+            participant.notify({"is": "refused", "why": why})
 
     async def _send(self, frame: bytes) -> None:
         await self._browser.send_bytes(frame)

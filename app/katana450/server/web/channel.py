@@ -23,7 +23,7 @@ from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
 from katana450.server.service.mutes import MutedError
-from katana450.server.service.participants import Window, session_of
+from katana450.server.service.participants import Participant, session_of
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.token_bucket import TokenBucket
 
@@ -105,7 +105,7 @@ class Channel(ABC):
         """
         self.hub = hub
         self.budget = budget
-        self.window: Window | None = None
+        self.participant: Participant | None = None
         self._dispatcher = Dispatcher(hub)
         self._line = line
         self._often = often
@@ -123,9 +123,9 @@ class Channel(ABC):
     def unasked(self) -> tuple[Any, float | None]:
         """Return the message to send now, or None, and the time until the next call [s]."""
 
-    def answer(self, window: Window, request: requests.Request) -> None:
+    def answer(self, participant: Participant, request: requests.Request) -> None:
         """Execute ``request``; send the answer if it has an id or is always answered."""
-        answer = self._dispatcher.handle(window, request, self.budget)
+        answer = self._dispatcher.handle(participant, request, self.budget)
         wanted = request.id is not None or request.traits.answered
         if self._dispatcher.is_pending(answer):
             task = asyncio.ensure_future(self._conclude(answer, wanted=wanted))
@@ -140,9 +140,9 @@ class Channel(ABC):
         if wanted or isinstance(answer, answers.Refused):
             self.notify(answer)
 
-    async def run(self, window: Window) -> None:
+    async def run(self, participant: Participant) -> None:
         """Receive and send until one side closes the connection."""
-        tasks = [asyncio.create_task(each) for each in (self._send(), self._receive(window))]
+        tasks = [asyncio.create_task(each) for each in (self._send(), self._receive(participant))]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -152,7 +152,7 @@ class Channel(ABC):
                 if isinstance(ended, Exception) and not isinstance(ended, GoneError):
                     log.error("Error on a channel.", exc_info=ended)
 
-    async def _receive(self, window: Window) -> None:
+    async def _receive(self, participant: Participant) -> None:
         while True:
             # One request per turn of the loop, so that a flooding client does not delay others.
             await asyncio.sleep(0)
@@ -160,8 +160,8 @@ class Channel(ABC):
             try:
                 request = self.hub.requests.decoded(text)
             except InputError as error:
-                log.warning("Invalid request from %s: %s", window.person.name, error)
-                self.hub.recorder.refuse("invalid", window.actor, error)
+                log.warning("Invalid request from %s: %s", participant.person.name, error)
+                self.hub.recorder.refuse("invalid", participant.actor, error)
                 if not self._bad.take(self.hub.clock()):
                     await self._disconnect(BAD_REQUEST_CLOSE_CODE, "Too many invalid requests.")
                     return
@@ -169,16 +169,16 @@ class Channel(ABC):
                 continue
             # STOP is exempt from the rate limit.
             if not self._often.take(self.hub.clock()) and not request.traits.safety:
-                log.warning("%s sends too many requests: disconnected.", window.person.name)
-                self.hub.recorder.refuse("any", window.actor, InputError("Too many requests."))
+                log.warning("%s sends too many requests: disconnected.", participant.person.name)
+                self.hub.recorder.refuse("any", participant.actor, InputError("Too many requests."))
                 await self._disconnect(LIMIT_CLOSE_CODE, "Too many requests.")
                 return
             try:
-                self.answer(window, request)
+                self.answer(participant, request)
             except BusyError as error:
                 if error.gone:
-                    log.warning("%s exceeds its budget: disconnected.", window.person.name)
-                    self.hub.recorder.refuse("any", window.actor, error)
+                    log.warning("%s exceeds its budget: disconnected.", participant.person.name)
+                    self.hub.recorder.refuse("any", participant.actor, error)
                     await self._disconnect(LIMIT_CLOSE_CODE, str(error))
                     return
                 self.refuse(str(error), request.id, retry=error.retry)
@@ -194,8 +194,8 @@ class Channel(ABC):
 
     def refuse(self, why: str, request_id: Id, **more: float) -> None:
         """Send a refusal of the request of ``request_id``. ``more``: fields of ``Refused``."""
-        if self.window is not None:
-            self.hub.people.refused(session_of(self.window.person.key))
+        if self.participant is not None:
+            self.hub.people.refused(session_of(self.participant.person.key))
         self.notify({"is": "refused", "why": why, "id": request_id, **more})
 
     def wake(self) -> None:

@@ -15,7 +15,7 @@ from katana450.server.service import status
 from katana450.server.service.budget import Budget, Budgets
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
@@ -48,9 +48,9 @@ class ControlSocket(Channel):
         self._sent: dict[str, Any] = {}
         self._checked_at = float("-inf")
 
-    def answer(self, window: Window, request: requests.Request) -> None:
+    def answer(self, participant: Participant, request: requests.Request) -> None:
         """Execute ``request``, send its answer, and confirm the receipt of a stop."""
-        super().answer(window, request)
+        super().answer(participant, request)
         if isinstance(request, requests.Stop):
             self.notify({"is": "stopped"})
         if not isinstance(request, requests.Heartbeat | requests.Jog):
@@ -59,10 +59,10 @@ class ControlSocket(Channel):
     def unasked(self) -> tuple[Any, float | None]:
         """Return the changes of the status, or None, and the time until the next call [s]."""
         t = self.hub.clock()
-        if self.window is None or t - self._checked_at < PUSH_EVERY / 2:
+        if self.participant is None or t - self._checked_at < PUSH_EVERY / 2:
             return None, PUSH_EVERY
         self._checked_at = t
-        now = status.common(self.hub) | status.of(self.hub, self.window)
+        now = status.common(self.hub) | status.of(self.hub, self.participant)
         changes = {key: value for key, value in now.items() if self._sent.get(key, self) != value}
         if not changes:
             return None, PUSH_EVERY
@@ -83,16 +83,16 @@ async def serve(
     line = WebSocketJsonChannel(socket)
     control = ControlSocket(hub, line, budgets.of(identity.session))
     identity = replace(identity, address=address_of(socket))
-    control.window = window = hub.join(identity, page, control.notify, line.arrival)
+    control.participant = participant = hub.join(identity, page, control.notify, line.arrival)
     connection = Connection(
-        identity, ConnectionKind.PAGE, address_of(socket), key=window.person.key
+        identity, ConnectionKind.PAGE, address_of(socket), key=participant.person.key
     )
     try:
         why = await authenticator.run_while_authorised(
-            lambda: authenticator.identity(socket.cookies), control.run(window), connection
+            lambda: authenticator.identity(socket.cookies), control.run(participant), connection
         )
         if why is not None:
-            hub.recorder.note("revocation", window.actor, always=True, why=why)
+            hub.recorder.note("revocation", participant.actor, always=True, why=why)
             await line.close(SIGN_IN_CLOSE_CODE, why)
     finally:
-        hub.leave(window)
+        hub.leave(participant)

@@ -26,7 +26,7 @@ from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import MutedError
-from katana450.server.service.participants import SHARED_SESSION, Window, actor_of
+from katana450.server.service.participants import SHARED_SESSION, Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
@@ -73,7 +73,7 @@ RouteProvider = Callable[[RouteContext], list[BaseRoute]]
 class _Posting(NamedTuple):
     """A program that sends requests by POST; ``timer`` closes its window."""
 
-    window: Window
+    participant: Participant
     connection: Connection
     timer: asyncio.TimerHandle
 
@@ -121,9 +121,9 @@ class Api:
             identity, driver = self._identity(request), ""
             if self._key(request, identity) in self._posting:
                 # A read counts as a heartbeat only of a program that has sent requests.
-                window = self._window(request, identity)
-                driver = driver_key(self._hub, window)
-                self._hub.heartbeat(window)
+                participant = self._participant(request, identity)
+                driver = driver_key(self._hub, participant)
+                self._hub.heartbeat(participant)
             try:
                 with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
                     if identity.session not in self._hub.drivers:
@@ -161,8 +161,8 @@ class Api:
             decoded = self._hub.requests.decoded(body)
             if isinstance(decoded, requests.Hello | requests.Watch):
                 raise InputError("Send this request on the websocket or the TCP port.")
-            window = self._window(request, identity)
-            answer = self._dispatcher.handle(window, decoded, self._budget(request))
+            participant = self._participant(request, identity)
+            answer = self._dispatcher.handle(participant, decoded, self._budget(request))
             if self._dispatcher.is_pending(answer):
                 answer = await self._dispatcher.concluded(answer)
             return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
@@ -214,26 +214,26 @@ class Api:
                 raise HTTPException(403, why)
         return replace(found, address=address_of(request))
 
-    def _window(self, request: Request, identity: Identity) -> Window:
+    def _participant(self, request: Request, identity: Identity) -> Participant:
         """Return the window of the program; it closes after ``LEASE_TIMEOUT`` without a request."""
         key = self._key(request, identity)
         known = self._posting.pop(key, None)
         if known is None:
             session, _, page = key.partition("/")
             identity = replace(identity, session=session)
-            window = self._hub.join(
+            participant = self._hub.join(
                 identity, page, lambda _notice: None, channel=CommandChannel.HTTP
             )
-            assert window.person.key == key
+            assert participant.person.key == key
             kind, address = ConnectionKind.POSTS, address_of(request)
             connection = Connection(identity, kind, address, key=key)
             self._hub.people.add(connection)
         else:
-            window, connection, timer = known
+            participant, connection, timer = known
             timer.cancel()
         timer = asyncio.get_running_loop().call_later(LEASE_TIMEOUT, self._forget, key)
-        self._posting[key] = _Posting(window, connection, timer)
-        return window
+        self._posting[key] = _Posting(participant, connection, timer)
+        return participant
 
     def _key(self, request: Request, identity: Identity) -> str:
         """Return the key that the requests of one program have in common."""
@@ -241,9 +241,9 @@ class Api:
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:
-        window, connection, _ = self._posting.pop(key)
+        participant, connection, _ = self._posting.pop(key)
         self._hub.people.remove(connection)
-        self._hub.leave(window, for_good=True)
+        self._hub.leave(participant, for_good=True)
 
 
 async def _too_much(error: BusyError | MutedError, id: Id = None) -> Response:

@@ -26,7 +26,7 @@ from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import ArmInterface
-from katana450.server.service.participants import Window, actor_of
+from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
@@ -96,7 +96,7 @@ class ProgramChannel(Channel):
         self._due = 0.0
         self._watched: tuple[requests.FieldName, ...] = ()
 
-    def answer(self, window: Window, request: requests.Request) -> None:
+    def answer(self, participant: Participant, request: requests.Request) -> None:
         """Execute ``request`` and send its answer; a ``watch`` sets the rate of states."""
         if isinstance(request, requests.Watch):
             if request.fields:
@@ -105,7 +105,7 @@ class ProgramChannel(Channel):
             self._watched = request.fields
             self._period = 1.0 / request.hz if request.hz > 0.0 else None
             self._due = self.hub.clock()
-        super().answer(window, request)
+        super().answer(participant, request)
         self.wake()
 
     def unasked(self) -> tuple[Any, float | None]:
@@ -116,7 +116,7 @@ class ProgramChannel(Channel):
         if t < self._due:
             return None, self._due - t
         self._due = max(self._due + self._period, t)
-        driver = "" if self.window is None else driver_key(self.hub, self.window)
+        driver = "" if self.participant is None else driver_key(self.hub, self.participant)
         try:
             with self.budget.charged(driver):
                 return self._state(self.hub.arm), self._due - t
@@ -137,13 +137,13 @@ class ProgramChannel(Channel):
                 values += arm.nodes.read(arm.state, (each,))
         return msgspec.structs.replace(now, fields=tuple(values))
 
-    def greet(self, window: Window) -> None:
+    def greet(self, participant: Participant) -> None:
         """Send the name, number and role of the program."""
-        self.window, person = window, window.person
+        self.participant, person = participant, participant.person
         self.notify(
             answers.Welcome(
                 name=person.name,
-                number=window.number,
+                number=participant.number,
                 role=person.role.value,
                 heartbeat=HEARTBEAT_INTERVAL,
                 stop_port=self.hub.stop_path.port,
@@ -278,18 +278,18 @@ async def _serve(
     program = ProgramChannel(hub, line, budget)
     page = secrets.token_hex(16)
     found = replace(found, address=client.address)
-    window = hub.join(found, page, program.notify, line.arrival, client.channel)
-    program.greet(window)
-    connection = Connection(found, client.kind, client.address, key=window.person.key)
+    participant = hub.join(found, page, program.notify, line.arrival, client.channel)
+    program.greet(participant)
+    connection = Connection(found, client.kind, client.address, key=participant.person.key)
     try:
         why = await authenticator.run_while_authorised(
-            client.identity, program.run(window), connection
+            client.identity, program.run(participant), connection
         )
         if why is not None:
-            hub.recorder.note("revocation", window.actor, always=True, why=why)
+            hub.recorder.note("revocation", participant.actor, always=True, why=why)
             await line.close(SIGN_IN_CLOSE_CODE, why)
     finally:
-        hub.leave(window, for_good=True)
+        hub.leave(participant, for_good=True)
 
 
 class _TcpLine:

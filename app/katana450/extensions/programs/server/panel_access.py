@@ -11,7 +11,7 @@ from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.api import answers
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Window
+from katana450.server.service.participants import Participant
 
 
 class PanelAccess:
@@ -44,18 +44,18 @@ class PanelAccess:
         self._call(lambda: self._steer(order, actor))
 
     def _steer(self, order: ProgramOrder, actor: Actor) -> None:
-        self._runner.steer(self._window_of(actor), order)
+        self._runner.steer(self._participant_of(actor), order)
 
     def _plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
-        window = self._window_of(actor)
+        participant = self._participant_of(actor)
         if then is not None:
             self._hub.gate.check_not_stopped()
-        self._runner.script(window, text, more=False, speed=1.0)
+        self._runner.script(participant, text, more=False, speed=1.0)
         self._runner.then(then)
 
-    def _window_of(self, actor: Actor) -> Window:
+    def _participant_of(self, actor: Actor) -> Participant:
         self._hub.gate.check_current(actor)
-        window = self._hub.window(actor.key)
-        if window is None:
+        participant = self._hub.participant(actor.key)
+        if participant is None:
             raise LeaseError("Open the start page to run programs.")
-        return window
+        return participant

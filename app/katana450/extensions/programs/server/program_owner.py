@@ -10,7 +10,7 @@ from katana450.errors import LeaseError
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Window, session_of
+from katana450.server.service.participants import Participant, session_of
 
 log = logging.getLogger(__name__)
 
@@ -55,7 +55,7 @@ class ProgramOwner:
         ``timeout`` is the heartbeat timeout of the owner [s]. ``may_be_unattended``: whether
         programs may run unattended.
         """
-        self.window: Window | None = None
+        self.participant: Participant | None = None
         self.unattended = False
         self.began: datetime | None = None
         self._allowed = may_be_unattended
@@ -63,14 +63,14 @@ class ProgramOwner:
         self._timeout = timeout
         self._seen = 0.0
 
-    def change_to(self, window: Window, t: float) -> None:
-        """Make ``window`` the owner of a program that has not begun, at the time ``t`` [s]."""
-        self.window, self._seen = window, t
+    def change_to(self, participant: Participant, t: float) -> None:
+        """Make ``participant`` the owner of a program that has not begun, at the time ``t`` [s]."""
+        self.participant, self._seen = participant, t
         self.unattended, self.began = False, None
 
-    def begin(self, window: Window, t: float, *, unattended: bool) -> None:
-        """Make ``window`` the owner of a run that begins at the time ``t`` [s]."""
-        self.change_to(window, t)
+    def begin(self, participant: Participant, t: float, *, unattended: bool) -> None:
+        """Make ``participant`` the owner of a run that begins at the time ``t`` [s]."""
+        self.change_to(participant, t)
         self.unattended, self.began = unattended, datetime.now(UTC)
 
     def check_unattended(self, *, unattended: bool) -> None:
@@ -109,20 +109,20 @@ class ProgramOwner:
         Another window of the owner's link or browser is so once the owner of an unattended program
         has left.
         """
-        if self.window is None:
+        if self.participant is None:
             return False
-        owner = self.window.person.key
+        owner = self.participant.person.key
         if self.unattended and not self.is_here:
             return session_of(person.key) == session_of(owner)
         return person.key == owner
 
     def check_may_steer(self, person: Person) -> None:
         """Raise LeaseError if ``person`` is not the owner and may not take the lease from it."""
-        window = self.window
-        if window is not None and not self.is_person(person) and not person.role.may_take:
-            raise LeaseError(f"The program belongs to {window.person.name}.")
+        participant = self.participant
+        if participant is not None and not self.is_person(person) and not person.role.may_take:
+            raise LeaseError(f"The program belongs to {participant.person.name}.")
 
-    def superseded_by(self, sender: Window) -> str:
+    def superseded_by(self, sender: Participant) -> str:
         """Return why the program that is being planned gives way to a new one of ``sender``.
 
         Raises LeaseError if it does not: planning may take two minutes, and then blocks all but the
@@ -130,7 +130,7 @@ class ProgramOwner:
         """
         if self.is_silent(self._hub.clock()):
             return "Its owner sends no heartbeats."
-        owner, drives = self.window, self._hub.lease.holder == sender.person
+        owner, drives = self.participant, self._hub.lease.holder == sender.person
         if owner is None or owner.person == sender.person or not drives:
             raise LeaseError("Another program is being planned. Cancel it, or wait for it.")
         why = f"{sender.person.name}, who drives, has sent another program."
@@ -138,6 +138,8 @@ class ProgramOwner:
         return why
 
     @property
-    def _connected(self) -> Window | None:
+    def _connected(self) -> Participant | None:
         """The present window of the owner, a new one after a page has reloaded."""
-        return None if self.window is None else self._hub.window(self.window.person.key)
+        return (
+            None if self.participant is None else self._hub.participant(self.participant.person.key)
+        )

@@ -32,7 +32,7 @@ from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.hub import Hub
 from katana450.server.service.last_pause import LastPause
-from katana450.server.service.participants import Window, session_of
+from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
@@ -56,7 +56,7 @@ class ProgramRunner(Runner):
         self._parts = ScriptParts()
         self._planning: Planning | None = None
         self._then: ProgramOrder | None = None
-        self._participant: Window | None = None
+        self._participant: Participant | None = None
         self._run: Run | None = None
         # The speed to restore at the end, the maximum that a person allows, and the last command.
         self._speed = self._allowed = self._commanded = 1.0
@@ -76,9 +76,9 @@ class ProgramRunner(Runner):
         """True if the program runs as soon as it is planned."""
         return self._then is not None
 
-    def owns(self, window: Window) -> bool:
-        """Return whether ``window`` is the page or API program that owns the present program."""
-        return self._owner.is_person(window.person)
+    def owns(self, participant: Participant) -> bool:
+        """Return whether ``participant`` owns the present program."""
+        return self._owner.is_person(participant.person)
 
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError if ``actor`` may not drive, or does not own the running program."""
@@ -86,30 +86,30 @@ class ProgramRunner(Runner):
         if self.running:
             self._owner.check_may_steer(actor.person)
 
-    def handle(self, window: Window, request: Request) -> answers.Answer:
+    def handle(self, participant: Participant, request: Request) -> answers.Answer:
         """Execute ``request``. Raises LeaseError or InputError."""
         match request:
             case requests.Program(text=text, more=more, speed=speed):
-                self.script(window, text, more=more, speed=speed)
+                self.script(participant, text, more=more, speed=speed)
             case requests.Steer(order=order, unattended=unattended):
-                if ticket := self.steer(window, order, unattended=unattended):
+                if ticket := self.steer(participant, order, unattended=unattended):
                     return answers.Done(ticket=ticket)
                 return answers.Done(outcome=Verdict.ACCEPTED.value)
             case requests.AllowUnattended(allowed=allowed):
-                self._owner.allow_unattended(window.person, allowed=allowed)
+                self._owner.allow_unattended(participant.person, allowed=allowed)
         return answers.Done()
 
     def then(self, order: ProgramOrder | None) -> None:
         """Carry out ``order`` as soon as the present script is planned."""
         self._then = order
 
-    def script(self, window: Window, text: str, *, more: bool, speed: float) -> None:
+    def script(self, participant: Participant, text: str, *, more: bool, speed: float) -> None:
         """Take a part of a script; after the last part, plan it from the present state of the arm.
 
         The last plan is kept if it is of the same script and nothing has changed since. Raises
         LeaseError while another program runs or is planned, and InputError for too long a script.
         """
-        script = self._parts.add(window.person.key, text, more=more)
+        script = self._parts.add(participant.person.key, text, more=more)
         if script is None:
             return
         if self.running:
@@ -117,32 +117,34 @@ class ProgramRunner(Runner):
         arm = self.hub.present()
         if arm.state.moving:
             raise LeaseError("The arm is moving. Plan the program when it is at rest.")
-        check_may_drive(window.person)
+        check_may_drive(participant.person)
         before = self._planning
         if before is not None and before.busy:
-            before.cancel(self._owner.superseded_by(window))
+            before.cancel(self._owner.superseded_by(participant))
         if before is not None and before.fits(script, speed, arm.state):
             before.refused, before.note = None, ""
-            self._own(window)
+            self._own(participant)
             return
         changed = ""
         if before is not None and (before.text, before.speed) == (script, speed) and before.program:
             changed = before.changed_to(arm.state)
-        self._plan(window, script, speed, changed)
+        self._plan(participant, script, speed, changed)
 
-    def _plan(self, window: Window, text: str, speed: float, changed: str) -> None:
+    def _plan(self, participant: Participant, text: str, speed: float, changed: str) -> None:
         """Plan ``text`` from the present state; ``changed``: why an earlier plan is void."""
         arm = self.hub.present()
         note = f"Planned again: {changed}." if changed else ""
         context = PlanContext(arm.session, arm.arm.T_base_shoulder)
         self._planning = Planning(text, speed, context, arm.state, self.hub.clock, note)
-        self._own(window)
+        self._own(participant)
 
-    def _own(self, window: Window) -> None:
+    def _own(self, participant: Participant) -> None:
         self._run = self._then = None
-        self._owner.change_to(window, self.hub.clock())
+        self._owner.change_to(participant, self.hub.clock())
 
-    def steer(self, window: Window, order: ProgramOrder, *, unattended: bool = False) -> int | None:
+    def steer(
+        self, participant: Participant, order: ProgramOrder, *, unattended: bool = False
+    ) -> int | None:
         """Run, step, pause, resume or end the program. Raises LeaseError if it is refused.
 
         During planning, RUN and STEP take effect at its end, PAUSE and RESUME decide whether the
@@ -150,23 +152,23 @@ class ProgramRunner(Runner):
 
         Returns the ticket of the command that the arm was given now; None for none.
         """
-        check_may_drive(window.person)
+        check_may_drive(participant.person)
         begins = order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running
         if unattended and not begins:
             raise LeaseError("Only `run` and `step` begin an unattended program.")
         self._owner.check_unattended(unattended=unattended)
         planning = self._planning
         if planning is not None and planning.busy:
-            self._owner.check_may_steer(window.person)
-            ticket = self._steer_planning(planning, window, order)
+            self._owner.check_may_steer(participant.person)
+            ticket = self._steer_planning(planning, participant, order)
             self._owner.unattended = self._owner.unattended or unattended
             return ticket
         if begins:
-            return self._begin(window, order, unattended=unattended)
+            return self._begin(participant, order, unattended=unattended)
         if not self.running or self._run is None:
             raise LeaseError("No program is running.")
-        self._owner.check_may_steer(window.person)
-        self.hub.recorder.note("program", window.actor, {"order": order.value})
+        self._owner.check_may_steer(participant.person)
+        self.hub.recorder.note("program", participant.actor, {"order": order.value})
         match order:
             case ProgramOrder.RUN | ProgramOrder.RESUME:
                 return self._send(cmd.Resume())
@@ -177,25 +179,25 @@ class ProgramRunner(Runner):
                 paused = self.hub.present().state.paused
                 ticket = self._send(cmd.Pause())
                 if not paused:
-                    self.hub.gate.last_pause = LastPause.by(window.actor)
+                    self.hub.gate.last_pause = LastPause.by(participant.actor)
                 return ticket
             case ProgramOrder.END:
-                return self._end(f"{window.person.name} ended it.")
+                return self._end(f"{participant.person.name} ended it.")
 
     def _steer_planning(
-        self, planning: Planning, window: Window, order: ProgramOrder
+        self, planning: Planning, participant: Participant, order: ProgramOrder
     ) -> int | None:
         match order:
             case ProgramOrder.RUN | ProgramOrder.STEP:
                 self.hub.gate.check_not_stopped()
                 self._then, planning.note = order, ""
             case ProgramOrder.PAUSE:
-                return self.hub.move(window, cmd.Pause())
+                return self.hub.move(participant, cmd.Pause())
             case ProgramOrder.RESUME:
-                return self.hub.move(window, cmd.Resume())
+                return self.hub.move(participant, cmd.Resume())
             case ProgramOrder.END:
                 self._then = None
-                planning.cancel(f"{window.person.name} cancelled the planning.")
+                planning.cancel(f"{participant.person.name} cancelled the planning.")
         return None
 
     def stopped(self) -> None:
@@ -211,18 +213,18 @@ class ProgramRunner(Runner):
         if self._then is not None and planning is not None:
             self._then, planning.note = None, f"Not run: {why}."
 
-    def leave(self, window: Window) -> None:
-        """Forget ``window``; end its program, or the run that waits for its planning."""
-        self._parts.forget(window.person.key)
-        if not self.owns(window):
+    def leave(self, participant: Participant) -> None:
+        """Forget ``participant``; end its program, or the run that waits for its planning."""
+        self._parts.forget(participant.person.key)
+        if not self.owns(participant):
             return
-        self._forget_run(f"{window.person.name} left")
+        self._forget_run(f"{participant.person.name} left")
         if self.running and not self._owner.unattended:
-            self._end(f"{window.person.name} left.")
+            self._end(f"{participant.person.name} left.")
 
     def removed(self, session: str) -> None:
         """End the program of the person of ``session``, even if it runs unattended."""
-        owner = self._owner.window
+        owner = self._owner.participant
         if owner is not None and session_of(owner.person.key) == session:
             self._owner.unattended = False
             self.leave(owner)
@@ -241,7 +243,7 @@ class ProgramRunner(Runner):
             # The next holder takes over an arm at rest, so no command is needed.
             self._leave_with(Phase.STOPPED, "The lease was taken from the program.")
             return
-        owner = self._owner.window
+        owner = self._owner.participant
         if (why := hub.halted) is not None:
             self._leave_with(Phase.STOPPED, why)
             return
@@ -265,7 +267,7 @@ class ProgramRunner(Runner):
 
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last program; None if there was none."""
-        planning, owner = self._planning, self._owner.window
+        planning, owner = self._planning, self._owner.participant
         if planning is None or owner is None:
             return None
         program, run, arm = planning.program, self._run, self.hub.arm
@@ -292,14 +294,14 @@ class ProgramRunner(Runner):
         """Return the line for the program in place of ``line``."""
         return state_line.status_line(state, line, self.progress(), waits=self.waits)
 
-    def orders(self, window: Window) -> tuple[str, ...]:
-        """Return the orders that the page of ``window`` offers; none if it is not the owner."""
-        return state_line.orders(self.progress()) if self.owns(window) else ()
+    def orders(self, participant: Participant) -> tuple[str, ...]:
+        """Return the orders that ``participant`` may give; none if it is not the owner."""
+        return state_line.orders(self.progress()) if self.owns(participant) else ()
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
         then, self._then = self._then, None
-        owner = self._owner.window
+        owner = self._owner.participant
         if then is None or owner is None:  # It was cancelled meanwhile.
             return
         try:
@@ -308,7 +310,9 @@ class ProgramRunner(Runner):
             assert self._planning is not None
             self._planning.refused = str(error)
 
-    def _begin(self, window: Window, order: ProgramOrder, *, unattended: bool) -> int | None:
+    def _begin(
+        self, participant: Participant, order: ProgramOrder, *, unattended: bool
+    ) -> int | None:
         """Run the planned program. If the situation has changed, plan it again first."""
         planning, hub = self._planning, self.hub
         if planning is None or planning.program is None:
@@ -319,40 +323,39 @@ class ProgramRunner(Runner):
             self.hub.gate.check_not_stopped()
             if arm.state.moving:
                 raise LeaseError("The arm is moving. Plan the program when it is at rest.")
-            if hub.lease.holder != window.person:
+            if hub.lease.holder != participant.person:
                 # Otherwise a refusal would come only at the end of the planning, which takes long.
-                hub.lease.acquire(window.person, hub.clock())
-            self._plan(window, planning.text, planning.speed, changed)
+                hub.lease.acquire(participant.person, hub.clock())
+            self._plan(participant, planning.text, planning.speed, changed)
             self._then, self._owner.unattended = order, unattended
             return None
         planning.refused, planning.note = None, ""
         program = planning.program
-        identity = program_identity(program.name, window.person)
+        identity = program_identity(program.name, participant.person)
         alive = AlwaysAlive(hub.clock)
         joined = hub.join(identity, "program", lambda _notice: None, alive, CommandChannel.PROGRAM)
         try:
-            if hub.lease.holder == window.person:
+            if hub.lease.holder == participant.person:
                 # A handover in one step: no other participant can take the lease in between.
-                hub.hand_over(window, joined.number)
+                hub.hand_over(participant, joined.number)
             else:
                 hub.acquire(joined)
-            # Drops earlier targets; a pause lasts until it is resumed. Raises LeaseError if the arm
-            # is stopped.
+            # Drops earlier targets; a pause lasts. Raises LeaseError if the arm is stopped.
             ticket = hub.move(joined, cmd.Hold())
         except LeaseError:
             hub.leave(joined, for_good=True)
             raise
         began = hub.clock()
         self._participant = joined
-        self._owner.begin(window, began, unattended=unattended)
-        hub.gate.program = RunningProgram(joined.person, window.person.key)
+        self._owner.begin(participant, began, unattended=unattended)
+        hub.gate.program = RunningProgram(joined.person, participant.person.key)
         self._speed = self._commanded = arm.state.speed
         self._allowed = 1.0
         self._run = Run(began, single=order is ProgramOrder.STEP)
         how = "runs unattended" if unattended else "runs"
-        log.info("%s %s the program %s.", window.person.name, how, program.name)
+        log.info("%s %s the program %s.", participant.person.name, how, program.name)
         what = {"program": program.name, "order": order.value, "unattended": unattended}
-        hub.recorder.note("program", window.actor, what)
+        hub.recorder.note("program", participant.actor, what)
         return ticket
 
     def _send(self, *commands: cmd.Command) -> int | None:
