@@ -69,7 +69,7 @@ def test_script_step_nudges(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     script = "steps:\n  - nudge: {axis: 1, by: 20}\n  - nudge: {axis: 1, by: -5}\n"
     tasks = compiled(parse(script), plan_context, state).tasks
-    plans = [task.order.plan for task in tasks if isinstance(task.order, FollowPlan)]
+    plans = [task.action.plan for task in tasks if isinstance(task.action, FollowPlan)]
     assert len(plans) == 2
     end = session.ready + np.deg2rad((15.0, 0.0, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(plans[-1].end, end, rtol=0, atol=1e-12)

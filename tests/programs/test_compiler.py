@@ -38,7 +38,9 @@ def test_cup_and_basin_change_places(stage: Stage) -> None:
     cup, basin = stood(stage, "cup"), stood(stage, "basin")
     text = puts(("cup", basin), ("basin", cup))
     program = compiled(parse(text), stage.plan_context, stage.begin())
-    ends = [task.order.scene_object for task in program.tasks if isinstance(task.order, PutObject)]
+    ends = [
+        task.action.scene_object for task in program.tasks if isinstance(task.action, PutObject)
+    ]
     assert [(each.name, *np.round(1e3 * each.T[:2, 3], 6)) for each in ends] == [
         ("cup", *basin),
         ("basin", *cup),
@@ -156,7 +158,7 @@ def layout(stage: Stage, text: str) -> tuple[PlanBuilder, Compiler]:
 @pytest.mark.usefixtures("untimed")
 def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: Stage) -> None:
     builder, found = layout(stage, PourDemo(basin=NEAR).text)
-    names = [name for orders in found.all() for name, _ in orders]
+    names = [name for actions in found.all() for name, _ in actions]
     # Failed attempts leave no actions behind.
     assert names.count("grasp cup: close") == 1
     assert names.count("pour") == 1

@@ -35,7 +35,7 @@ def check_poured(stage: Stage, program: Program) -> None:
     assert found.emptied_percent >= 99.0
     assert found.spilled_ml == 0.0
     # The water surface stays below the lip until the cup is turned over to pour.
-    (turned,) = (task.order for task in program.tasks if task.name == POURING)
+    (turned,) = (task.action for task in program.tasks if task.name == POURING)
     assert isinstance(turned, FollowPlan)
     plan = turned.plan
     carried = list(takewhile(lambda s: s.following is None or s.following.plan is not plan, states))

@@ -115,8 +115,8 @@ def test_a_timeline_agrees_with_the_run(stage: Stage, program: Program) -> None:
 def test_every_plan_is_clear_and_joins_the_next(program: Program) -> None:
     q = program.start
     for task in program.tasks:
-        if isinstance(task.order, FollowPlan):
-            plan = task.order.plan
+        if isinstance(task.action, FollowPlan):
+            plan = task.action.plan
             assert np.abs(plan.start - q).max() < 1e-6
             assert plan.clear_of is not None
             assert plan.nearest is not None
@@ -253,7 +253,7 @@ def test_repetitions_are_planned_once(stage: Stage) -> None:
         "{gripper: open}, {gripper: closed}]}"
     )
     program = compiled(parse(text), stage.plan_context, stage.begin())
-    plans = {id(task.order.plan) for task in program.tasks if isinstance(task.order, FollowPlan)}
+    plans = {id(task.action.plan) for task in program.tasks if isinstance(task.action, FollowPlan)}
     # The fingers are neither open nor closed at first, so the first repetition differs.
     assert len(plans) == 4
     assert program.steps == 160

@@ -22,7 +22,7 @@ def test_a_taught_script_goes_through_the_postures(stage: Stage) -> None:
     program = compiled(
         parse(script_from_postures("Shown", postures)), stage.plan_context, stage.begin()
     )
-    ends = [task.order.plan.end for task in program.tasks if isinstance(task.order, FollowPlan)]
+    ends = [task.action.plan.end for task in program.tasks if isinstance(task.action, FollowPlan)]
     assert program.name == "Shown"
     assert np.abs(np.array(ends) - postures).max() < np.radians(6e-4)
 

@@ -48,7 +48,7 @@ class Planner:
             self._to_pose(builder, goal)
         else:
             builder.move_to(self.session.require_arm().chain.check_q(goal), "plan")
-        if not builder.orders:
+        if not builder.actions:
             raise InputError("The arm is at the goal already; there is nothing to plan.")
         return _timed(builder)
 
@@ -109,7 +109,7 @@ class Planner:
         builder = self._builder(start)
         Circle(arc, size, count, chosen_branch).build(builder)
         if start is None:
-            del builder.orders[:-1]
+            del builder.actions[:-1]
         return _timed(builder)
 
     def _to_pose(self, builder: PlanBuilder, goal: npt.ArrayLike) -> None:
@@ -144,7 +144,7 @@ class Planner:
 
 def _timed(builder: PlanBuilder) -> Plan:
     """Time the paths of ``builder``, one after another."""
-    untimed_paths = [order for _, order in builder.orders if isinstance(order, UntimedPath)]
+    untimed_paths = [action for _, action in builder.actions if isinstance(action, UntimedPath)]
     paths = tuple(path for untimed in untimed_paths for path in untimed.paths)
     return replace(untimed_paths[0], paths=paths).timed().plan
 

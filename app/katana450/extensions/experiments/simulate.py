@@ -61,8 +61,8 @@ def _print_tasks(program: Program) -> None:
     """Print each task with its line, duration, length and minimum clearance."""
     for task in program.tasks:
         details = ""
-        if isinstance(task.order, FollowPlan):
-            plan = task.order.plan
+        if isinstance(task.action, FollowPlan):
+            plan = task.action.plan
             details = f"{plan.duration:.2f} s, {1e3 * plan.length:.0f} mm"
             if plan.nearest is not None:
                 one, other = map(part, plan.nearest.contact.parts)

@@ -88,9 +88,9 @@ def alongs(program: Program) -> tuple[PathTrace, ...]:
     """Return the paths of the tool, each repeated path once."""
     found: dict[int, PathTrace] = {}
     for task in program.tasks:
-        if not isinstance(task.order, FollowPlan):
+        if not isinstance(task.action, FollowPlan):
             continue
-        for segment in task.order.plan.segments:
+        for segment in task.action.plan.segments:
             if isinstance(segment.path, ToolPath) and id(segment.path) not in found:
                 found[id(segment.path)] = _along(task.name, segment.path)
     return tuple(found.values())
@@ -112,12 +112,12 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
         tool_speed(chain, q, qd) for chain, q, qd in zip(chains, trace.q, trace.qd, strict=True)
     ]
     nearest = [
-        task.order.plan.nearest.contact.distance
+        task.action.plan.nearest.contact.distance
         for task in program.tasks
-        if isinstance(task.order, FollowPlan)
-        and task.order.plan.nearest is not None
+        if isinstance(task.action, FollowPlan)
+        and task.action.plan.nearest is not None
         # An object to be lifted touches the table at first.
-        and task.order.plan.nearest.contact.distance >= STOP
+        and task.action.plan.nearest.contact.distance >= STOP
     ]
     return {
         "max_position_error_mm": _maximum(1e3 * errors),
@@ -186,10 +186,10 @@ def _along(name: str, path: ToolPath) -> PathTrace:
 
 
 def _path_at(program: Program, trace: Trace, tick: int) -> ToolPath | None:
-    order, segment = program.tasks[int(trace.task[tick])].order, int(trace.segment[tick])
-    if segment < 0 or not isinstance(order, FollowPlan):
+    action, segment = program.tasks[int(trace.task[tick])].action, int(trace.segment[tick])
+    if segment < 0 or not isinstance(action, FollowPlan):
         return None
-    path = order.plan.segments[segment].path
+    path = action.plan.segments[segment].path
     return path if isinstance(path, ToolPath) else None
 
 

@@ -113,7 +113,7 @@ def _ticks(trace: Trace, task: int) -> list[int]:
 
 
 def _path(program: Program, trace: Trace, tick: int) -> ToolPath | None:
-    order = program.tasks[int(trace.task[tick])].order
+    order = program.tasks[int(trace.task[tick])].action
     if not isinstance(order, FollowPlan):
         return None
     path = order.plan.segments[int(trace.segment[tick])].path

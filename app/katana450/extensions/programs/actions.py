@@ -191,10 +191,10 @@ class Task:
         number: index of its step, from 0; repetitions count separately.
         line: line of the script, from 1.
         name: name that is shown to people.
-        order: the action.
+        action: the action.
     """
 
     number: int
     line: int
     name: str
-    order: Action
+    action: Action

@@ -57,7 +57,7 @@ Report = Callable[[PlanningStage], None]
 class CompiledStep(NamedTuple):
     """The actions of a step before its paths are timed, and the state at its end."""
 
-    orders: list[tuple[str, Action | UntimedPath]]
+    actions: list[tuple[str, Action | UntimedPath]]
     state: State
     taken: GraspInfo | None
 
@@ -117,25 +117,25 @@ class Compiler:
         key = id(placed.step), *_situation(builder)
         if key in self._known:
             return self._known[key]
-        builder.orders = []
+        builder.actions = []
         try:
             placed.step.build(builder)
         except InputError as error:
             raise _at(placed, error) from error
-        compiled_step = CompiledStep(builder.orders, builder.state, builder.taken)
-        if any(isinstance(order, UntimedPath) for _, order in compiled_step.orders):
+        compiled_step = CompiledStep(builder.actions, builder.state, builder.taken)
+        if any(isinstance(action, UntimedPath) for _, action in compiled_step.actions):
             self._known[key] = compiled_step
         return compiled_step
 
     def _timed(self, compiled_step: CompiledStep) -> Orders:
         found: Orders = []
-        for name, order in compiled_step.orders:
-            if isinstance(order, UntimedPath):
-                if id(order) not in self._plans:
-                    self._plans[id(order)] = order.timed()
-                found.append((name, self._plans[id(order)]))
+        for name, action in compiled_step.actions:
+            if isinstance(action, UntimedPath):
+                if id(action) not in self._plans:
+                    self._plans[id(action)] = action.timed()
+                found.append((name, self._plans[id(action)]))
             else:
-                found.append((name, order))
+                found.append((name, action))
         return found
 
     def _note_grasp(self, before: GraspInfo | None, place: tuple[int, State]) -> None:

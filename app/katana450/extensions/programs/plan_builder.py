@@ -137,7 +137,7 @@ class PlanBuilder:
         """Start from ``state``, in which the arm is at rest."""
         self.plan_context = plan_context
         self.state = state
-        self.orders: list[tuple[str, Action | UntimedPath]] = []
+        self.actions: list[tuple[str, Action | UntimedPath]] = []
         self.taken: GraspInfo | None = None
         """The grasp of the held object; None with an empty hand."""
         self.given_up: tuple[float, ...] = ()
@@ -174,9 +174,9 @@ class PlanBuilder:
         """Return the direction ``v`` (3,) in {S}; ``in_base``: it is given in the base frame."""
         return frozen(self.plan_context.T_base_shoulder[:3, :3].T @ v if in_base else v)
 
-    def note(self, name: str, order: Action | UntimedPath, state: State) -> None:
-        """Append ``order``, which leads to ``state``."""
-        self.orders.append((name, order))
+    def note(self, name: str, action: Action | UntimedPath, state: State) -> None:
+        """Append ``action``, which leads to ``state``."""
+        self.actions.append((name, action))
         self.state = state
 
     def move_to(self, q: FloatArray, name: str) -> None:
@@ -229,13 +229,13 @@ class PlanBuilder:
         expects.
         """
         refused = InputError("no alternative is left.")
-        state, orders = self.state, tuple(self.orders)
+        state, actions = self.state, tuple(self.actions)
         for number, option in enumerate(options):
             checkpoint()
             try:
                 return build(option)
             except InputError as error:
-                self.state, self.orders = state, list(orders)
+                self.state, self.actions = state, list(actions)
                 if number == 0:
                     refused = error
         raise refused

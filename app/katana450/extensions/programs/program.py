@@ -35,7 +35,7 @@ class Program:
     def duration(self) -> float:
         """Duration of all motions at full speed [s]."""
         return sum(
-            task.order.plan.duration for task in self.tasks if isinstance(task.order, FollowPlan)
+            task.action.plan.duration for task in self.tasks if isinstance(task.action, FollowPlan)
         )
 
 
@@ -61,7 +61,7 @@ def compiled(
     builder.state = builder.standing(state.setpoint)
     compiled_steps = Compiler(script, builder, report).all()
     tasks = [Task(0, 1, "speed", SetSpeed(1.0))]
-    for number, (placed, orders) in enumerate(zip(script.steps, compiled_steps, strict=True)):
-        tasks += [Task(number, placed.line, name, order) for name, order in orders]
+    for number, (placed, actions) in enumerate(zip(script.steps, compiled_steps, strict=True)):
+        tasks += [Task(number, placed.line, name, action) for name, action in actions]
     total_speed = script.speed * speed
     return Program(script.name, total_speed, state.setpoint, tuple(tasks), len(script.steps))

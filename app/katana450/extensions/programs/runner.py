@@ -88,7 +88,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         return run, ()
     task = program.tasks[run.number]
     if not run.started:
-        return replace(run, started=True, waited=0.0, blocked=0.0), task.order.commands(
+        return replace(run, started=True, waited=0.0, blocked=0.0), task.action.commands(
             program.speed
         )
     stands = state.blocked and state.motion.at_rest
@@ -96,7 +96,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     try:
         if run.blocked > ACTION_TIMEOUT:
             raise InputError(f"The path is still blocked: {_met(state)} would collide.")
-        done = task.order.done(state, run.waited)
+        done = task.action.done(state, run.waited)
     except InputError as error:
         why = f"Line {task.line}, {task.name}: {error}"
         return replace(run, phase=Phase.FAILED, why=why), (cmd.Hold(),)
@@ -119,15 +119,15 @@ def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0)
         return 0.0
     left, speed = 0.0, state.speed
     for number, task in enumerate(program.tasks[run.number :], run.number):
-        order = task.order
+        action = task.action
         begun = run.started and number == run.number
-        rest = 1.0 - order.fraction(state, run.waited) if begun else 1.0
-        if isinstance(order, SetSpeed):
-            speed = min(order.scale(program.speed), allowed)
-        elif isinstance(order, FollowPlan):
-            left += rest * order.plan.duration / speed
-        elif isinstance(order, Wait):
-            left += rest * order.seconds
+        rest = 1.0 - action.fraction(state, run.waited) if begun else 1.0
+        if isinstance(action, SetSpeed):
+            speed = min(action.scale(program.speed), allowed)
+        elif isinstance(action, FollowPlan):
+            left += rest * action.plan.duration / speed
+        elif isinstance(action, Wait):
+            left += rest * action.seconds
     return left
 
 
@@ -159,7 +159,7 @@ def progress(program: Program, run: Run, state: State) -> Progress:
     task = program.tasks[run.number]
     fraction = 1.0 if run.phase is Phase.DONE else 0.0
     if run.started and run.phase is Phase.RUNNING:
-        fraction = task.order.fraction(state, run.waited)
+        fraction = task.action.fraction(state, run.waited)
     status = run.phase.value
     if run.phase is Phase.RUNNING and state.paused:
         status = "paused"

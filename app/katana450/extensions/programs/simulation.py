@@ -116,11 +116,11 @@ class Simulation:
         return pouring.margin_to_rim(state.poured, state.objects)
 
     def _place(self, state: State, number: int) -> tuple[int, float]:
-        following, order = state.following, self._program.tasks[number].order
+        following, action = state.following, self._program.tasks[number].action
         if (
             following is None
-            or not isinstance(order, FollowPlan)
-            or following.plan is not order.plan
+            or not isinstance(action, FollowPlan)
+            or following.plan is not action.plan
         ):
             return -1, 0.0
         return following.number, following.segment.scaling.pace(following.local).sigma

@@ -31,7 +31,7 @@ class Timeline:
     @staticmethod
     def of(program: Program) -> Timeline:
         """Return the timeline of ``program``."""
-        plans = [task.order.plan for task in program.tasks if isinstance(task.order, FollowPlan)]
+        plans = [task.action.plan for task in program.tasks if isinstance(task.action, FollowPlan)]
         pieces = tuple((segment, plan.fingers) for plan in plans for segment in plan.segments)
         durations = (segment.scaling.duration for segment, _ in pieces)
         return Timeline(pieces, tuple(accumulate(durations, initial=0.0)))

@@ -156,11 +156,11 @@ def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray
     """Return the tool's path of each plan, (PATH_SAMPLES, 2, 3) in the base frame [m]."""
     paths: list[FloatArray] = []
     for task in program.tasks:
-        if isinstance(task.order, UseTool):
-            tool = task.order.name
-        elif isinstance(task.order, FollowPlan):
+        if isinstance(task.action, UseTool):
+            tool = task.action.name
+        elif isinstance(task.action, FollowPlan):
             chain = arm.chain_to(tool)
-            postures = task.order.plan.postures(PATH_SAMPLES + 1)
+            postures = task.action.plan.postures(PATH_SAMPLES + 1)
             points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
             paths.append(np.stack((points[:-1], points[1:]), axis=1))
     return paths

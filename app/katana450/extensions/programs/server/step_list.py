@@ -32,8 +32,8 @@ def steps_of(program: Program) -> tuple[ListedStep, ...]:
     # The first task belongs to no step; it sets the speed.
     for task in reversed(program.tasks[1:]):
         names[task.number] = task.name.partition(":")[0]
-        if isinstance(task.order, FollowPlan):
-            seconds[task.number] += task.order.plan.duration
+        if isinstance(task.action, FollowPlan):
+            seconds[task.number] += task.action.plan.duration
     return tuple(map(ListedStep, names, seconds))
 
 
