@@ -68,7 +68,7 @@ async def swing(arm: AsyncClient) -> None:
         with suppress(KeyError):
             now = time.monotonic()
             q = ready + SWING * math.sin(math.tau * now / PERIOD)
-            await arm.tell(requests.Servo(q=q.tolist()))
+            await arm.send(requests.Servo(q=q.tolist()))
             await asyncio.sleep(0.02)
 
 
@@ -176,7 +176,7 @@ async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
         await arm.clear_stop()
         await asyncio.sleep(0.4)
         sent = time.perf_counter()
-        await arm.tell(requests.Stop())
+        await arm.send(requests.Stop())
         async for state in states:
             if state.status == "stopped":
                 found.append((state.t - sent, time.perf_counter() - sent))

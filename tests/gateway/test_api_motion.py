@@ -85,7 +85,7 @@ def test_state_includes_values_derived_from_the_posture(
     assert state.margins.axis == distances.argmin() + 1
     assert state.margins.clearance is not None
     assert state.margins.clearance > 0.005
-    program.tell(requests.Joints(q=THERE.tolist()))
+    program.send(requests.Joints(q=THERE.tolist()))
     deadline = time.monotonic() + 5.0
     while (program.query(answers.State).tool_speed or 0.0) < 0.05:
         assert time.monotonic() < deadline

@@ -19,7 +19,7 @@ def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
     began = time.monotonic()
     while (t := time.monotonic() - began) < 1.5:
         wave = READY + math.sin(2.0 * t) * np.array((0.2, 0.0, 0.0, 0.0, 0.4))
-        program.tell(requests.Servo(q=wave.tolist()))
+        program.send(requests.Servo(q=wave.tolist()))
         time.sleep(0.02)
     moving = program.query(answers.State)
     assert abs(np.array(moving.qd)[0]) > 0.05

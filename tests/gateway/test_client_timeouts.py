@@ -50,12 +50,12 @@ async def _states(client: AsyncClient) -> None:
         pass
 
 
-async def _tell(client: AsyncClient) -> None:
+async def _send(client: AsyncClient) -> None:
     while True:
-        await client.tell(requests.Servo(q=[0.1] * 1000))
+        await client.send(requests.Servo(q=[0.1] * 1000))
 
 
-ACTS = {"ask": _ask, "states": _states, "tell": _tell}
+ACTS = {"ask": _ask, "states": _states, "send": _send}
 
 WELCOME = msgspec.json.encode(
     answers.Welcome(name="x", number=1, role="admin", heartbeat=10.0)
@@ -106,7 +106,7 @@ def test_missing_states_raise_an_error() -> None:
 
 
 def test_server_that_reads_nothing_raises_an_error() -> None:
-    _talk(_deaf, "tell")
+    _talk(_deaf, "send")
 
 
 def test_server_with_another_protocol_raises_an_error() -> None:

@@ -96,7 +96,7 @@ def test_undo_does_not_leap_over_a_stream(program: Client) -> None:
     q = np.array(program.nudge(1, 0.1).q)
     for _ in range(20):
         q[0] += 0.005
-        program.tell(requests.Servo(q=q.tolist()))
+        program.send(requests.Servo(q=q.tolist()))
         time.sleep(0.02)
     time.sleep(1.0)
     streamed = state(program)

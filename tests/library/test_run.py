@@ -56,7 +56,7 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
             if abs(state.q[0] - plan.start[0]) < 3.5 if to_start else state.q[0] > -1.5:
                 break
         # On the connection that also carries the run.
-        client.tell(requests.Stop())
+        client.send(requests.Stop())
         client.clear_stop()
         running.join(60.0)
         assert len(refused) == 1

@@ -68,7 +68,7 @@ class AsyncClient:
         future: asyncio.Future[answers.Answer] = asyncio.get_running_loop().create_future()
         self._waiting[self._last_id] = future
         try:
-            await self._send(request)
+            await self.send(request)
             async with asyncio.timeout(ANSWER_TIMEOUT):
                 return await future
         except TimeoutError as error:
@@ -76,9 +76,21 @@ class AsyncClient:
         finally:
             self._waiting.pop(request.id, None)
 
-    async def tell(self, request: requests.Request) -> None:
-        """Send ``request`` without waiting for an answer: for streams, Servo and Jog."""
-        await self._send(request)
+    async def send(self, request: requests.Request) -> None:
+        """Send ``request`` without waiting for an answer: for streams, Servo and Jog.
+
+        Raises LostError if the connection is lost.
+        """
+        if self._lost is not None:
+            raise LostError(self._lost)
+        try:
+            async with asyncio.timeout(ANSWER_TIMEOUT):
+                await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
+        except ConnectionClosed as error:
+            raise LostError(f"The server has closed the connection: {error}.") from error
+        except TimeoutError as error:
+            self._lose(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.")
+            raise LostError(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.") from error
 
     async def stop(self) -> str:
         """Stop the arm: send STOP on all paths at once, and return its stage.
@@ -174,7 +186,7 @@ class AsyncClient:
             if self._lost is None and not self._states:
                 # The client may have been closed meanwhile.
                 with suppress(LostError):
-                    await self.tell(requests.Watch(hz=0.0))
+                    await self.send(requests.Watch(hz=0.0))
 
     async def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
         """Request a motion and wait until the arm is at rest; return its state then.
@@ -258,21 +270,9 @@ class AsyncClient:
         """End the mute of ``person``. For admins only."""
         await self.ask(requests.Unmute(person=person))
 
-    async def _send(self, request: requests.Request) -> None:
-        if self._lost is not None:
-            raise LostError(self._lost)
-        try:
-            async with asyncio.timeout(ANSWER_TIMEOUT):
-                await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
-        except ConnectionClosed as error:
-            raise LostError(f"The server has closed the connection: {error}.") from error
-        except TimeoutError as error:
-            self._lose(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.")
-            raise LostError(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.") from error
-
     async def _heartbeat(self) -> None:
         while True:
-            await self._send(requests.Heartbeat())
+            await self.send(requests.Heartbeat())
             await asyncio.sleep(self.welcome.heartbeat)
 
     async def _listen(self) -> None:

@@ -34,9 +34,9 @@ class Client:
         """See ``AsyncClient.ask``."""
         return self._wait(self._client.ask(request))
 
-    def tell(self, request: requests.Request) -> None:
-        """See ``AsyncClient.tell``."""
-        self._wait(self._client.tell(request))
+    def send(self, request: requests.Request) -> None:
+        """See ``AsyncClient.send``."""
+        self._wait(self._client.send(request))
 
     def stop(self) -> str:
         """See ``AsyncClient.stop``."""

@@ -205,7 +205,7 @@ class Report:
             name=html.escape(self.script.name),
             about=f"<p>{html.escape(self.script.about)}</p>" if self.script.about else "",
             verdict=verdict,
-            mood="held" if self.held else "missed",
+            result="held" if self.held else "missed",
             figures=shown,
             rows=rows,
             checks=checks,
@@ -272,7 +272,7 @@ footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 </style>
 <h1>{name}</h1>
 {about}
-<p class="verdict {mood}">{verdict}</p>
+<p class="verdict {result}">{verdict}</p>
 {notes}
 {figures}
 <h2>Measured</h2>
