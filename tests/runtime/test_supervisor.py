@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 from katana450.assembly import supervisor as supervisor_module
-from katana450.assembly.supervised import KEPT, READY, SupervisorLink
+from katana450.assembly.supervised import KEPT, READY, SupervisorPipe
 from katana450.assembly.supervisor import (
     START_SILENCE,
     Child,
@@ -28,40 +28,40 @@ from katana450.errors import ConfigurationError
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals of Linux and macOS")
 
 
-def worker(folder: Path, kept: dict[bytes, bytes] | None, link: SupervisorLink) -> None:
+def worker(folder: Path, kept: dict[bytes, bytes] | None, supervisor: SupervisorPipe) -> None:
     """Write what happens to ``folder``, until the supervisor ends this process."""
     count = 0 if kept is None else int(kept[KEPT])
     (folder / f"pid{count}").write_text(str(os.getpid()))
-    link.keep(KEPT, str(count + 1).encode())
-    link.report(READY)
-    link.ended.wait()
+    supervisor.keep(KEPT, str(count + 1).encode())
+    supervisor.report(READY)
+    supervisor.ended.wait()
     (folder / f"ended{count}").touch()
 
 
-def idler(folder: Path, link: SupervisorLink) -> None:
+def idler(folder: Path, supervisor: SupervisorPipe) -> None:
 
     def note(text: str) -> None:
         (folder / "notice").write_text(text)
 
-    link.notify = note
-    link.report(READY)
-    link.ended.wait()
+    supervisor.notify = note
+    supervisor.report(READY)
+    supervisor.ended.wait()
 
 
-def stubborn(folder: Path, link: SupervisorLink) -> None:
+def stubborn(folder: Path, supervisor: SupervisorPipe) -> None:
     """Report ready, and send no heartbeats."""
     with (folder / "started").open("a") as file:
         file.write("x")
-    link.prove(lambda: False)
-    link.report(READY)
+    supervisor.prove(lambda: False)
+    supervisor.report(READY)
     time.sleep(60.0)
 
 
-def refusing(_folder: Path, _link: SupervisorLink) -> None:
+def refusing(_folder: Path, _link: SupervisorPipe) -> None:
     raise ConfigurationError("The reason.")
 
 
-def failing(_folder: Path, _link: SupervisorLink) -> None:
+def failing(_folder: Path, _link: SupervisorPipe) -> None:
     raise SystemExit(3)
 
 
@@ -123,7 +123,7 @@ def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
     ("work", "message"), [(refusing, "The reason."), (failing, "It did not start: it ended; see")]
 )
 def test_error_of_the_first_start_ends_the_server(
-    tmp_path: Path, work: Callable[[Path, SupervisorLink], None], message: str
+    tmp_path: Path, work: Callable[[Path, SupervisorPipe], None], message: str
 ) -> None:
     supervisor = Supervisor([child_spec("it", "It", work, tmp_path, 1.0)], threading.Event())
     supervisor.start()

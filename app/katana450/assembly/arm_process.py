@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from katana450.arm.runtime.arm_listener import FRONT, STOP, ArmAddress, ArmListener
 from katana450.assembly.output import say
-from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorLink
+from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
 from katana450.extension import serve_extensions
 from katana450.settings import Settings
 
@@ -54,7 +54,7 @@ class ArmConfig:
     folder: Path
 
 
-def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: SupervisorLink) -> None:
+def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: SupervisorPipe) -> None:
     """Run the arm in this process, from start to end. Raises KatanaError.
 
     kept: what an earlier process gave to the supervisor; None at the first start.
@@ -119,7 +119,7 @@ def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene 
     return (found_robots[0] if found_robots else None), scene
 
 
-def _keep(state_publisher: StatePublisher, supervisor: SupervisorLink) -> None:
+def _keep(state_publisher: StatePublisher, supervisor: SupervisorPipe) -> None:
     """Let the supervisor keep each new state for the next process."""
     seen = None
     while not supervisor.ended.wait(KEEP_INTERVAL):

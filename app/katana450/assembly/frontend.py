@@ -34,10 +34,10 @@ from katana450.server.view.view_updater import ViewUpdater
 def build_frontend(
     gateway: Gateway, config: FrontendConfig, meshes: Meshes, ended: Event
 ) -> tuple[FrontEnd, ViewUpdater, DetourPlanner | None]:
-    """Connect ``gateway`` to the arm; return the link to its process, the view, and the planner.
+    """Connect ``gateway`` to the arm; return the pipe to its process, the view, and the planner.
 
-    The planner of detours is None for a robot without a tool. The link runs when this function
-    returns, so no answer contains a state older than the link. The view is not started.
+    The planner of detours is None for a robot without a tool. The pipe is served when this function
+    returns, so no answer contains a state older than this call. The view is not started.
 
     Args:
         gateway: the server of the page.
@@ -47,13 +47,13 @@ def build_frontend(
 
     Raises:
         ConfigurationError: an option needs an arm, but the robot has none.
-        EOFError: the server ends, or the arm's process has closed the link.
+        EOFError: the server ends, or the arm's process has closed the pipe.
     """
     settings, layers = config.settings, _layers(config.options)
     found = find_robot(settings, config.urdf, config.tool)
     robot, session, _ = found
     address = config.address
-    link = FrontEnd(
+    front_end = FrontEnd(
         connect_when_ready(address, Greeting(FRONT), ended),
         session.check,
         lambda number: connect(address, Greeting(FRONT, number)),
@@ -63,20 +63,20 @@ def build_frontend(
         for layer in layers:
             if layer.what:
                 raise ConfigurationError(f"{layer.what} {robot.why}")
-        link.start()
-        gateway.attach(ArmHandle(robot, session, link, None, nodes))
-        return link, _machine_view(gateway, config, robot, link), None
-    planning_worker = PlanningWorker(session, link.state_publisher, link)
-    folders = partial(_folders, gateway, config.options, robot, link)
-    view = _view(gateway, config, found, link, ViewOptions(layers, meshes, folders))
+        front_end.start()
+        gateway.attach(ArmHandle(robot, session, front_end, None, nodes))
+        return front_end, _machine_view(gateway, config, robot, front_end), None
+    planning_worker = PlanningWorker(session, front_end.state_publisher, front_end)
+    folders = partial(_folders, gateway, config.options, robot, front_end)
+    view = _view(gateway, config, found, front_end, ViewOptions(layers, meshes, folders))
     go = partial(gateway.hub.gate.submit, cmd.Go()) if settings.go_on_release else None
-    detours = DetourPlanner(session, link.state_publisher, planning_worker, go)
+    detours = DetourPlanner(session, front_end.state_publisher, planning_worker, go)
     planning_worker.notify = gateway.announce
     planning_worker.redirected = guarded(gateway.hub.runner.redirected)
-    link.start()
-    gateway.attach(ArmHandle(robot, session, link, planning_worker, nodes))
+    front_end.start()
+    gateway.attach(ArmHandle(robot, session, front_end, planning_worker, nodes))
     detours.start()
-    return link, view, detours
+    return front_end, view, detours
 
 
 def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
@@ -99,15 +99,15 @@ def _view(
     gateway: Gateway,
     config: FrontendConfig,
     found: DescribedRobot,
-    link: FrontEnd,
+    front_end: FrontEnd,
     view_options: ViewOptions,
 ) -> View:
     return View(
         gateway.viser,
         found.robot,
-        link.state_publisher,
+        front_end.state_publisher,
         gateway.gestures,
-        lambda: link.last_ticket,
+        lambda: front_end.last_ticket,
         found.session,
         config.settings.frame_rate,
         view_options,
@@ -118,7 +118,7 @@ def _folders(
     gateway: Gateway,
     options: Namespace | None,
     robot: Robot,
-    link: FrontEnd,
+    front_end: FrontEnd,
     tabs: PanelTabs,
 ) -> Iterator[PanelFolder]:
     """Add the controls of the extensions to the panel. Raises KatanaError."""
@@ -128,7 +128,7 @@ def _folders(
         gateway.viser,
         robot,
         gateway.gestures,
-        lambda: link.state_publisher.snapshot.state,
+        lambda: front_end.state_publisher.snapshot.state,
         gateway.hub,
         gateway.call,
         options,
@@ -141,13 +141,13 @@ def _folders(
 
 
 def _machine_view(
-    gateway: Gateway, config: FrontendConfig, robot: Robot, link: FrontEnd
+    gateway: Gateway, config: FrontendConfig, robot: Robot, front_end: FrontEnd
 ) -> MachineView:
     return MachineView(
         gateway.viser,
         robot,
-        link.state_publisher,
+        front_end.state_publisher,
         gateway.gestures,
-        lambda: link.last_ticket,
+        lambda: front_end.last_ticket,
         config.settings.frame_rate,
     )

@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from katana450.arm.runtime.arm_listener import ArmAddress
-from katana450.assembly.supervised import READY, SupervisorLink
+from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.extension import serve_extensions
 from katana450.platform_support import reset_priority
 from katana450.settings import Settings
@@ -53,7 +53,7 @@ class FrontendConfig:
     folder: Path
 
 
-def run_frontend(config: FrontendConfig, records: Connection, supervisor: SupervisorLink) -> None:
+def run_frontend(config: FrontendConfig, records: Connection, supervisor: SupervisorPipe) -> None:
     """Run the front end in this process, from start to end. Raises KatanaError.
 
     records: pipe to the event log.
@@ -92,16 +92,16 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
         # meanwhile.
         from katana450.assembly.frontend import build_frontend
 
-        link, view, detours = build_frontend(gateway, config, meshes, supervisor.ended)
+        front_end, view, detours = build_frontend(gateway, config, meshes, supervisor.ended)
         view.start()
         # Exempt all present objects from garbage collection, which would delay STOP.
         gc.collect()
         gc.freeze()
         supervisor.report(READY)
-        while not supervisor.ended.wait(WAKE_INTERVAL) and not link.cut.is_set():
+        while not supervisor.ended.wait(WAKE_INTERVAL) and not front_end.cut.is_set():
             if view.failed.is_set():
                 raise SystemExit(1)
-        link.close()
+        front_end.close()
         gateway.stop()
         view.stop()
         if detours is not None:

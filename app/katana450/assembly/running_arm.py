@@ -14,9 +14,9 @@ from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import State
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.initial_scene import InitialScene
+from katana450.arm.runtime.arm_end import ArmEnd
 from katana450.arm.runtime.arm_listener import Greeting
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.state_publisher import StatePublisher

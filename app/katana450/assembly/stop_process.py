@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from katana450.arm.runtime.arm_listener import STOP, ArmAddress, Greeting, connect_when_ready
-from katana450.arm.runtime.stop_link import StopLink
+from katana450.arm.runtime.stop_pipe import StopPipe
 from katana450.assembly.authentication import access_file, address_of, tls_context
-from katana450.assembly.supervised import READY, SupervisorLink
+from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.platform_support import raise_priority
 from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
 from katana450.server.web.authenticator import Authenticator
@@ -48,28 +48,30 @@ class StopConfig:
     address: ArmAddress
 
 
-def run_stop(config: StopConfig, supervisor: SupervisorLink) -> None:
+def run_stop(config: StopConfig, supervisor: SupervisorPipe) -> None:
     """Run the server of STOP in this process, from start to end. Raises KatanaError."""
     raise_priority()
     asyncio.run(_serve(config, supervisor))
 
 
-async def _serve(config: StopConfig, supervisor: SupervisorLink) -> None:
+async def _serve(config: StopConfig, supervisor: SupervisorPipe) -> None:
     settings, listening = config.settings, config.listening
     address = address_of(settings, listening)
     access = access_file(settings, listening)
     tls = tls_context(settings)
     raise_descriptor_limit()
-    link = StopLink(lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended))
+    stop_pipe = StopPipe(
+        lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended)
+    )
     acceptor = Acceptor(listening)
     authenticator = Authenticator(access, config.main_port, address)
-    server = StopServer(link, authenticator, address, config.main_port, acceptor)
+    server = StopServer(stop_pipe, authenticator, address, config.main_port, acceptor)
     acceptor.start(partial(StopConnection, server), tls)
     # Exempt all present objects from garbage collection, which would delay STOP.
     gc.collect()
     gc.freeze()
     turned = time.monotonic()
-    supervisor.prove(lambda: link.running and time.monotonic() - turned < HANG_TIMEOUT)
+    supervisor.prove(lambda: stop_pipe.running and time.monotonic() - turned < HANG_TIMEOUT)
     supervisor.report(READY)
     while not supervisor.ended.is_set():
         turned = time.monotonic()

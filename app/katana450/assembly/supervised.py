@@ -40,11 +40,11 @@ READY = "ready"
 log = logging.getLogger(__name__)
 
 
-class SupervisorLink:
+class SupervisorPipe:
     """The pipe from a process to its supervisor, as the process sees it."""
 
     def __init__(self, pipe: Connection) -> None:
-        """Create the link; ``start`` runs it."""
+        """Create the pipe's end; ``start`` runs it."""
         self._pipe = pipe
         self._sending = threading.Lock()
         self._heard = time.monotonic()
@@ -52,11 +52,11 @@ class SupervisorLink:
         self.ended = threading.Event()
         """Set when the supervisor ends this process, or has ended itself."""
         self.notify: Callable[[str], None] = lambda _: None
-        """Called, in a thread of the link, with each notice about another process."""
+        """Called, in a thread of its own, with each notice about another process."""
 
     def start(self) -> None:
-        """Send heartbeats in a thread of the link."""
-        threading.Thread(target=self._run, name="supervisor link", daemon=True).start()
+        """Send heartbeats in a thread of its own."""
+        threading.Thread(target=self._run, name="supervisor pipe", daemon=True).start()
 
     def prove(self, alive: Callable[[], bool]) -> None:
         """Send heartbeats only while ``alive`` returns True; it is called at each of them."""
@@ -100,7 +100,7 @@ class SupervisorLink:
             # The supervisor has ended.
             pass
         except Exception:
-            log.exception("The link to the supervisor met an error; this process ends.")
+            log.exception("The pipe to the supervisor met an error; this process ends.")
         self.ended.set()
         # This thread keeps no object of a process that ends.
         del self._alive, self.notify
@@ -136,7 +136,7 @@ class SupervisorLink:
         return problem is not None
 
 
-def run_supervised(name: str, work: Callable[[SupervisorLink], None], pipe: Connection) -> None:
+def run_supervised(name: str, work: Callable[[SupervisorPipe], None], pipe: Connection) -> None:
     """Do ``work`` in this process, which the supervisor has just started.
 
     Args:
@@ -149,10 +149,10 @@ def run_supervised(name: str, work: Callable[[SupervisorLink], None], pipe: Conn
         signal.signal(number, signal.SIG_IGN)
     name_process(name)
     start_log()
-    link = SupervisorLink(pipe)
-    link.start()
+    supervisor = SupervisorPipe(pipe)
+    supervisor.start()
     try:
-        work(link)
+        work(supervisor)
     except KatanaError as error:
-        link.report(error)
+        supervisor.report(error)
         raise SystemExit(1) from None

@@ -29,7 +29,7 @@ from katana450.assembly.supervised import (
     READY,
     REPORT,
     SCENE,
-    SupervisorLink,
+    SupervisorPipe,
     run_supervised,
 )
 from katana450.errors import ConfigurationError, KatanaError
@@ -67,7 +67,7 @@ log = logging.getLogger(__name__)
 Kept = dict[bytes, bytes]
 """The last known state of the arm, by the kinds KEPT and SCENE, which is not read here."""
 
-Work = Callable[[SupervisorLink], None]
+Work = Callable[[SupervisorPipe], None]
 
 
 @dataclass(frozen=True)
@@ -322,9 +322,9 @@ def child_spec(
     *,
     keeps: bool = False,
 ) -> ChildSpec:
-    """Return the specification of a process that runs ``function(config, link)``.
+    """Return the specification of a process that runs ``function(config, supervisor)``.
 
-    keeps: whether the function takes the kept state too: ``function(config, kept, link)``.
+    keeps: whether the function takes the kept state too: ``function(config, kept, supervisor)``.
     """
 
     def work(kept: Kept | None) -> Work:

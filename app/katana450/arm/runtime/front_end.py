@@ -1,4 +1,4 @@
-"""The front end's end of the pipe to the arm's process; ``link`` is the other end."""
+"""The front end's end of the pipe to the arm's process; ``arm_end`` is the other end."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.scene_objects import same
 from katana450.arm.control.stopping import joined
-from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.link import (
+from katana450.arm.runtime.arm_end import (
     PIPE_ERRORS,
     PULSE,
     CommandMessage,
     Heartbeat,
     StateMessage,
 )
+from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.readiness import readable, writable
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.wire import PlanStore
@@ -36,7 +36,7 @@ RECONNECT_INTERVAL = 0.05
 
 
 class FrontEnd:
-    """The end of the link in the front end: it takes commands and publishes the arm's states."""
+    """The end of the pipe in the front end: it takes commands and publishes the arm's states."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class FrontEnd:
             pipe: the pipe to the arm's process.
             check: see ``Mailbox``.
             reconnect: makes a pipe to a new process of the arm, to which it gives the number of the
-                newest command. Raises OSError or EOFError while there is none. Without it the link
+                newest command. Raises OSError or EOFError while there is none. Without it the pipe
                 is cut when the arm's process ends.
 
         Raises:
@@ -74,7 +74,7 @@ class FrontEnd:
         self.state_publisher.publish(first.snapshot, first.event_log)
         self.cut = threading.Event()
         """Set once this front end is no longer the one of the arm."""
-        self._thread = threading.Thread(target=self._listen, name="link", daemon=True)
+        self._thread = threading.Thread(target=self._listen, name="pipe", daemon=True)
 
     def start(self) -> None:
         """Read all states that have arrived, then follow the arm in a thread of its own.
@@ -142,7 +142,7 @@ class FrontEnd:
                 self._send(Heartbeat(drivers))
 
     def close(self) -> None:
-        """Cut the link; a thread that reads from the pipe ends with its process."""
+        """Cut the pipe; a thread that reads from the pipe ends with its process."""
         self.cut.set()
 
     def _flush(self) -> bool:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.runtime.link import JOIN_TIMEOUT, PIPE_ERRORS
+from katana450.arm.runtime.arm_end import JOIN_TIMEOUT, PIPE_ERRORS
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.stop_messages import STATUS_INTERVAL, StopPress, StopStatus

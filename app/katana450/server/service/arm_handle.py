@@ -139,7 +139,7 @@ class ArmHandle:
         return self._state_publisher.outcomes.of(ticket)
 
     def listen(self, listener: Callable[[Sequence[TicketOutcome]], None]) -> None:
-        """Call ``listener`` with all outcomes from now on, in the thread of the link."""
+        """Call ``listener`` with all outcomes from now on, in the thread of the pipe."""
         self._state_publisher.outcomes.listener = listener
 
     @property

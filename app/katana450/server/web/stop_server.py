@@ -59,7 +59,7 @@ LINES_HELP = 'Send {"do": "hello", "name": "..."} and {"do": "stop"}, each on a 
 
 
 class Link(Protocol):
-    """The arm as this server sees it; ``StopLink`` implements it."""
+    """The arm as this server sees it; ``StopPipe`` implements it."""
 
     status: StopStatus | None
 

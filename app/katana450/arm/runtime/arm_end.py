@@ -99,10 +99,10 @@ class StateMessage:
 
 
 class ArmEnd:
-    """The end of the link in the arm's process.
+    """The end of the pipe in the arm's process.
 
     It delivers commands to the mailbox and sends what the loop publishes. It stops the arm when the
-    link is cut. When the link is silent, a moving arm stops, or pauses if it is simulated.
+    pipe is cut. When the pipe is silent, a moving arm stops, or pauses if it is simulated.
     """
 
     def __init__(
@@ -137,17 +137,17 @@ class ArmEnd:
         self.cut = threading.Event()
         """Set once the other end is closed."""
         self._threads = [
-            threading.Thread(target=target, name=f"link {name}", daemon=True)
+            threading.Thread(target=target, name=f"pipe {name}", daemon=True)
             for name, target in (("in", self._listen), ("out", self._show), ("watch", self._watch))
         ]
 
     def start(self) -> None:
-        """Run the link in threads of its own until it is cut."""
+        """Serve the pipe in threads of its own until it is cut."""
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
-        """Cut the link: the front end disconnects, and the arm stops."""
+        """Cut the pipe: the front end disconnects, and the arm stops."""
         self._lose()
 
     def join(self) -> None:
@@ -168,7 +168,7 @@ class ArmEnd:
             self._lose()
 
     def _lose(self) -> None:
-        """Stop the arm, unless the link is cut already: no command can come any more."""
+        """Stop the arm, unless the pipe is cut already: no command can come any more."""
         if not self.cut.is_set():
             self.cut.set()
             self._mailbox.put(cmd.Stop())

@@ -1,4 +1,4 @@
-"""The two ends of the link: the arm's end with a real control loop, and the front end."""
+"""The two ends of the pipe: the arm's end with a real control loop, and the front end."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Finding, Reason, Verdict
 from katana450.arm.control.stopping import clear_refusal
 from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.arm_end import ArmEnd, CommandMessage
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.front_end import FrontEnd
-from katana450.arm.runtime.link import ArmEnd, CommandMessage
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES
@@ -34,7 +34,7 @@ SILENCE = 0.3
 
 
 class Ends:
-    """Both ends of the link, and the control loop."""
+    """Both ends of the pipe, and the control loop."""
 
     def __init__(
         self,

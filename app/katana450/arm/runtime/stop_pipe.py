@@ -18,7 +18,7 @@ MAX_UNSENT = 16
 """Number of presses that are kept while there is no connection; one stops the arm."""
 
 
-class StopLink:
+class StopPipe:
     """Sends presses of STOP to the arm's process and holds the newest answer.
 
     It belongs to the event loop in which it is created; a thread of its own reads the pipe.
@@ -39,7 +39,7 @@ class StopLink:
         self._changed = asyncio.Event()
         self.status: StopStatus | None = None
         """The newest status; None while there is no connection to the arm."""
-        self._thread = threading.Thread(target=self._listen, name="stop link", daemon=True)
+        self._thread = threading.Thread(target=self._listen, name="stop pipe", daemon=True)
         self._thread.start()
 
     @property

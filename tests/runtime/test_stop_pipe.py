@@ -23,8 +23,8 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.stop_end import StopEnd
-from katana450.arm.runtime.stop_link import StopLink
 from katana450.arm.runtime.stop_messages import StopPress
+from katana450.arm.runtime.stop_pipe import StopPipe
 
 TIMEOUT = 5.0
 
@@ -34,14 +34,14 @@ def press(name: str) -> StopPress:
     return StopPress(pressed("Vera", "v", name, 1.0), Actor(person, CommandChannel.HTTP))
 
 
-def connected(link: StopLink) -> bool:
-    return link.status is not None
+def connected(stop_pipe: StopPipe) -> bool:
+    return stop_pipe.status is not None
 
 
-async def ended(link: StopLink) -> None:
-    """Wait until the thread of ``link`` has read the end of its connection."""
+async def ended(stop_pipe: StopPipe) -> None:
+    """Wait until the thread of ``stop_pipe`` has read the end of its connection."""
     async with asyncio.timeout(TIMEOUT):
-        while link.running:
+        while stop_pipe.running:
             await asyncio.sleep(0.01)
 
 
@@ -83,31 +83,31 @@ def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
         return pipe
 
     async def act() -> None:
-        link = StopLink(connect)
+        stop_pipe = StopPipe(connect)
         # Before the arm is there.
-        link.press(press("one"))
-        assert await link.executed("one", 0.1) is None
+        stop_pipe.press(press("one"))
+        assert await stop_pipe.executed("one", 0.1) is None
         with arm_end(arm, session) as first:
             pipes.put(first)
-            assert await link.executed("one", TIMEOUT) == press("one").cause
+            assert await stop_pipe.executed("one", TIMEOUT) == press("one").cause
             # The cause stays that of the first press.
-            link.press(press("two"))
-            assert await link.executed("two", TIMEOUT) == press("one").cause
-            assert link.status is not None
-            assert link.status.presses == ("one", "two")
-            assert link.age < TIMEOUT
+            stop_pipe.press(press("two"))
+            assert await stop_pipe.executed("two", TIMEOUT) == press("one").cause
+            assert stop_pipe.status is not None
+            assert stop_pipe.status.presses == ("one", "two")
+            assert stop_pipe.age < TIMEOUT
         first.close()
         async with asyncio.timeout(TIMEOUT):
-            while connected(link):
+            while connected(stop_pipe):
                 await asyncio.sleep(0.01)
-        link.press(press("three"))
+        stop_pipe.press(press("three"))
         with arm_end(arm, session) as second:
             pipes.put(second)
-            assert await link.executed("three", TIMEOUT) == press("three").cause
+            assert await stop_pipe.executed("three", TIMEOUT) == press("three").cause
         second.close()
-        assert link.running
+        assert stop_pipe.running
         pipes.put(None)
-        await ended(link)
+        await ended(stop_pipe)
 
     asyncio.run(act())
 
@@ -119,11 +119,11 @@ def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
     async def act() -> None:
         with arm_end(arm, session) as pipe:
             pipes = iter((pipe,))
-            link = StopLink(lambda: _next(pipes))
-            link.press(press("one"))
-            found = await link.executed(name, TIMEOUT if name == "one" else 0.3)
+            stop_pipe = StopPipe(lambda: _next(pipes))
+            stop_pipe.press(press("one"))
+            found = await stop_pipe.executed(name, TIMEOUT if name == "one" else 0.3)
             assert (found is not None) == (name == "one")
-        await ended(link)
+        await ended(stop_pipe)
         pipe.close()
 
     asyncio.run(act())
@@ -135,17 +135,17 @@ def test_status_names_the_newest_drivers(arm: ArmModel, session: Session) -> Non
     async def act() -> None:
         with arm_end(arm, session, lambda: tuple(drivers)) as pipe:
             pipes = iter((pipe,))
-            link = StopLink(lambda: _next(pipes))
+            stop_pipe = StopPipe(lambda: _next(pipes))
 
             async def names(expected: tuple[str, ...]) -> None:
                 async with asyncio.timeout(TIMEOUT):
-                    while link.status is None or link.status.drivers != expected:
+                    while stop_pipe.status is None or stop_pipe.status.drivers != expected:
                         await asyncio.sleep(0.01)
 
             await names(())
             drivers.append("oda")
             await names(("oda",))
-        await ended(link)
+        await ended(stop_pipe)
         pipe.close()
 
     asyncio.run(act())
