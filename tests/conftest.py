@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import tempfile
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +18,15 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.settings import Settings
+from tests.schedule import LowestPriority, Schedule
 
 LONG = "KATANA450_LONG" in os.environ
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """A shell has what it runs in the background ignore Ctrl-C, and so would all it starts."""
+    if hasattr(config, "workerinput"):
+        config.pluginmanager.register(LowestPriority())
     signal.signal(signal.SIGINT, signal.default_int_handler)
     # Servers that the tests start keep their event logs out of the user's folders.
     state = tempfile.mkdtemp(prefix="katana450-")
@@ -41,6 +45,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Schedule:
+    """Return the schedule by which `make test` runs the tests in several processes."""
+    return Schedule(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -157,6 +157,7 @@ def test_page_reconnects_after_a_restart_of_its_server(open_page: OpenPage) -> N
         page = open_page(server.url, nodes=NODES)
         with page.grip_arrow(MOVE, "z") as grip:
             grip.to(0.05)
+            page.wait_until(lambda: page.node_pose(BOX)[2, 3] > START[2], "the box to follow")
             server.kill()
             page.wait_lost()
         assert page.node_pose(BOX)[2, 3] > START[2]  # the last picture stays

@@ -1,0 +1,70 @@
+"""Schedule of the tests when several processes run them.
+
+Tests that drive a browser would starve each other of time, and so would tests that run servers:
+each of these kinds runs in one process. The others only compute. They run file by file, at the
+lowest priority, in the time that is left.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import suppress
+from pathlib import PurePath
+
+import pytest
+from xdist.scheduler.loadscope import LoadScopeScheduling
+
+BROWSER = "browser"
+SERVERS = "servers"
+
+KINDS = {
+    "tests/browser": BROWSER,
+    "tests/gateway": SERVERS,
+    "tests/event_log": SERVERS,
+    "tests/extensions": SERVERS,
+    # Some of these run servers too; they follow the browser to make both rows equally long.
+    "tests/cli/test_serve.py": BROWSER,
+    "tests/docs": BROWSER,
+    "tests/examples": BROWSER,
+    "tests/library/test_run.py": BROWSER,
+    "tests/robot/test_other_arms.py": BROWSER,
+}
+"""Kinds of the tests that need their time at once, by their folders and files."""
+
+
+def kind_of(nodeid: str) -> str:
+    """Return the kind of a test: browser, servers, or the file of a test that only computes."""
+    path = PurePath(nodeid.partition("::")[0])
+    for each in (path, *path.parents):
+        if each.as_posix() in KINDS:
+            return KINDS[each.as_posix()]
+    return path.as_posix()
+
+
+class Schedule(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
+    """The tests of one kind run in one process, the kinds with the most tests first."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return kind_of(nodeid)
+
+
+class LowestPriority:
+    """Plugin of a process that runs tests for others: it gives way before it computes."""
+
+    def __init__(self) -> None:
+        self._lowered = False
+
+    def pytest_runtest_setup(self, item: pytest.Item) -> None:
+        """Lower the priority of this process for good, before its first test that computes."""
+        if self._lowered or kind_of(item.nodeid) in (BROWSER, SERVERS):
+            return
+        self._lowered = True
+        if sys.platform == "win32":
+            return
+        os.nice(19)
+        # Linux shares a processor among sessions first, so the priority is that of a session.
+        with suppress(OSError):
+            os.setsid()
+            with open("/proc/self/autogroup", "w", encoding="ascii") as group:
+                group.write("19")
