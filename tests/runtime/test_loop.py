@@ -164,6 +164,18 @@ def test_wait_for_change_returns_on_change_or_timeout(parts: LoopParts) -> None:
     thread.join()
 
 
+def test_wake_ends_a_wait_for_change(parts: LoopParts) -> None:
+    parts.tick()
+    publisher = parts.loop.state_publisher
+    seen, found = publisher.snapshot, []
+    thread = threading.Thread(target=lambda: found.append(publisher.wait_for_change(seen, 60.0)))
+    thread.start()
+    while thread.is_alive():
+        publisher.wake()
+        thread.join(0.01)
+    assert found == [seen]
+
+
 def test_loop_runs_and_stops_on_the_machine_clock(arm: ArmModel, session: Session) -> None:
     mailbox = Mailbox(session.check)
     driver = SimulatedDriver(arm, session.ready, 0.0)

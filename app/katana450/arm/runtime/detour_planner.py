@@ -62,6 +62,7 @@ class DetourPlanner:
     def stop(self) -> None:
         """End the thread."""
         self._stopping.set()
+        self._state_publisher.wake()
         self._thread.join()
 
     def _run(self) -> None:

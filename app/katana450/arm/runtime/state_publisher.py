@@ -31,6 +31,7 @@ class StatePublisher:
         self._snapshot = first
         self._event_log: deque[LogEntry] = deque(maxlen=MAX_KEPT_ENTRIES)
         self._published = threading.Condition()
+        self._wakes = 0
         self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_OUTCOMES)
         self.outcomes = Outcomes()
         """Outcomes of commands, by their tickets."""
@@ -69,10 +70,22 @@ class StatePublisher:
             return outcomes
 
     def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
-        """Return the newest snapshot once it is another than ``seen``, or after ``timeout`` [s]."""
+        """Return the newest snapshot once it is another than ``seen``, or after ``timeout`` [s].
+
+        ``wake`` ends the wait too.
+        """
         with self._published:
-            self._published.wait_for(lambda: self._snapshot is not seen, timeout)
+            wakes = self._wakes
+            self._published.wait_for(
+                lambda: self._snapshot is not seen or self._wakes != wakes, timeout
+            )
             return self._snapshot
+
+    def wake(self) -> None:
+        """End each wait for a change, so that a thread that is to end does so at once."""
+        with self._published:
+            self._wakes += 1
+            self._published.notify_all()
 
     def wait_for_command(self, seen: Snapshot, timeout: float) -> None:
         """Return once a command newer than ``seen`` is published, or after ``timeout`` [s]."""

@@ -42,6 +42,7 @@ class ViewUpdater(ABC):
     def stop(self) -> None:
         """End the thread and wait for it."""
         self._stopping.set()
+        self._state_publisher.wake()
         if self._thread.is_alive():
             self._thread.join()
 
