@@ -31,7 +31,7 @@ from katana450.platform_support import cache_folder, only_this_user_writes
 T = TypeVar("T")
 
 MAX_FILES = 500
-"""Number of files after which the oldest are deleted."""
+"""Number of files after which those that were not used for longest are deleted."""
 
 LIBRARIES = ("numpy", "trimesh", "yourdfpy")
 """Libraries whose version may change a value."""
@@ -53,6 +53,8 @@ def kept(make: Callable[[], T], *inputs: bytes | str | np.ndarray[Any, Any]) -> 
     file = folder / _digest((_surroundings(), name, *inputs)).hex()
     with suppress(OSError, _DamagedError):
         found: T = _loaded(file.read_bytes())
+        with suppress(OSError):
+            os.utime(file)
         return found
     value = make()
     with suppress(OSError):

@@ -103,6 +103,20 @@ def test_number_of_files_is_bounded(folder: Path, monkeypatch: pytest.MonkeyPatc
     assert len(list(folder.iterdir())) == 3
 
 
+def test_value_that_is_used_is_kept_longest(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(disk_cache, "MAX_FILES", 2)
+    used, unused = Made(), Made()
+    kept(used, "used")
+    kept(unused, "unused")
+    for file in folder.iterdir():
+        os.utime(file, (0, 0))
+    kept(used, "used")
+    kept(Made(), "new")
+    kept(used, "used")
+    kept(unused, "unused")
+    assert (used.times, unused.times) == (1, 2)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such permissions")
 def test_folder_that_others_may_write_to_is_not_used(folder: Path) -> None:
     made = Made()
