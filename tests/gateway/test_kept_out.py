@@ -169,7 +169,7 @@ def test_refused_queries_of_a_muted_person_cost_and_those_of_the_driver_count(
     (number,) = house.file.grants
     house.people.mutes.add(number, 60.0)
     house.arm.loop_timing = LoopTiming(0.01)
-    query = house.api._read("loop")
+    query = house.api._query("loop")
 
     async def ask() -> int:
         return (await query(house.request(b"", token))).status_code

@@ -105,4 +105,4 @@ def test_a_ring_of_followers_names_the_joint_that_is_followed(tmp_path: Path) ->
         for name, other in (("left", "right"), ("right", "left"))
     ]
     (fault, _) = load(written(tmp_path, "arm", [*PX150, *jaws])).faults
-    assert fault.startswith("Joint 'left' of arm.urdf mimics 'right', which follows no driven")
+    assert fault.startswith("Joint 'left' of arm.urdf mimics 'right', which is not driven")

@@ -1,4 +1,4 @@
-"""Motions of cups: poses, accelerations and steps, as a control loop would give them."""
+"""Motions of the cup for tests: its pose and acceleration in each time step."""
 
 from __future__ import annotations
 
@@ -13,18 +13,25 @@ from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
 
 Step = tuple[FloatArray, FloatArray]
-"""The pose of the cup (4, 4) and the acceleration of its middle (3,)."""
+"""Pose (4, 4) [m] of the cup, and acceleration (3,) [m/s^2] of its middle, in the base frame."""
 
-UPRIGHT = np.zeros(3)
+NO_ACCELERATION = np.zeros(3)
+"""[m/s^2] Zero acceleration of the cup."""
 
 
 def placed(x: float, y: float, z: float, tilt: float = 0.0) -> FloatArray:
-    """Return a cup with the middle of its foot there, turned about x with its mouth to -y."""
+    """Return the pose of a cup with the middle of its foot at ``x``, ``y``, ``z`` [m].
+
+    ``tilt`` [rad] turns the cup about x, so that its mouth moves towards -y.
+    """
     return se3.from_rotation_translation(so3.exp((tilt, 0.0, 0.0)), (x, y, z))
 
 
 def over_basin(environment: WaterEnvironment, tilt: float) -> FloatArray:
-    """Return a cup whose mouth is 20 cm over the table, turned about the middle of its mouth."""
+    """Return the pose of a cup whose mouth is 20 cm over the table, above the middle of the basin.
+
+    ``tilt`` [rad] turns the cup about the middle of its mouth, which stays in place.
+    """
     x, y, _ = environment.basin.at
     mouth = environment.cup.floor + environment.cup.inside.depth
     R = so3.exp((tilt, 0.0, 0.0))
@@ -32,9 +39,10 @@ def over_basin(environment: WaterEnvironment, tilt: float) -> FloatArray:
 
 
 def carried(start: float, distance: float, duration: float, dt: float) -> Iterator[Step]:
-    """Yield a cycloidal motion along x from rest to rest.
+    """Yield a cycloidal motion of the cup along x, from rest to rest.
 
-    The maximum acceleration is 2 pi distance / T^2.
+    ``start`` and ``distance`` in m, ``duration`` and time step ``dt`` in s. The maximum
+    acceleration is 2 pi distance / duration^2.
     """
     for k in range(1, round(duration / dt) + 1):
         s = math.tau * k * dt / duration
@@ -46,12 +54,16 @@ def carried(start: float, distance: float, duration: float, dt: float) -> Iterat
 def poured(
     flow: WaterFlow, water: Water, tilt: Callable[[float], float], duration: float, dt: float
 ) -> Iterator[Water]:
-    """Yield the water in a cup over the basin that is tilted by ``tilt`` of the time."""
+    """Yield all water after each time step ``dt`` [s], while a cup over the basin is tilted.
+
+    ``tilt`` returns the tilt [rad] at a time [s].
+    """
     for k in range(1, round(duration / dt) + 1):
-        water = flow.step(water, over_basin(flow.water_environment, tilt(k * dt)), UPRIGHT, dt)
+        pose = over_basin(flow.water_environment, tilt(k * dt))
+        water = flow.step(water, pose, NO_ACCELERATION, dt)
         yield water
 
 
 def turned_to(final: float, rate: float) -> Callable[[float], float]:
-    """Return a turn at ``rate`` [rad/s] up to ``final`` [rad], then rest."""
+    """Return a tilt over time [s] that rises at ``rate`` [rad/s] to ``final`` [rad] and stays."""
     return lambda t: min(rate * t, final)

@@ -1,4 +1,4 @@
-"""The basin's level, and the props as vessels."""
+"""Tests of cup and basin: their sizes, and the level and volume of the water in the basin."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ basins = st.builds(
 )
 
 
-def test_the_props_are_the_vessels(environment: WaterEnvironment) -> None:
+def test_cup_and_basin_have_the_sizes_of_the_props(environment: WaterEnvironment) -> None:
     props = load_props()
     assert environment.cup.inside.radius == props.cup.inner_radius
     assert environment.cup.floor + environment.cup.inside.depth == pytest.approx(props.cup.height)
@@ -37,22 +37,22 @@ def test_the_props_are_the_vessels(environment: WaterEnvironment) -> None:
 
 @repeatable
 @given(basins, st.floats(0.0, 1.0))
-def test_a_level_is_the_inverse_of_a_volume(basin: Basin, fraction: float) -> None:
+def test_basin_level_is_the_inverse_of_its_volume(basin: Basin, fraction: float) -> None:
     level = fraction * basin.depth
     z = (np.arange(2000) + 0.5) / 2000.0 * level
-    slices = np.array([basin.radius(height) for height in z])
-    summed = float((math.pi * slices**2).mean()) * level
-    assert basin.volume(level) == pytest.approx(summed, rel=1e-6, abs=1e-18)
+    slice_radii = np.array([basin.radius(height) for height in z])
+    integral = float((math.pi * slice_radii**2).mean()) * level
+    assert basin.volume(level) == pytest.approx(integral, rel=1e-6, abs=1e-18)
     assert basin.level(basin.volume(level)) == pytest.approx(level, rel=1e-11, abs=1e-15)
 
 
-def test_straight_basin_is_the_limit_of_conical_ones(environment: WaterEnvironment) -> None:
+def test_nearly_straight_basin_fills_like_a_straight_one(environment: WaterEnvironment) -> None:
     straight = replace(environment.basin, rim_radius=environment.basin.floor_radius)
-    nearly = replace(straight, rim_radius=straight.floor_radius * (1.0 + 1e-12))
-    assert nearly.level(2e-4) == pytest.approx(straight.level(2e-4), rel=1e-10)
+    nearly_straight = replace(straight, rim_radius=straight.floor_radius * (1.0 + 1e-12))
+    assert nearly_straight.level(2e-4) == pytest.approx(straight.level(2e-4), rel=1e-10)
 
 
-def test_a_basin_without_size_or_place_is_refused(environment: WaterEnvironment) -> None:
+def test_basin_without_finite_size_and_place_is_refused(environment: WaterEnvironment) -> None:
     with pytest.raises(InputError, match="depth"):
         replace(environment.basin, depth=math.nan)
     with pytest.raises(InputError, match="stands at"):

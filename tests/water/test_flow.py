@@ -20,7 +20,7 @@ from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.slosh import steady_acceleration
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, counted
 from tests.geometry.strategies import points, repeatable, rotation_vectors
-from tests.water.motions import UPRIGHT, carried, over_basin, placed, poured, turned_to
+from tests.water.motions import NO_ACCELERATION, carried, over_basin, placed, poured, turned_to
 
 FULL = 2e-4
 """A filling [m^3]."""
@@ -115,7 +115,7 @@ def carry(flow: WaterFlow, distance: float, duration: float) -> tuple[Water, flo
         water = flow.step(water, T, acceleration, 0.01)
         least = min(least, flow.margin_to_rim(water))
     for _ in range(200):
-        water = flow.step(water, water.T_base_cup, UPRIGHT, 0.01)
+        water = flow.step(water, water.T_base_cup, NO_ACCELERATION, 0.01)
         least = min(least, flow.margin_to_rim(water))
     return water, least
 
@@ -165,14 +165,14 @@ def test_water_leaves_with_the_velocity_of_the_lip(flow: WaterFlow) -> None:
     water = flow.begin(1.5e-4, T)
     moved = T.copy()
     moved[0, 3] += 0.005
-    water = flow.step(water, moved, UPRIGHT, 0.01)
+    water = flow.step(water, moved, NO_ACCELERATION, 0.01)
     (parcel,) = water.parcels
     lip = moved[:3, :3] @ (0.0, -0.03, 0.09) + moved[:3, 3]
     assert parcel.start == pytest.approx(tuple(lip))
     assert parcel.velocity[0] == pytest.approx(0.5)
     assert parcel.velocity[1] < 0.0
     assert parcel.velocity[2] == pytest.approx(0.0, abs=1e-9)
-    again = flow.step(water, moved, UPRIGHT, 0.01)
+    again = flow.step(water, moved, NO_ACCELERATION, 0.01)
     assert again.parcels[0] == parcel._replace(age=0.01)
 
 
@@ -184,7 +184,7 @@ def test_the_cup_catches_what_falls_into_its_mouth(flow: WaterFlow) -> None:
         flying = Water(
             water.cup, 0, (drop._replace(start=start),), (), water.slosh, water.T_base_cup
         )
-        after = flow.step(flying, water.T_base_cup, UPRIGHT, 0.01)
+        after = flow.step(flying, water.T_base_cup, NO_ACCELERATION, 0.01)
         assert (after.cup == water.cup + MILLILITRE) is caught
         checked(flying, after, flow)
 
@@ -213,13 +213,13 @@ def test_water_stays_in_free_fall_but_not_upside_down(flow: WaterFlow) -> None:
 
 def test_water_at_rest_stays_at_rest(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15, 0.2))
-    after = flow.step(water, water.T_base_cup, UPRIGHT, 0.01)
+    after = flow.step(water, water.T_base_cup, NO_ACCELERATION, 0.01)
     assert (after.cup, after.parcels, after.slosh) == (water.cup, (), water.slosh)
 
 
 def test_step_of_zero_time_only_moves_the_cup(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15))
-    after = flow.step(water, placed(0.3, -0.3, 0.15, 2.0), UPRIGHT, 0.0)
+    after = flow.step(water, placed(0.3, -0.3, 0.15, 2.0), NO_ACCELERATION, 0.0)
     assert after.cup == water.cup
     assert after.T_base_cup[0, 3] == 0.3
 
@@ -228,7 +228,7 @@ def test_the_puddles_stay_few(flow: WaterFlow) -> None:
     water = flow.begin(2.4e-4, placed(-0.2, -0.5, 0.2, 0.3))
     for k in range(600):
         T = placed(-0.2 + k * 1.5e-3, -0.5, 0.2, 0.3 + k * 3e-3)
-        after = flow.step(water, T, UPRIGHT, 0.01)
+        after = flow.step(water, T, NO_ACCELERATION, 0.01)
         checked(water, after, flow)
         water = after
     assert 4 <= len(water.puddles) <= 8
@@ -243,10 +243,10 @@ def test_overfull_cup_is_refused(flow: WaterFlow) -> None:
 def test_bad_numbers_are_refused(flow: WaterFlow) -> None:
     water = flow.begin(FULL, np.eye(4))
     with pytest.raises(InputError, match="pose of the cup"):
-        flow.step(water, np.ones((4, 4)), UPRIGHT, 0.01)
+        flow.step(water, np.ones((4, 4)), NO_ACCELERATION, 0.01)
     with pytest.raises(InputError, match="acceleration"):
         flow.step(water, np.eye(4), (0.0, math.nan, 0.0), 0.01)
     with pytest.raises(InputError, match="time step"):
-        flow.step(water, np.eye(4), UPRIGHT, -0.01)
+        flow.step(water, np.eye(4), NO_ACCELERATION, -0.01)
     with pytest.raises(InputError, match="time step"):
-        flow.step(water, np.eye(4), UPRIGHT, math.inf)
+        flow.step(water, np.eye(4), NO_ACCELERATION, math.inf)

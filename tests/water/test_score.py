@@ -8,7 +8,7 @@ import pytest
 
 from katana450.maths.water.flow import WaterFlow
 from katana450.maths.water.score import Course, score
-from tests.water.motions import UPRIGHT, over_basin, poured, turned_to
+from tests.water.motions import NO_ACCELERATION, over_basin, poured, turned_to
 
 
 def test_pour_into_the_basin_has_the_full_score(flow: WaterFlow) -> None:
@@ -32,7 +32,7 @@ def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:
 
 def test_score_without_water_is_nan(flow: WaterFlow) -> None:
     empty = flow.begin(0.0, over_basin(flow.water_environment, 0.0))
-    empty = flow.step(empty, over_basin(flow.water_environment, 2.0), UPRIGHT, 0.01)
+    empty = flow.step(empty, over_basin(flow.water_environment, 2.0), NO_ACCELERATION, 0.01)
     assert math.isnan(score(empty, Course()).emptied_percent)
 
 

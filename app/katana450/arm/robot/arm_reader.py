@@ -120,7 +120,9 @@ def _limit(joint: UrdfJoint, which: str) -> float:
         return math.pi if which == "upper" else -math.pi
     value = None if joint.limit is None else getattr(joint.limit, which)
     if value is None:
-        raise RobotDescriptionError(f"Joint {joint.name!r} has no {which} limit.")
+        raise RobotDescriptionError(
+            f"Joint {joint.name!r} has no {which} limit. Add {which!r} to its <limit>."
+        )
     return float(value)
 
 

@@ -145,7 +145,8 @@ def _following(
             return None
         if above.name in passed:
             raise RobotDescriptionError(
-                f"Joint {passed[0]!r} mimics {joint.mimic.joint!r}, which follows no driven joint."
+                f"Joint {passed[0]!r} mimics {joint.mimic.joint!r}, which is not driven and "
+                "follows no driven joint. Name a driven joint in its <mimic>."
             )
         passed.append(above.name)
         joint = above

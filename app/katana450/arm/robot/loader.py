@@ -95,8 +95,8 @@ def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]
 def _joint(path: Path, joint: UrdfJoint) -> Joint:
     if joint.type not in MOVABLE:
         raise RobotDescriptionError(
-            f"Joint {joint.name!r} of {path.name} is {joint.type}; "
-            f"supported are fixed, {', '.join(MOVABLE)}."
+            f"Joint {joint.name!r} of {path.name} is {joint.type}, which is not supported. Change "
+            f"its type to one of fixed, {', '.join(MOVABLE)}."
         )
     size = float(np.linalg.norm(joint.axis))
     if not 0.0 < size < math.inf:
@@ -132,8 +132,8 @@ def _following(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> Joint:
         above = joints.get(joint.leader)
         if above is None or above.name in passed:
             raise RobotDescriptionError(
-                f"Joint {joint.name!r} of {path.name} mimics {named!r}, "
-                "which follows no driven joint."
+                f"Joint {joint.name!r} of {path.name} mimics {named!r}, which is not driven and "
+                "follows no driven joint. Name a driven joint in its <mimic>."
             )
         passed.append(above.name)
         factor, offset = joint.factor * above.factor, joint.factor * above.offset + joint.offset

@@ -1,6 +1,7 @@
-"""VRML97 as values: nodes with their fields, and routes between them.
+"""A VRML97 world as immutable values: nodes with their fields, and routes between their events.
 
-Field names and types are those of ISO/IEC 14772-1:1997, chapter 6, for the nodes that are used.
+Only the nodes that the export writes are listed. Their field names and types are those of ISO/IEC
+14772-1:1997, chapter 6.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import NamedTuple
 
 
 class Type(Enum):
-    """The type of a field: the kind of its values, and whether it is a list (MF)."""
+    """The VRML type of a field: SF types have a single value, MF types a list of values."""
 
     BOOL = "SFBool"
     INT = "SFInt32"
@@ -52,10 +53,10 @@ WIDTHS: Mapping[Type, int] = MappingProxyType(
         Type.ROTATION_LIST: 4,
     }
 )
-"""Numbers per value of the numeric types."""
+"""Count of numbers in a single value of each numeric type."""
 
 LISTS = frozenset(kind for kind in Type if kind.value.startswith("MF"))
-"""Types with any number of values."""
+"""Types whose value is a list of any length."""
 
 _CHILDREN = {"children": Type.NODE_LIST}
 
@@ -113,7 +114,7 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
         "PositionInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.VECTOR_LIST},
     }
 )
-"""The fields of every node that is written, with their types."""
+"""Fields of each kind of node that the export writes, with their types."""
 
 EVENTS: Mapping[tuple[str, str], Type] = MappingProxyType(
     {
@@ -122,7 +123,7 @@ EVENTS: Mapping[tuple[str, str], Type] = MappingProxyType(
         ("PositionInterpolator", "value_changed"): Type.VECTOR,
     }
 )
-"""Outgoing events of nodes."""
+"""Types of the events that nodes send (eventOut), by kind of node and name of the event."""
 
 SETTERS: Mapping[tuple[str, str], Type] = MappingProxyType(
     {
@@ -132,7 +133,7 @@ SETTERS: Mapping[tuple[str, str], Type] = MappingProxyType(
         ("Transform", "set_translation"): Type.VECTOR,
     }
 )
-"""Incoming events of nodes."""
+"""Types of the events that nodes receive (eventIn), by kind of node and name of the event."""
 
 KEYWORDS = frozenset(
     [
@@ -140,26 +141,26 @@ KEYWORDS = frozenset(
         *("eventIn", "eventOut", "exposedField", "field"),
     ]
 )
-"""Words that cannot be names."""
+"""Reserved words of VRML97, which no node may have as its name."""
 
 
 class Use(NamedTuple):
-    """A reference to a node with a DEF name."""
+    """A reference (USE) to the node whose DEF name is ``name``."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class Node:
-    """A node of a world.
+    """A node of a VRML world.
 
-    Values are bool, float, str, tuples of them, a Node or Use, or a tuple of those. Lists of
-    vectors are flat tuples of numbers.
+    The value of a field is a bool, float, str, Node or Use, or a tuple of these. A list of vectors
+    is one flat tuple of numbers.
 
     Attributes:
-        kind: a key of FIELDS.
+        kind: type name of the node, such as ``Transform``; a key of FIELDS.
         fields: name and value of each field that is set.
-        name: its DEF name.
+        name: its DEF name; None without one.
     """
 
     kind: str
@@ -171,7 +172,7 @@ class Node:
         return next((value for name, value in self.fields if name == field), None)
 
     def walk(self) -> Iterator[Node]:
-        """Yield this node and all nodes in it, in the order of a file."""
+        """Yield this node, then all nodes inside it, in the order in which a file has them."""
         yield self
         for _, value in self.fields:
             for part in value if isinstance(value, tuple) else (value,):
@@ -184,7 +185,14 @@ Value = bool | float | str | Node | Use | tuple["float | str | Node | Use", ...]
 
 
 class Route(NamedTuple):
-    """A route from an event of a node to an event of another."""
+    """A route that passes each event of one node on to another node.
+
+    Attributes:
+        source: DEF name of the node that sends the event.
+        out: name of the event that it sends.
+        target: DEF name of the node that receives the event.
+        into: name of the event that it receives.
+    """
 
     source: str
     out: str
@@ -194,7 +202,7 @@ class Route(NamedTuple):
 
 @dataclass(frozen=True)
 class World:
-    """The content of a file."""
+    """The content of a VRML file: its top-level nodes, and its routes."""
 
     nodes: tuple[Node, ...]
     routes: tuple[Route, ...] = ()

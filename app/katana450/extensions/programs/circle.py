@@ -1,24 +1,25 @@
-"""The script of the circle demo, for any circle."""
+"""The script of the circle demo, with the circle as a parameter."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-PAPER = "The paper's first experiment; it reports a position error below 3e-12 mm."
-"""Description of the default script; the error is the value that the paper reports."""
+PAPER_CIRCLE = "First experiment of the paper, which reports a position error below 3e-12 mm."
+"""Description of the script with default values, which is the circle of the paper."""
 
 
 @dataclass(frozen=True)
 class CircleDemo:
-    """The circle demo with its parameters.
+    """The parameters of the circle demo.
 
     Attributes:
-        centre: [mm] in the shoulder frame.
-        normal: direction as in a script, such as ``x``.
-        radius: [mm].
-        turns: number of turns.
-        pitch: [deg] as text, ``keep`` or ``roomiest``; None for the default of the tool.
-        tool: tool frame; ``flange`` means an arm without its gripper.
+        centre: centre of the circle [mm] in the shoulder frame.
+        normal: direction of the circle's normal, written as in a script, such as ``x``.
+        radius: radius of the circle [mm].
+        turns: number of turns along the circle.
+        pitch: pitch of the tool in a script: degrees, ``keep``, or ``roomiest`` for the greatest
+            distance to the joint limits; None for the default of ``tool``.
+        tool: tool frame that follows the circle; ``flange`` means an arm without its gripper.
     """
 
     centre: tuple[float, float, float] = (150.0, 0.0, -110.0)
@@ -34,7 +35,7 @@ class CircleDemo:
         x, y, z = self.centre
         bare = self.tool == "flange"
         pitch = self.pitch or ("99" if bare else "roomiest")
-        about = f"about: {PAPER}\n" if self == CircleDemo() else ""
+        about = f"about: {PAPER_CIRCLE}\n" if self == CircleDemo() else ""
         return f"""\
 name: Circle
 {about}gripper: {"none" if bare else "fitted"}

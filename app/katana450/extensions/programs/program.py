@@ -19,10 +19,10 @@ class Program:
 
     Attributes:
         name: name of the script.
-        speed: fraction of full speed.
-        start: (5,) posture [rad] in which the arm must stand.
-        tasks: the actions in their order.
-        steps: number of steps.
+        speed: speed of all motions, as a fraction of full speed.
+        start: (5,) posture [rad] from which the program must start.
+        tasks: the actions in the order of their execution.
+        steps: number of steps of the script.
     """
 
     name: str
@@ -46,11 +46,19 @@ def compiled(
     speed: float = 1.0,
     report: Report = lambda _: None,
 ) -> Program:
-    """Return the program of ``script`` from the situation of ``state``.
+    """Return ``script`` compiled to a program that starts from ``state``.
 
-    ``speed`` is the fraction of the script's own speed. ``report`` is called with every stage of
-    the planning as it begins. Raises ScriptError with the line of a step that is not possible,
-    InputError for an arm with the wrong gripper, and CancelledError from a checkpoint.
+    Args:
+        script: the script.
+        plan_context: the arm and its environment.
+        state: the state before the program: posture, fingers, tool frame, scene and water.
+        speed: fraction of the speed that the script sets.
+        report: function that is called with each stage of the planning as it begins.
+
+    Raises:
+        ScriptError: a step is not possible; the error has its line.
+        InputError: the script needs an arm without gripper, and this arm has one.
+        CancelledError: the planning was cancelled.
     """
     if script.bare and plan_context.arm.gripper.moves:
         raise InputError(
@@ -61,7 +69,7 @@ def compiled(
     builder.state = builder.standing(state.setpoint)
     compiled_steps = Compiler(script, builder, report).all()
     tasks = [Task(0, 1, "speed", SetSpeed(1.0))]
-    for number, (placed, actions) in enumerate(zip(script.steps, compiled_steps, strict=True)):
-        tasks += [Task(number, placed.line, name, action) for name, action in actions]
+    for number, (located, actions) in enumerate(zip(script.steps, compiled_steps, strict=True)):
+        tasks += [Task(number, located.line, name, action) for name, action in actions]
     total_speed = script.speed * speed
     return Program(script.name, total_speed, state.setpoint, tuple(tasks), len(script.steps))

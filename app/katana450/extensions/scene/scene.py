@@ -17,9 +17,9 @@ class Scene:
     """The scene objects, the water, and the posture of the arm.
 
     Attributes:
-        objects: the objects, none of them held.
-        water: in the cup [m^3]; None for no water.
-        joints: (n,) [rad]; None if not given.
+        objects: the objects; the fingers hold none of them.
+        water: volume of the water in the cup [m^3]; None for no water.
+        joints: (n,) posture of the arm [rad]; None if not given.
     """
 
     objects: tuple[SceneObject, ...]
@@ -32,10 +32,10 @@ class MeshFile:
     """A mesh file of a scene.
 
     Attributes:
-        path: path relative to the scene.
-        unit: as in `read_mesh`, None to guess.
-        up: as in `read_mesh`, None for the default of the format.
-        sha256: hash of its bytes; None to accept any content.
+        path: path relative to the folder of the scene.
+        unit: unit of its coordinates, such as ``mm``; None to guess it.
+        up: axis that points up, ``y`` or ``z``; None for the default of the file format.
+        sha256: SHA-256 of the file in hexadecimal; None to accept any content.
     """
 
     path: str
@@ -46,7 +46,15 @@ class MeshFile:
 
 @dataclass(frozen=True, eq=False)
 class SceneEntry:
-    """An object of a text, whose mesh is not read yet. ``at`` is its place in the text."""
+    """An object in the text of a scene, before its mesh file is read.
+
+    Attributes:
+        at: its place in the text, for error messages.
+        mesh: its mesh file; None for other shapes.
+        T: (4, 4) its pose [m] in the base frame, or in the tool frame if it is ``fixed``.
+
+    All others are as in ``SceneObject``.
+    """
 
     at: YamlValue
     name: str
@@ -62,16 +70,17 @@ class SceneEntry:
 
 @dataclass(frozen=True, eq=False)
 class SceneDraft:
-    """A parsed text. Poses of fixed objects are in the frame of the tool."""
+    """A parsed scene, before its mesh files are read. The values are as in ``Scene``."""
 
     entries: tuple[SceneEntry, ...]
     water: float | None
     joints: FloatArray | None
 
     def scene(self, solids: Mapping[MeshFile, Solid], T_palm_tool: FloatArray | None) -> Scene:
-        """Return the scene with its meshes. ``T_palm_tool``: see ``Hand``; None without a hand.
+        """Return the scene, with the solid of each mesh file from ``solids``.
 
-        Raises ScriptError with the places of all errors.
+        ``T_palm_tool``: (4, 4) pose of the default tool in the frame of the palm; None without a
+        hand. Raises ScriptError with all errors and their places in the text.
         """
         objects: list[SceneObject] = []
         problems: list[Problem] = []
@@ -79,7 +88,8 @@ class SceneDraft:
             try:
                 if entry.fixed and T_palm_tool is None:
                     raise InputError(
-                        "Nothing can be attached to the hand: this arm has no model of a hand."
+                        "Nothing can be attached to the hand: this arm has no model of a hand. "
+                        "Remove `attach: hand`."
                     )
                 objects.append(
                     SceneObject(

@@ -1,4 +1,4 @@
-"""The API over HTTP: readable values, STOP, and single requests of a program."""
+"""The API over HTTP: queries, STOP, and single requests of a program."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_js
 
 log = logging.getLogger(__name__)
 
-QUESTIONS = ("state", "arm", "event_log", "branches", "loop", "objects", "world", "links")
-"""Subjects of ``query``; each has its own path."""
+QUERY_SUBJECTS = ("state", "arm", "event_log", "branches", "loop", "objects", "world", "links")
+"""Subjects of the request ``query``. Each has a URL path of its own for GET."""
 
-PROGRAM = re.compile(r"[A-Za-z0-9_-]{16,64}")
-"""Form of the key of a program that sends requests by POST. The key identifies the program and is
-secret; others see the name in ``NAME``."""
+PROGRAM_KEY = re.compile(r"[A-Za-z0-9_-]{16,64}")
+"""Pattern of the secret key that identifies a program which sends requests by POST."""
 
 KEY, NAME = "x-program", "x-name"
-"""Headers of the key and the name of a program."""
+"""HTTP headers with the secret key of a program, and with the name that others see."""
 
 RETRY_STATUS = 503
+"""HTTP status of the answer to a query while there is no arm."""
 
 MAX_PAUSE = 0.5
-"""Maximum delay [s] of the refusal of a too frequent request."""
+"""Maximum time [s] by which the refusal of a too frequent request is delayed."""
 
 
 class RouteContext(NamedTuple):
-    """Context of the routes of an extension.
+    """The objects of the server that the routes of an extension can use.
 
     Attributes:
         hub: The hub with the arm and the lease.
@@ -70,8 +70,8 @@ RouteProvider = Callable[[RouteContext], list[BaseRoute]]
 """Function that returns the routes of an extension."""
 
 
-class _Posting(NamedTuple):
-    """A program that sends requests by POST; ``timer`` closes its window."""
+class _HttpProgram(NamedTuple):
+    """A program that sends requests by POST; ``timer`` closes its window after its last request."""
 
     participant: Participant
     connection: Connection
@@ -95,7 +95,7 @@ class Api:
         self._dispatcher = Dispatcher(hub)
         context = RouteContext(hub, authenticator, self._identity)
         self._provided = [route for provider in provided for route in provider(context)]
-        self._posting: dict[str, _Posting] = {}
+        self._programs: dict[str, _HttpProgram] = {}
 
     def routes(self) -> list[BaseRoute]:
         """Return all routes of the API and of the extensions."""
@@ -108,7 +108,7 @@ class Api:
             await program_socket.serve_socket(self._hub, self._authenticator, self._budgets, socket)
 
         return [
-            *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
+            *(Route(f"{ROOT}/{subject}", self._query(subject)) for subject in QUERY_SUBJECTS),
             Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
             Route(f"{ROOT}/do", self._do, methods=["POST"]),
             *self._provided,
@@ -116,11 +116,13 @@ class Api:
             WebSocketRoute(f"{ROOT}/socket", socket),
         ]
 
-    def _read(self, at: str) -> Callable[[Request], Awaitable[Response]]:
-        async def read(request: Request) -> Response:
+    def _query(self, subject: str) -> Callable[[Request], Awaitable[Response]]:
+        """Return the handler of GET requests for ``subject``."""
+
+        async def query(request: Request) -> Response:
             identity, driver = self._identity(request), ""
-            if self._key(request, identity) in self._posting:
-                # A read counts as a heartbeat only of a program that has sent requests.
+            if self._key(request, identity) in self._programs:
+                # A query counts as a heartbeat only if the program has sent a request by POST.
                 participant = self._participant(request, identity)
                 driver = driver_key(self._hub, participant)
                 self._hub.heartbeat(participant)
@@ -128,7 +130,7 @@ class Api:
                 with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
                     if identity.session not in self._hub.drivers:
                         self._hub.people.mutes.count_request(identity.session)
-                    return as_json(self._dispatcher.query(at))
+                    return as_json(self._dispatcher.query(subject))
             except (BusyError, MutedError) as error:
                 self._refused(request)
                 self._note_flood(identity, error)
@@ -138,7 +140,7 @@ class Api:
             except InputError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
-        return read
+        return query
 
     async def _stop(self, request: Request) -> Response:
         found = self._identity(request, stopping=True)
@@ -148,19 +150,22 @@ class Api:
 
     async def _do(self, request: Request) -> Response:
         identity = self._identity(request)
-        if not PROGRAM.fullmatch(request.headers.get(KEY, "")):
+        if not PROGRAM_KEY.fullmatch(request.headers.get(KEY, "")):
             why = (
                 "The header X-Program is missing or invalid. Choose a key of 16 to 64 letters and "
                 "digits, and keep it secret. X-Name is the name that others see."
             )
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.MAX_REQUEST_BYTES)
-        # An admin may have kept the sender out while the body arrived.
+        # An admin may have disconnected the sender while the body was received.
         identity = self._identity(request)
         try:
             decoded = self._hub.requests.decoded(body)
             if isinstance(decoded, requests.Hello | requests.Watch):
-                raise InputError("Send this request on the websocket or the TCP port.")
+                raise InputError(
+                    "This request needs an open connection. Send it on the WebSocket or the TCP "
+                    "port."
+                )
             participant = self._participant(request, identity)
             answer = self._dispatcher.handle(participant, decoded, self._budget(request))
             if self._dispatcher.is_pending(answer):
@@ -181,7 +186,7 @@ class Api:
             return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
 
     def _refused(self, request: Request) -> None:
-        """Count a refused request of the sender."""
+        """Add one to the refused requests of the sender of ``request``."""
         self._hub.people.refused(identity(self._authenticator, request) or address_of(request))
 
     def _note_flood(self, identity: Identity, error: BusyError | MutedError) -> None:
@@ -208,16 +213,19 @@ class Api:
             )
             raise HTTPException(401, TOKEN_REQUIRED) if why is None else HTTPException(403, why)
         if not self._authenticator.requires_link and not stopping:
-            # All these programs have one identity, without which nobody could keep one out.
+            # Without links these programs share one session, so that an admin can keep them out.
             why = self._authenticator.kept_out(SHARED_SESSION)
             if why is not None and KEY in headers:
                 raise HTTPException(403, why)
         return replace(found, address=address_of(request))
 
     def _participant(self, request: Request, identity: Identity) -> Participant:
-        """Return the window of the program; it closes after ``LEASE_TIMEOUT`` without a request."""
+        """Return the window of the program that sends ``request``, and open it if necessary.
+
+        The window closes after ``LEASE_TIMEOUT`` without a request.
+        """
         key = self._key(request, identity)
-        known = self._posting.pop(key, None)
+        known = self._programs.pop(key, None)
         if known is None:
             session, _, page = key.partition("/")
             identity = replace(identity, session=session)
@@ -232,22 +240,22 @@ class Api:
             participant, connection, timer = known
             timer.cancel()
         timer = asyncio.get_running_loop().call_later(LEASE_TIMEOUT, self._forget, key)
-        self._posting[key] = _Posting(participant, connection, timer)
+        self._programs[key] = _HttpProgram(participant, connection, timer)
         return participant
 
     def _key(self, request: Request, identity: Identity) -> str:
-        """Return the key that the requests of one program have in common."""
+        """Return the key that all requests of one program have in common."""
         session = identity.session if self._authenticator.requires_link else SHARED_SESSION
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:
-        participant, connection, _ = self._posting.pop(key)
+        participant, connection, _ = self._programs.pop(key)
         self._hub.people.remove(connection)
         self._hub.leave(participant, for_good=True)
 
 
 async def _too_much(error: BusyError | MutedError, id: Id = None) -> Response:
-    # The delay slows down immediate repetitions. STOP has a route of its own.
+    # The delay slows down a client that repeats the request at once. STOP is not delayed.
     await asyncio.sleep(min(error.retry, MAX_PAUSE))
     answer = as_json(answers.Refused(why=str(error), id=id, retry=error.retry), TOO_MANY)
     answer.headers["Retry-After"] = str(math.ceil(error.retry))

@@ -28,44 +28,47 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api.answers import Progress
 from katana450.server.view.controls import GestureGate, refuse
 
-FOLLOW_INTERVAL = 0.1
-"""[s] Step of the slider with which a preview is looked at."""
+TIME_STEP = 0.1
+"""[s] Step of the slider that chooses a time of the preview, and resolution of shown durations."""
 
 MAX_TAUGHT_POSTURES = 200
-"""Maximum number of poses of a taught script."""
+"""Maximum number of postures in a taught script."""
 
 ORDERS = {
     "Run": ProgramOrder.RUN,
     "Step": ProgramOrder.STEP,
     "End": ProgramOrder.END,
 }
-"""The order that each button gives."""
+"""The order that each button gives to the program."""
 
 
 class Steering(Protocol):
-    """The panel's interface to the runner. All methods raise KatanaError with the reason."""
+    """The program runner as the panel uses it.
+
+    Its methods raise KatanaError with the reason if they refuse.
+    """
 
     def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
-        """Plan a script for ``actor``; then carry out ``then``."""
+        """Plan the script ``text`` for ``actor``, then execute the order ``then``, if any."""
         ...
 
     def steer(self, order: ProgramOrder, actor: Actor) -> None:
-        """Give an order to the present program."""
+        """Execute ``order`` of ``actor`` for the present program."""
         ...
 
     @property
     def progress(self) -> Progress | None:
-        """The progress of the present or last program."""
+        """The progress of the present or last program; None before the first one."""
         ...
 
     @property
     def program(self) -> Program | None:
-        """The program that is planned."""
+        """The program whose planning has succeeded; None without one."""
         ...
 
 
 class ProgramsPanel:
-    """The controls, and the preview in the scene."""
+    """The controls for programs, and the preview of a program in the scene."""
 
     def __init__(
         self,
@@ -76,7 +79,7 @@ class ProgramsPanel:
         gestures: GestureGate,
         state: Callable[[], State],
     ) -> None:
-        """Add the controls to the open tab of ``server``. ``state`` returns the newest state."""
+        """Add the controls to the tab that is being built. ``state`` returns the newest state."""
         self._steering = steering
         self._scripts = scripts
         self._gestures = gestures
@@ -84,39 +87,39 @@ class ProgramsPanel:
         self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
         self._steps: tuple[ListedStep, ...] = ()
-        # The script that was last requested.
+        # The text of the script that was last requested.
         self._text = ""
-        # Held while an order is carried out: viser calls back in a thread of its own.
+        # Held while a program is requested: viser runs callbacks in other threads.
         self._order_lock = threading.Lock()
-        # Whether the program was requested as a preview, which shows ghosts.
+        # Whether the program was requested by Preview, which also shows ghosts.
         self._with_ghosts = False
         self._preview = Preview(server, robot)
         gui = server.gui
         names = tuple(scripts.paths)
-        # The first script that this arm can run: the library has one for the bare flange too.
-        fitting = (name for name in names if _suits(scripts, name, robot))
+        # Some scripts of the library need an arm without its gripper.
+        suitable = (name for name in names if _suits(scripts, name, robot))
         self._choice = gui.add_dropdown(
             "Script",
             names,
-            initial_value=next(fitting, None),
-            hint="Scripts of the library and of --programs DIR",
+            initial_value=next(suitable, None),
+            hint="Scripts of the library, and of the folder of --programs",
         )
         self._choice.on_update(lambda _: self._draw(None))
         self._orders = gui.add_button_group(
             "Program",
             ("Preview", *ORDERS),
-            hint="Preview: plan it and show the tool's path. Step: run to the end of a step. "
-            "End: end the run, or the planning",
+            hint="Preview: plan the script and show the tool's path. Step: run one step, then "
+            "wait. End: end the run or the planning",
         )
         self._orders.on_click(self._guarded(self._order))
         self._look = gui.add_slider(
             "Look at",
             min=0.0,
             max=1.0,
-            step=FOLLOW_INTERVAL,
+            step=TIME_STEP,
             initial_value=0.0,
             disabled=True,
-            hint="Time in the preview [s], at full speed: shows the arm at that time",
+            hint="Show the arm at this time [s] of the preview, at full speed",
         )
         self._look.on_update(lambda _: self._preview.look(self._look.value))
         self._status = gui.add_html("")
@@ -124,8 +127,8 @@ class ProgramsPanel:
         self._teach = gui.add_button_group(
             "Teach",
             ("Add pose", "Forget", "Save"),
-            hint="Add pose: add the present pose. Save: save a script through all poses in the "
-            "folder of --programs, or else as a download",
+            hint="Add pose: add the present pose. Forget: drop all poses. Save: save a script that "
+            "moves through all poses, in the folder of --programs or else as a download",
         )
         self._teach.on_click(self._guarded(self._on_teach))
         self._name = gui.add_text("Name", "My script", hint="Name of the script that Save writes")
@@ -133,9 +136,9 @@ class ProgramsPanel:
     def follow(self) -> None:
         """Update the display of the program's progress."""
         progress = self._steering.progress
-        page = _page(progress, len(self._taught))
-        if page != self._status.content:
-            self._status.content = page
+        status = _page(progress, len(self._taught))
+        if status != self._status.content:
+            self._status.content = status
         if self._order_lock.acquire(blocking=False):
             try:
                 self._follow_program()
@@ -185,7 +188,7 @@ class ProgramsPanel:
             self._with_ghosts = button == "Preview"
             self._steering.plan(text, ORDERS.get(button), actor)
             self._text = text
-            # Forces a kept plan to be drawn again.
+            # If the plan of this script was kept, `follow` draws it again.
             self._drawn = None
             self._draw(None)
 
@@ -194,7 +197,7 @@ class ProgramsPanel:
             case "Add pose":
                 if len(self._taught) >= MAX_TAUGHT_POSTURES:
                     raise InputError(
-                        f"The maximum is {MAX_TAUGHT_POSTURES} poses. Save these first."
+                        f"A script has at most {MAX_TAUGHT_POSTURES} poses. Save these first."
                     )
                 self._taught.append(self._state().goal)
             case "Forget":
@@ -205,7 +208,7 @@ class ProgramsPanel:
                 self._save(client)
 
     def _save(self, client: viser.ClientHandle | None) -> None:
-        """Save the poses in the folder or, without one, as a download of ``client``."""
+        """Save the poses as a script in the folder or, without one, as a download of ``client``."""
         name = self._name.value.strip()
         text = script_from_postures(name, self._taught)
         if client is not None and not self._scripts.keeps:
@@ -222,7 +225,7 @@ class ProgramsPanel:
     ) -> Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]:
         """Return a handler that runs ``act`` in a thread and shows errors in the sender's page."""
 
-        async def acted(event: viser.GuiEvent[Any]) -> None:
+        async def handler(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:
                 return
             try:
@@ -231,16 +234,16 @@ class ProgramsPanel:
             except KatanaError as error:
                 refuse(event, error)
 
-        return acted
+        return handler
 
 
 def shown_seconds(duration: float) -> float:
-    """Return ``duration`` [s] rounded up to the resolution of the panel's text and slider."""
-    return math.ceil(round(duration / FOLLOW_INTERVAL, 6)) * FOLLOW_INTERVAL
+    """Return ``duration`` [s] rounded up to a multiple of TIME_STEP."""
+    return math.ceil(round(duration / TIME_STEP, 6)) * TIME_STEP
 
 
 def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
-    """Return whether the script can be read and suits the arm's gripper."""
+    """Return whether the script ``name`` can be read, and can run on ``robot`` with its gripper."""
     try:
         return not (parse(scripts.text(name)).bare and robot.require_arm().gripper.moves)
     except KatanaError:
@@ -248,6 +251,7 @@ def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
 
 
 def _page(progress: Progress | None, poses: int) -> str:
+    """Return the progress, and the number of taught poses, as HTML; empty without both."""
     lines = []
     if progress is not None:
         head = f"<b>{escape(progress.name)}</b> " if progress.name else ""
