@@ -31,8 +31,17 @@ def sized(window: ViserPage) -> Iterator[Page]:
     window.page.emulate_media(color_scheme="light")
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("size", "scheme"),
+    [
+        ("phone", "dark"),
+        ("tablet", "light"),
+        ("desk", "light"),
+        pytest.param("phone", "light", marks=pytest.mark.long),
+        pytest.param("tablet", "dark", marks=pytest.mark.long),
+        pytest.param("desk", "dark", marks=pytest.mark.long),
+    ],
+)
 def test_stop_is_always_visible_and_the_largest_button(
     page: ViserPage, sized: Page, truth: Truth, artefacts: Path, size: str, scheme: str
 ) -> None:

@@ -227,7 +227,7 @@ def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
         assert found["shown"] == 0
 
 
-@pytest.mark.parametrize("size", ["portrait", "landscape"])
+@pytest.mark.parametrize("size", ["portrait", pytest.param("landscape", marks=pytest.mark.long)])
 def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
     server: AppServer, open_page: OpenPage, size: str
 ) -> None:
@@ -246,8 +246,17 @@ def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
     assert hit == "welcome"
 
 
-@pytest.mark.parametrize("size", list(SIZES))
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("size", "scheme"),
+    [
+        ("wide", "light"),
+        ("portrait", "dark"),
+        pytest.param("landscape", "light", marks=pytest.mark.long),
+        pytest.param("wide", "dark", marks=pytest.mark.long),
+        pytest.param("portrait", "light", marks=pytest.mark.long),
+        pytest.param("landscape", "dark", marks=pytest.mark.long),
+    ],
+)
 def test_card_fits_every_size(
     server: AppServer, open_page: OpenPage, size: str, scheme: str, artefacts: Path
 ) -> None:

@@ -18,7 +18,7 @@ from tests.browser.test_jog import GAMEPAD
 EXACT = 2e-6
 """[m] Tolerance of one step."""
 
-PHONES = [(390, 844), (844, 390)]
+PHONES = [(390, 844), pytest.param((844, 390), marks=pytest.mark.long)]
 LEAST_FINGER = 44.0
 """Minimum width and height of a button of the sheet on a phone [px]."""
 

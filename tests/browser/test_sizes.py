@@ -21,6 +21,7 @@ from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import take
+from tests.conftest import LONG
 from tests.gateway.slow_link import SlowLink
 
 MOVE = "/target/move"
@@ -151,7 +152,7 @@ def eye(page: ViserPage) -> FloatArray:
 def test_arm_and_gizmo_are_in_the_picture_at_every_size(desk: ViserPage, artefacts: Path) -> None:
     wait_whole(desk, "at first")
     first = eye(desk)
-    for scheme in ("light", "dark"):
+    for scheme in ("light", "dark") if LONG else ("light",):
         desk.page.emulate_media(color_scheme=scheme)
         for size in SIZES:
             resize(desk, size)
@@ -299,7 +300,7 @@ def test_buttons_of_the_lease_fit_on_a_phone(server: AppServer, open_page: OpenP
         assert overhang(page) <= 0.0
 
 
-@pytest.mark.parametrize("size", [PORTRAIT, LANDSCAPE])
+@pytest.mark.parametrize("size", [PORTRAIT, pytest.param(LANDSCAPE, marks=pytest.mark.long)])
 def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
     server: AppServer, open_page: OpenPage, size: tuple[int, int], artefacts: Path
 ) -> None:

@@ -79,7 +79,7 @@ def stays(arm: Client, seconds: float = 1.0) -> None:
     assert not after.moving
 
 
-@pytest.mark.parametrize("by", ["pause", "steer"])
+@pytest.mark.parametrize("by", ["pause", pytest.param("steer", marks=pytest.mark.long)])
 def test_pause_during_planning_lasts_until_resume(arm: Client, by: str) -> None:
     planning(arm)
     request = requests.Pause() if by == "pause" else Steer(order=ProgramOrder.PAUSE)
@@ -117,7 +117,14 @@ def test_pause_during_planning_over_http(server: AppServer, arm: Client) -> None
     wait(arm, lambda state: state.stopped is not None and status(state) == "stopped", 5.0)
 
 
-@pytest.mark.parametrize("request_", [requests.Hold(), requests.Stop(), requests.Home()])
+@pytest.mark.parametrize(
+    "request_",
+    [
+        requests.Stop(),
+        pytest.param(requests.Hold(), marks=pytest.mark.long),
+        pytest.param(requests.Home(), marks=pytest.mark.long),
+    ],
+)
 def test_hold_stop_and_motions_during_planning_keep_it_from_running(
     arm: Client, request_: requests.AnyRequest
 ) -> None:

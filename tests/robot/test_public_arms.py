@@ -266,7 +266,13 @@ def test_the_commands_take_an_so101(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "joints", [PX150, KATANAS["katana_300"], SO101], ids=["px150", "300", "so101"]
+    "joints",
+    [
+        pytest.param(PX150, marks=pytest.mark.long),
+        pytest.param(KATANAS["katana_300"], marks=pytest.mark.long),
+        SO101,
+    ],
+    ids=["px150", "300", "so101"],
 )
 def test_they_are_served_with_their_grippers(tmp_path: Path, joints: list[J]) -> None:
     path = written(tmp_path, "arm", joints)
