@@ -58,7 +58,7 @@ class Segment:
         q, q1, q2 = (
             np.array(each) for each in zip(*(j.derivatives()[:3] for j in joints), strict=True)
         )
-        # A path that touches a limit exceeds it by rounding, and such a setpoint is refused.
+        # A path that touches a limit exceeds it by rounding. No setpoint may.
         q = self.path.chain.clamp(q)
         return PathMotion(frozen(q), q1 * pace.first, q2 * pace.first**2 + q1 * pace.second)
 
@@ -123,12 +123,14 @@ class Plan:
     @cached_property
     def start(self) -> FloatArray:
         """The joint angles (5,) [rad] at the start."""
-        return self.segments[0].path.start
+        path = self.segments[0].path
+        return frozen(path.chain.clamp(path.start))
 
     @cached_property
     def end(self) -> FloatArray:
         """The joint angles (5,) [rad] at the end."""
-        return self.segments[-1].path.end
+        path = self.segments[-1].path
+        return frozen(path.chain.clamp(path.end))
 
     def q(self, tau: float) -> FloatArray:
         """Return the joint angles (5,) [rad] at `tau` [s], from 0 to `span`."""
