@@ -168,11 +168,17 @@ def test_wake_ends_a_wait_for_change(parts: LoopParts) -> None:
     parts.tick()
     publisher = parts.loop.state_publisher
     seen, found = publisher.snapshot, []
-    thread = threading.Thread(target=lambda: found.append(publisher.wait_for_change(seen, 60.0)))
+    ended = threading.Event()
+    thread = threading.Thread(
+        target=lambda: found.append(publisher.wait_for_change(seen, 60.0, ended.is_set))
+    )
     thread.start()
-    while thread.is_alive():
-        publisher.wake()
-        thread.join(0.01)
+    publisher.wake()
+    thread.join(0.05)
+    assert thread.is_alive()
+    ended.set()
+    publisher.wake()
+    thread.join(30.0)
     assert found == [seen]
 
 

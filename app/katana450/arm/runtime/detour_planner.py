@@ -78,7 +78,7 @@ class DetourPlanner:
                 continue
             wanted = _wants_detour(seen.state)
             new = self._state_publisher.wait_for_change(
-                seen, SETTLE_TIME if wanted else WAKE_INTERVAL
+                seen, SETTLE_TIME if wanted else WAKE_INTERVAL, self._stopping.is_set
             )
             if new is seen and wanted:
                 self._offer(seen)
@@ -90,7 +90,7 @@ class DetourPlanner:
         """Return the next snapshot after ``seen``, or ``seen`` when the thread ends."""
         new = seen
         while new is seen and not self._stopping.is_set():
-            new = self._state_publisher.wait_for_change(seen, WAKE_INTERVAL)
+            new = self._state_publisher.wait_for_change(seen, WAKE_INTERVAL, self._stopping.is_set)
         return new
 
     def _offer(self, seen: Snapshot) -> None:

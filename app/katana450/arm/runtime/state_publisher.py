@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from katana450.arm.control.event_log import LogEntry
@@ -31,7 +31,6 @@ class StatePublisher:
         self._snapshot = first
         self._event_log: deque[LogEntry] = deque(maxlen=MAX_KEPT_ENTRIES)
         self._published = threading.Condition()
-        self._wakes = 0
         self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_OUTCOMES)
         self.outcomes = Outcomes()
         """Outcomes of commands, by their tickets."""
@@ -69,22 +68,20 @@ class StatePublisher:
             self._unsent.clear()
             return outcomes
 
-    def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
+    def wait_for_change(
+        self, seen: Snapshot, timeout: float, ended: Callable[[], bool] = lambda: False
+    ) -> Snapshot:
         """Return the newest snapshot once it is another than ``seen``, or after ``timeout`` [s].
 
-        ``wake`` ends the wait too.
+        ``ended``: whether the thread that waits is to end. Call ``wake`` when that changes.
         """
         with self._published:
-            wakes = self._wakes
-            self._published.wait_for(
-                lambda: self._snapshot is not seen or self._wakes != wakes, timeout
-            )
+            self._published.wait_for(lambda: self._snapshot is not seen or ended(), timeout)
             return self._snapshot
 
     def wake(self) -> None:
-        """End each wait for a change, so that a thread that is to end does so at once."""
+        """Let each thread that waits for a change check whether it is to end."""
         with self._published:
-            self._wakes += 1
             self._published.notify_all()
 
     def wait_for_command(self, seen: Snapshot, timeout: float) -> None:

@@ -63,7 +63,7 @@ class ViewUpdater(ABC):
         while not self._stopping.is_set():
             # The read-out has a longer interval and needs one more update after the last change.
             snapshot = self._state_publisher.wait_for_change(
-                seen, 0.5 if settled else READOUT_INTERVAL
+                seen, 0.5 if settled else READOUT_INTERVAL, self._stopping.is_set
             )
             settled = snapshot is seen
             seen = snapshot
