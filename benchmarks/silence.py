@@ -2,10 +2,11 @@
 
     python -m benchmarks.silence
 
-The server has the profile of a real arm. The driver streams setpoints, then sends nothing more on
-its open connection. The time ends with the first state that is stopped, by its own time stamp:
-server and benchmark read the same clock of the machine. The attacks are those of
-``benchmarks.stop``, without the flood of STOP, under which an arm never moves.
+The server has the profile of a real arm. The driver starts a long motion and streams heartbeats.
+Then it sends nothing more on its open connection, on which it still receives states. The time ends
+with the first state in which the stop is confirmed, by its own time stamp: server and benchmark
+read the same clock of the machine. The attacks are those of ``benchmarks.stop``, without the flood
+of STOP, under which an arm never moves.
 """
 
 from __future__ import annotations
@@ -16,17 +17,13 @@ import json
 import math
 import tempfile
 import time
-from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from websockets.asyncio.client import ClientConnection
 
-from benchmarks.load import PERIOD, SWING
 from benchmarks.stop import ATTACKS, DESCRIPTIONS, LOST, Links, attacked
-from katana450.client import aconnect
-from katana450.server.api import answers
 from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, AppServer
@@ -34,11 +31,14 @@ from tests.gateway.client import websocket
 
 NAMES = tuple(name for name in ATTACKS if name != "STOP flooders")
 
+SIDES = (-1.2, 1.2)
+"""[rad] Angles of axis 1 between which the arm moves in turn, which takes longer than a trial."""
+
 STREAMED = 0.6
-"""[s] Duration of the stream before the driver falls silent."""
+"""[s] Duration of the heartbeats before the driver falls silent."""
 
 INTERVAL = 0.02
-"""[s] Interval of the stream."""
+"""[s] Interval of the heartbeats."""
 
 CLEARING = 0.2
 """[s] Interval of the requests to clear the stop."""
@@ -47,37 +47,42 @@ TOLERANCE = 0.05
 """[s] Difference from the timeout that counts as in time."""
 
 
-async def say(socket: ClientConnection, do: str, **fields: Any) -> None:
-    """Send the request ``do``."""
-    await socket.send(json.dumps({"do": do, **fields}))
+class Driver:
+    """The connection of a driver that can fall silent."""
 
+    def __init__(self, socket: ClientConnection) -> None:
+        self._socket = socket
 
-async def clear(socket: ClientConnection, states: AsyncGenerator[answers.State, None]) -> None:
-    """Clear the stop, if there is one, as the driver."""
-    due = 0.0
-    async for state in states:
-        if state.stopped is None:
-            return
-        if time.perf_counter() >= due:
-            due = time.perf_counter() + CLEARING
-            await say(socket, "take")
-            await say(socket, "clear_stop")
+    async def say(self, do: str, **fields: Any) -> float:
+        """Send the request ``do``; return the time [s]."""
+        await self._socket.send(json.dumps({"do": do, **fields}))
+        return time.perf_counter()
 
+    async def state(self) -> dict[str, Any]:
+        """Return the next state."""
+        while True:
+            message: dict[str, Any] = json.loads(await self._socket.recv())
+            if message["is"] == "state":
+                return message
 
-async def fall_silent(
-    socket: ClientConnection, states: AsyncGenerator[answers.State, None]
-) -> float:
-    """Stream, fall silent; return the time from the last message to the first stopped state [s]."""
-    last, end = 0.0, time.perf_counter() + STREAMED
-    while time.perf_counter() < end:
-        q = np.array(Settings.ready) + SWING * math.sin(math.tau * time.perf_counter() / PERIOD)
-        await say(socket, "servo", q=q.tolist())
-        last = time.perf_counter()
-        await asyncio.sleep(INTERVAL)
-    async for state in states:
-        if state.stopped is not None:
-            return state.t - last
-    return math.inf
+    async def clear(self) -> None:
+        """Clear the stop, if there is one."""
+        due = 0.0
+        while (await self.state())["stop"] is not None:
+            if time.perf_counter() >= due:
+                due = await self.say("clear_stop") + CLEARING
+
+    async def fall_silent(self, side: float) -> float:
+        """Move to ``side`` [rad], fall silent; return the time until the stop is confirmed [s]."""
+        await self.say("joints", q=[side, *Settings.ready[1:]])
+        last, end = 0.0, time.perf_counter() + STREAMED
+        while time.perf_counter() < end:
+            last = await self.say("heartbeat")
+            await asyncio.sleep(INTERVAL)
+        while True:
+            state = await self.state()
+            if state["stop"] == "confirmed":
+                return float(state["t"]) - last
 
 
 async def measure(url: str, links: Links, trials: int) -> list[float]:
@@ -85,20 +90,17 @@ async def measure(url: str, links: Links, trials: int) -> list[float]:
     found: list[float] = []
     headers = {"Authorization": f"Bearer {links.driver}"}
     path = "/api/v1/socket?name=Driver"
-    async with (
-        aconnect(url, "Observer", links.presser) as observer,
-        websocket(url, path, headers=headers, max_queue=None) as socket,
-    ):
-        states = observer.states(100.0)
-        await say(socket, "take")
-        for _ in range(trials):
+    async with websocket(url, path, headers=headers, max_queue=None) as socket:
+        driver = Driver(socket)
+        await driver.say("take")
+        await driver.say("watch", hz=100.0)
+        for number in range(trials):
             try:
                 async with asyncio.timeout(LOST + STREAMED):
-                    await clear(socket, states)
-                    found.append(await fall_silent(socket, states))
+                    await driver.clear()
+                    found.append(await driver.fall_silent(SIDES[number % 2]))
             except TimeoutError:
                 found.append(math.inf)
-                states = observer.states(100.0)
     return found
 
 
