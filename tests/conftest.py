@@ -18,15 +18,16 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.settings import Settings
-from tests.schedule import LowestPriority, Schedule
+from tests.schedule import Completeness, LowestPriority, Schedule
 
 LONG = "KATANA450_LONG" in os.environ
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """A shell has what it runs in the background ignore Ctrl-C, and so would all it starts."""
-    if hasattr(config, "workerinput"):
-        config.pluginmanager.register(LowestPriority())
+    """Prepare each process that runs or distributes tests."""
+    in_worker = hasattr(config, "workerinput")
+    config.pluginmanager.register(LowestPriority() if in_worker else Completeness())
+    # A shell has what it runs in the background ignore Ctrl-C, and so would all it starts.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     # Servers that the tests start keep their event logs out of the user's folders.
     state = tempfile.mkdtemp(prefix="katana450-")

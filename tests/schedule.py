@@ -49,8 +49,28 @@ class Schedule(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
         return kind_of(nodeid)
 
 
+class Completeness:
+    """Plugin of the process that distributes the tests: it reports tests that were never run."""
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Fail with another status than that of failed tests, which are tried again.
+
+        xdist ends early with the status of failed tests if its processes crash repeatedly.
+        """
+        distribution = session.config.pluginmanager.getplugin("dsession")
+        schedule = None if distribution is None else distribution.sched
+        if schedule is not None and schedule.has_pending:
+            print("\nSome tests were not run.")
+            session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
+
+
 class LowestPriority:
-    """Plugin of a process that runs tests for others: it gives way before it computes."""
+    """Plugin of a process that runs tests for others: it gives way before it computes.
+
+    A process can't raise its priority again. Browsers and servers keep theirs, as these kinds have
+    the most tests and so are given out first.
+    """
 
     def __init__(self) -> None:
         self._lowered = False
