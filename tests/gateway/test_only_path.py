@@ -1,4 +1,4 @@
-"""Test that only the command gate puts commands into the link to the arm."""
+"""Test that only the command gate puts commands into the pipe to the arm."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_only_the_gate_delivers_commands() -> None:
     assert uses("deliver") == DELIVERIES
 
 
-def test_only_the_link_makes_command_messages() -> None:
+def test_only_the_front_end_makes_command_messages() -> None:
     made = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py")

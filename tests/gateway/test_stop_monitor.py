@@ -23,11 +23,11 @@ import sys
 from katana450.cli.main import main
 from katana450.arm.runtime.stop_pipe import StopPipe
 call = StopPipe._call
-def fatal(link, act, *values):
+def fatal(pipe, act, *values):
     pathlib.Path(sys.argv[2]).unlink()
     raise SystemExit
-def checked(link, act, *values):
-    return (fatal if pathlib.Path(sys.argv[2]).exists() else call)(link, act, *values)
+def checked(pipe, act, *values):
+    return (fatal if pathlib.Path(sys.argv[2]).exists() else call)(pipe, act, *values)
 StopPipe._call = checked
 if __name__ == "__main__":
     sys.exit(main(["serve", "--port", sys.argv[1]]))

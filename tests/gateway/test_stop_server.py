@@ -28,8 +28,8 @@ RUNS = StopStatus(None, ())
 STOPPED = StopStatus(pressed("Anna", "a", "one", 1.0), ("one",))
 
 
-class FakeLink:
-    """A link to an arm that executes no press."""
+class FakePipe:
+    """A pipe to an arm that executes no press."""
 
     def __init__(self) -> None:
         self.status: StopStatus | None = RUNS
@@ -55,8 +55,8 @@ class Port:
         self.file = file
         address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
         authenticator = Authenticator(file, 8080, address)
-        self.link = FakeLink()
-        self.server = StopServer(self.link, authenticator, address, 8080, Acceptor(listening))
+        self.pipe = FakePipe()
+        self.server = StopServer(self.pipe, authenticator, address, 8080, Acceptor(listening))
 
     async def stop(self, token: str, press: str = "two") -> tuple[int, str]:
         """Return status and stage of a STOP, which is answered at once."""
@@ -77,7 +77,7 @@ class Port:
     @property
     def sent(self) -> list[str]:
         """The presses that the arm got."""
-        return [each.cause.press for each in self.link.presses]
+        return [each.cause.press for each in self.pipe.presses]
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ async def exhaust(port: Port, token: str) -> None:
 
 def test_flood_of_one_link_delays_no_press_of_another(port: Port) -> None:
     async def act() -> None:
-        port.link.status = STOPPED
+        port.pipe.status = STOPPED
         await exhaust(port, port.vera)
         assert await port.stop(port.otto) == (200, "confirmed")
 
@@ -110,11 +110,11 @@ def test_flood_of_one_link_delays_no_press_of_another(port: Port) -> None:
 
 def test_press_that_finds_the_arm_running_is_never_delayed(port: Port) -> None:
     async def act() -> None:
-        port.link.status = STOPPED
+        port.pipe.status = STOPPED
         await exhaust(port, port.vera)
-        port.link.status, sent = RUNS, len(port.link.presses)
+        port.pipe.status, sent = RUNS, len(port.pipe.presses)
         assert await port.stop(port.vera, "three") == (202, "requested")
-        assert [each.cause.press for each in port.link.presses[sent:]] == ["three"]
+        assert [each.cause.press for each in port.pipe.presses[sent:]] == ["three"]
 
     asyncio.run(act())
 
@@ -125,13 +125,13 @@ def test_delayed_press_counts_once_the_stop_is_cleared(
     monkeypatch.setattr(stop_server, "RATE", 0.0)
 
     async def act() -> None:
-        port.link.status = STOPPED
+        port.pipe.status = STOPPED
         await exhaust(port, port.vera)
         monkeypatch.setattr(stop_server, "DELAY", 0.05)
         sent = len(port.sent)
         press = asyncio.create_task(port.stop(port.vera, "three"))
         await asyncio.sleep(0.0)
-        port.link.status = RUNS
+        port.pipe.status = RUNS
         assert await press == (202, "requested")
         assert port.sent[sent:] == ["three"]
 
@@ -140,7 +140,7 @@ def test_delayed_press_counts_once_the_stop_is_cleared(
 
 def test_repeated_press_whose_stop_was_cleared_is_not_requested_again(port: Port) -> None:
     async def act() -> None:
-        port.link.status = StopStatus(None, ("two",))
+        port.pipe.status = StopStatus(None, ("two",))
         assert await port.stop(port.vera, "two") == (200, "cleared")
         assert port.sent == []
         assert await port.stop(port.vera, "three") == (202, "requested")
@@ -150,9 +150,9 @@ def test_repeated_press_whose_stop_was_cleared_is_not_requested_again(port: Port
 
 def test_old_status_confirms_nothing(port: Port) -> None:
     async def act() -> None:
-        port.link.status, port.link.age = STOPPED, NO_STATE
+        port.pipe.status, port.pipe.age = STOPPED, NO_STATE
         assert await port.stop(port.vera) == (202, "requested")
-        port.link.age = 0.0
+        port.pipe.age = 0.0
         assert await port.stop(port.vera) == (200, "confirmed")
 
     asyncio.run(act())
@@ -162,7 +162,7 @@ def test_wrong_tokens_of_an_address_are_delayed_and_send_nothing(port: Port) -> 
     async def act() -> None:
         assert await port.stop("wrong") == (401, "")
         await exhaust(port, "wrong")
-        assert port.link.presses == []
+        assert port.pipe.presses == []
         # They do not use up the rate of a link.
         assert await port.stop(port.vera) == (202, "requested")
 
@@ -173,11 +173,11 @@ def test_number_of_counted_clients_is_bounded(port: Port, monkeypatch: pytest.Mo
     monkeypatch.setattr(stop_server, "MAX_CLIENTS", 1)
 
     async def act() -> None:
-        port.link.status = STOPPED
+        port.pipe.status = STOPPED
         await exhaust(port, port.vera)
         assert await port.stop(port.otto) == (200, "confirmed")
         assert list(port.server._often) == [
-            each.actor.key for each in port.link.presses if each.cause.by == "Otto, Program"
+            each.actor.key for each in port.pipe.presses if each.cause.by == "Otto, Program"
         ]
 
     asyncio.run(act())
@@ -186,14 +186,14 @@ def test_number_of_counted_clients_is_bounded(port: Port, monkeypatch: pytest.Mo
 def test_muted_person_does_not_prolong_a_stop(port: Port) -> None:
     async def act() -> None:
         port.file.mute(port.number(port.vera), 60.0)
-        port.link.status = STOPPED
+        port.pipe.status = STOPPED
         for press in ("two", "three"):
             assert await port.stop(port.vera, press) == (200, "confirmed")
         assert port.sent == []
         assert await port.stop(port.otto, "four") == (200, "confirmed")
         assert port.sent == ["four"]
         # It used up nothing.
-        port.link.status = RUNS
+        port.pipe.status = RUNS
         assert await port.stop(port.vera, "five") == (202, "requested")
         assert await port.stop(port.vera, "six") == (429, "")
         assert port.sent == ["four", "five"]
@@ -216,9 +216,9 @@ def test_every_press_of_a_muted_driver_counts(port: Port) -> None:
     async def act() -> None:
         number = port.number(port.vera)
         port.file.mute(number, 60.0)
-        port.link.status = StopStatus(None, (), ("other", number))
+        port.pipe.status = StopStatus(None, (), ("other", number))
         # The front end hangs, and the last drivers that it named stay.
-        port.link.age = 10.0 * NO_STATE
+        port.pipe.age = 10.0 * NO_STATE
         for press in ("two", "three"):
             assert await port.stop(port.vera, press) == (202, "requested")
         assert port.sent == ["two", "three"]
@@ -230,9 +230,9 @@ def test_press_on_another_path_counts_here_too(port: Port) -> None:
     async def act() -> None:
         number = port.number(port.vera)
         port.file.mute(number, 60.0)
-        port.link.status = StopStatus(pressed("Vera", f"{number}/page", "one", 1.0), ("one",))
+        port.pipe.status = StopStatus(pressed("Vera", f"{number}/page", "one", 1.0), ("one",))
         port.server.follow()
-        port.link.status = RUNS
+        port.pipe.status = RUNS
         port.server.follow()
         assert await port.stop(port.vera, "two") == (429, "")
         assert await port.stop(port.otto, "three") == (202, "requested")

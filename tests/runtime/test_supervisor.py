@@ -57,11 +57,11 @@ def stubborn(folder: Path, supervisor: SupervisorPipe) -> None:
     time.sleep(60.0)
 
 
-def refusing(_folder: Path, _link: SupervisorPipe) -> None:
+def refusing(_folder: Path, _supervisor: SupervisorPipe) -> None:
     raise ConfigurationError("The reason.")
 
 
-def failing(_folder: Path, _link: SupervisorPipe) -> None:
+def failing(_folder: Path, _supervisor: SupervisorPipe) -> None:
     raise SystemExit(3)
 
 

@@ -73,7 +73,7 @@ class RunningArm:
             SilenceProfile.REAL_ARM if strict else driver.silence_profile,
         )
         self._silence_timeout = settings.silence
-        self._link: ArmEnd | None = None
+        self._front_end: ArmEnd | None = None
         self._stop_end: StopEnd | None = None
         self._attaching = threading.Lock()
         self._proven = -1
@@ -86,12 +86,12 @@ class RunningArm:
     def attach(self, pipe: Connection, greeting: Greeting) -> None:
         """Execute the commands from the other end of ``pipe``, in place of any previous pipe."""
         with self._attaching:
-            if self._link is not None:
-                self._link.close()
-            self._link = ArmEnd(
+            if self._front_end is not None:
+                self._front_end.close()
+            self._front_end = ArmEnd(
                 pipe, self._loop, self._mailbox, self._silence_timeout, greeting.number
             )
-            self._link.start()
+            self._front_end.start()
 
     def attach_stop(self, pipe: Connection, _greeting: Greeting) -> None:
         """Execute each STOP from the other end of ``pipe``, in place of any previous pipe."""
@@ -102,7 +102,7 @@ class RunningArm:
             self._stop_end.start()
 
     def _drivers(self) -> tuple[str, ...]:
-        return () if self._link is None else self._link.drivers
+        return () if self._front_end is None else self._front_end.drivers
 
     @property
     def state_publisher(self) -> StatePublisher:
@@ -122,7 +122,7 @@ class RunningArm:
 
     def stop(self) -> None:
         """Brake to rest, end the loop, and close the pipes."""
-        ends = [each for each in (self._link, self._stop_end) if each is not None]
+        ends = [each for each in (self._front_end, self._stop_end) if each is not None]
         for each in ends:
             each.close()
         # Even at rest: a command that has just arrived may begin a motion.

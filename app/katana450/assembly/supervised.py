@@ -141,7 +141,7 @@ def run_supervised(name: str, work: Callable[[SupervisorPipe], None], pipe: Conn
 
     Args:
         name: name of the process.
-        work: ends when ``SupervisorLink.ended`` is set. A KatanaError is reported.
+        work: ends when ``SupervisorPipe.ended`` is set. A KatanaError is reported.
         pipe: the pipe to the supervisor.
     """
     # Ctrl-C reaches all processes of a terminal; the supervisor ends this one.

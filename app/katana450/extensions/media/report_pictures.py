@@ -113,10 +113,10 @@ def _ticks(trace: Trace, task: int) -> list[int]:
 
 
 def _path(program: Program, trace: Trace, tick: int) -> ToolPath | None:
-    order = program.tasks[int(trace.task[tick])].action
-    if not isinstance(order, FollowPlan):
+    action = program.tasks[int(trace.task[tick])].action
+    if not isinstance(action, FollowPlan):
         return None
-    path = order.plan.segments[int(trace.segment[tick])].path
+    path = action.plan.segments[int(trace.segment[tick])].path
     return path if isinstance(path, ToolPath) else None
 
 

@@ -16,7 +16,7 @@ from katana450.extensions.programs.script import LocatedStep, Script
 from katana450.extensions.programs.situation import Situation
 from katana450.extensions.programs.source import Problem, ScriptError
 
-Orders = list[tuple[str, Action]]
+Actions = list[tuple[str, Action]]
 """The actions of one step, each with its name."""
 
 FINDING, TIMING = "finding paths", "timing paths"
@@ -87,7 +87,7 @@ class Compiler:
         self._grasp: tuple[int, State] | None = None
         self._refused: Problem | None = None
 
-    def all(self) -> list[Orders]:
+    def all(self) -> list[Actions]:
         """Return the actions of each step. Raises ScriptError with the line of a failed step."""
         steps = self._script.steps
         while len(self._compiled_steps) < len(steps):
@@ -106,7 +106,7 @@ class Compiler:
             _, self._builder.state, self._builder.taken = compiled_step
             self._note_grasp(taken, (number, before))
         # Paths are timed last, so that no time is spent on a script that is refused.
-        found: list[Orders] = []
+        found: list[Actions] = []
         for number, compiled_step in enumerate(self._compiled_steps, 1):
             self._report(PlanningStage(TIMING, number, len(steps)))
             found.append(self._timed(compiled_step))
@@ -127,8 +127,8 @@ class Compiler:
             self._known[key] = compiled_step
         return compiled_step
 
-    def _timed(self, compiled_step: CompiledStep) -> Orders:
-        found: Orders = []
+    def _timed(self, compiled_step: CompiledStep) -> Actions:
+        found: Actions = []
         for name, action in compiled_step.actions:
             if isinstance(action, UntimedPath):
                 if id(action) not in self._plans:

@@ -40,11 +40,11 @@ class ArmHandle:
         self,
         robot: Robot,
         session: Session,
-        link: FrontEnd,
+        front_end: FrontEnd,
         planning_worker: PlanningWorker | None,
         nodes: Nodes,
     ) -> None:
-        """Connect the arm to ``link``.
+        """Connect the arm to ``front_end``.
 
         ``planning_worker``: None for a mechanism that has only joints. ``nodes``: everything that
         has a name in the VRML world of the arm.
@@ -52,10 +52,10 @@ class ArmHandle:
         self.robot = robot
         self.nodes = nodes
         self.session = session
-        self._link = link
-        self._state_publisher = link.state_publisher
+        self._front_end = front_end
+        self._state_publisher = front_end.state_publisher
         self._planning_worker = planning_worker
-        self._sink: CommandSink = link if planning_worker is None else planning_worker
+        self._sink: CommandSink = front_end if planning_worker is None else planning_worker
         self._loads = loads_of(robot)
         self._measured: (
             tuple[tuple[str, CollisionWorld | None, bytes], tuple[Margins, FloatArray | None]]
@@ -75,7 +75,7 @@ class ArmHandle:
     @property
     def profile(self) -> SilenceProfile:
         """The reaction of the moving arm to silence."""
-        return self._link.profile
+        return self._front_end.profile
 
     @property
     def environment(self) -> Environment:
@@ -155,7 +155,7 @@ class ArmHandle:
     @property
     def caught_up(self) -> bool:
         """True if the newest state includes every command."""
-        return self.snapshot.ticket == self._link.last_ticket
+        return self.snapshot.ticket == self._front_end.last_ticket
 
     @property
     def clear_refusal(self) -> str:
@@ -169,9 +169,9 @@ class ArmHandle:
 
     def heartbeat(self, drivers: tuple[str, ...]) -> None:
         """Send a heartbeat of the server, with its drivers, to the arm's process."""
-        self._link.heartbeat(drivers)
+        self._front_end.heartbeat(drivers)
 
     @property
     def age(self) -> float:
         """Time since the arm's process last proved that its control loop runs [s]."""
-        return self._link.age
+        return self._front_end.age

@@ -119,7 +119,7 @@ class Budget:
     ) -> Iterator[None]:
         """Charge the processor time of the ``with`` block to the budget.
 
-        ``driver``: key of the window that asks if it drives; else empty. ``question``: whether
+        ``driver``: key of the participant that asks if it drives; else empty. ``question``: whether
         the shared account of all clients that do not drive pays too. ``fixed``: cost in addition
         to the block itself [s]. Raises BusyError, which costs ``fixed``, when an account is empty.
         """

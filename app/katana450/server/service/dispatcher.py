@@ -52,7 +52,7 @@ def driver_key(hub: Hub, participant: Participant) -> str:
 
 
 class Dispatcher:
-    """Executes requests on behalf of a window.
+    """Executes requests on behalf of a participant.
 
     Raises LeaseError if it may not drive and InputError for an invalid request; neither changes
     any state.

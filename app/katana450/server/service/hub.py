@@ -193,7 +193,7 @@ class Hub:
         return self.gate.present()
 
     def participant(self, key: str) -> Participant | None:
-        """Return the window of ``key``; None unless its control socket is open."""
+        """Return the connected participant of ``key``; None if it is not connected."""
         return self._participants.get(key)
 
     def at_scene(self, key: str, seen: int) -> Actor:
@@ -227,11 +227,11 @@ class Hub:
 
     @property
     def participants(self) -> list[Participant]:
-        """All open windows, the oldest first."""
+        """All connected participants, the oldest first."""
         return sorted(self._participants.values(), key=lambda participant: participant.number)
 
     def announce(self, why: str) -> None:
-        """Send all windows the reason for which a request is refused. For any thread."""
+        """Send all participants the reason for which a request is refused. For any thread."""
         for participant in self.participants:
             participant.notify({"is": "refused", "why": why})
 
@@ -286,7 +286,7 @@ class Hub:
         self.gate.change(lambda lease, _: lease.withdraw(participant.person), participant.actor)
 
     def taken_by(self, participant: Participant) -> str | None:
-        """Return who took the lease from ``participant`` and still holds it; None if nobody."""
+        """Return the name of the holder who took the lease from ``participant``; None if none."""
         took = self._takeover
         return None if took is None else took.taker_from(participant.person, self.lease.holder)
 
@@ -296,12 +296,12 @@ class Hub:
         self._takeover = None
 
     def hand_over(self, participant: Participant, number: int) -> None:
-        """Hand the lease to the window of ``number``; a running program of ``participant`` ends."""
+        """Hand the lease to the participant of ``number``; a running program of the giver ends."""
         giver, taker = self.giver(participant), self._numbered(number).person
         self.gate.change(lambda lease, t: lease.hand_over(giver, taker, t), participant.actor)
 
     def decline(self, participant: Participant, number: int) -> None:
-        """Decline the request of the window of ``number`` for the lease, and notify it."""
+        """Decline the request of the participant of ``number`` for the lease, and notify it."""
         giver, requester = self.giver(participant), self._numbered(number)
         self.gate.change(lambda lease, _: lease.decline(giver, requester.person), participant.actor)
         why = f"{participant.person.name} declined your request."

@@ -64,7 +64,7 @@ class Connection:
         identity: Identity of the client.
         kind: Kind of the connection.
         address: Host address of the client, as the server sees it.
-        key: Key of its window; empty without one.
+        key: Key of its participant; empty without one.
         since: Time at which it was opened [s since the epoch].
         kicked: Set when an admin ends the connection.
     """

@@ -155,7 +155,7 @@ class PeopleRequests:
         )
 
     def _name(self, identity: Identity) -> str:
-        """Return the name of the link; without links, of the first window."""
+        """Return the name of the link; without links, of the first participant."""
         if identity.link_name:
             return identity.link_name
         for each in self._people.connections.get(identity.session, ()):
@@ -179,5 +179,5 @@ class PeopleRequests:
 
 
 def _report(participant: Participant, why: str) -> None:
-    """Show ``why`` in ``participant`` as the reason of a refusal."""
+    """Send ``participant`` the reason ``why`` of a refusal."""
     participant.notify({"is": "refused", "why": why})

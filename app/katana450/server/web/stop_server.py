@@ -58,7 +58,7 @@ MAX_KEPT = 32
 LINES_HELP = 'Send {"do": "hello", "name": "..."} and {"do": "stop"}, each on a line of its own.'
 
 
-class Link(Protocol):
+class ArmPipe(Protocol):
     """The arm as this server sees it; ``StopPipe`` implements it."""
 
     status: StopStatus | None
@@ -88,14 +88,14 @@ class StopServer:
 
     def __init__(
         self,
-        link: Link,
+        pipe: ArmPipe,
         authenticator: Authenticator,
         address: Address,
         main_port: int,
         acceptor: Acceptor,
     ) -> None:
-        """Serve ``link``. ``main_port``: port of the pages that may send STOP to this one."""
-        self._link = link
+        """Serve ``pipe``. ``main_port``: port of the pages that may send STOP to this one."""
+        self._pipe = pipe
         self._authenticator = authenticator
         self._address = address
         self._main_port = main_port
@@ -106,8 +106,8 @@ class StopServer:
 
     def follow(self) -> None:
         """Count the presses that came on other paths. Call this often."""
-        if self._link.status is not None:
-            self._mutes.follow(self._link.status.stopped)
+        if self._pipe.status is not None:
+            self._mutes.follow(self._pipe.status.stopped)
 
     async def reply(self, request: h11.Request, client: tuple[str, int] | None) -> Reply:
         """Execute ``request`` of ``client`` and return its response."""
@@ -215,7 +215,7 @@ class StopServer:
 
         ``press``: empty for a new press. ``page``: the page that sends it; empty for a program.
         """
-        link = self._link
+        pipe = self._pipe
         key = f"{identity.session}/{page}" if PAGE.fullmatch(page) else identity.session
         name = identity.name or "Somebody"
         press = press or secrets.token_urlsafe(16)
@@ -231,7 +231,7 @@ class StopServer:
                 return _stop_reply(stopped)
         if stopped is None and executed:
             return _answer("cleared", "This press stopped the arm; that stop was cleared since.")
-        drives = link.status is not None and identity.session in link.status.drivers
+        drives = pipe.status is not None and identity.session in pipe.status.drivers
         if identity.muted is not None and not drives and not executed:
             if stopped is not None:
                 # Sent, it would put off the time at which the stop can be cleared.
@@ -242,14 +242,14 @@ class StopServer:
                 retry = ("retry-after", str(math.ceil(error.retry)))
                 return Reply(HTTPStatus.TOO_MANY_REQUESTS, str(error).encode(), headers=(retry,))
         # Sent even if the arm is stopped, so that late copies of this press are recognised.
-        link.press(StopPress(cause, actor))
+        pipe.press(StopPress(cause, actor))
         if stopped is None:
             log.info("%s pressed STOP (port of STOP).", name)
             kept = self._kept < MAX_KEPT
             self._kept += kept
             try:
                 with self._acceptor.kept(client) if kept else nullcontext():
-                    stopped = await link.executed(press, CONFIRM_TIMEOUT)
+                    stopped = await pipe.executed(press, CONFIRM_TIMEOUT)
             finally:
                 self._kept -= kept
         return _stop_reply(stopped)
@@ -259,17 +259,17 @@ class StopServer:
 
         (None, False) while the arm's process does not answer.
         """
-        status = self._link.status
-        if status is None or self._link.age >= NO_STATE:
+        status = self._pipe.status
+        if status is None or self._pipe.age >= NO_STATE:
             return None, False
         return status.stopped, press in status.presses
 
     def _health(self) -> Reply:
-        link = self._link
-        if link.status is None:
+        pipe = self._pipe
+        if pipe.status is None:
             problem = "The arm is not ready yet."
-        elif link.age >= NO_STATE:
-            problem = f"No answer from the arm's process for {link.age:.1f} s."
+        elif pipe.age >= NO_STATE:
+            problem = f"No answer from the arm's process for {pipe.age:.1f} s."
         else:
             return Reply(HTTPStatus.OK, b"ok\n")
         return Reply(HTTPStatus.SERVICE_UNAVAILABLE, f"{problem}\n".encode())

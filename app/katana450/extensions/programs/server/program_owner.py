@@ -44,7 +44,7 @@ class ProgramOwner:
     """The owner of the present program, its heartbeats and its rights.
 
     Attributes:
-        window: the window of the owner; None before the first program.
+        participant: the owner; None before the first program.
         unattended: whether the program runs, or is to run, without heartbeats of the owner.
         began: time at which the run began; None before that.
     """
@@ -139,7 +139,7 @@ class ProgramOwner:
 
     @property
     def _connected(self) -> Participant | None:
-        """The present window of the owner, a new one after a page has reloaded."""
+        """The owner as it is connected now; its page may have reloaded."""
         return (
             None if self.participant is None else self._hub.participant(self.participant.person.key)
         )

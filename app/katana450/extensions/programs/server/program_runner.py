@@ -56,7 +56,7 @@ class ProgramRunner(Runner):
         self._parts = ScriptParts()
         self._planning: Planning | None = None
         self._then: ProgramOrder | None = None
-        self._participant: Participant | None = None
+        self._runs_as: Participant | None = None
         self._run: Run | None = None
         # The speed to restore at the end, the maximum that a person allows, and the last command.
         self._speed = self._allowed = self._commanded = 1.0
@@ -64,7 +64,7 @@ class ProgramRunner(Runner):
     @property
     def running(self) -> bool:
         """True while a program holds the arm."""
-        return self._participant is not None
+        return self._runs_as is not None
 
     @property
     def program(self) -> Program | None:
@@ -237,9 +237,9 @@ class ProgramRunner(Runner):
         if self.program is not None and self._then is not None:
             self._start_planned()
         program = self.program
-        if self._participant is None or self._run is None or program is None:
+        if self._runs_as is None or self._run is None or program is None:
             return
-        if hub.lease.holder != self._participant.person:
+        if hub.lease.holder != self._runs_as.person:
             # The next holder takes over an arm at rest, so no command is needed.
             self._leave_with(Phase.STOPPED, "The lease was taken from the program.")
             return
@@ -295,7 +295,7 @@ class ProgramRunner(Runner):
         return state_line.status_line(state, line, self.progress(), waits=self.waits)
 
     def orders(self, participant: Participant) -> tuple[str, ...]:
-        """Return the orders that ``participant`` may give; none if it is not the owner."""
+        """Return the orders that the page of ``participant`` offers; none if not the owner."""
         return state_line.orders(self.progress()) if self.owns(participant) else ()
 
     def _start_planned(self) -> None:
@@ -346,7 +346,7 @@ class ProgramRunner(Runner):
             hub.leave(joined, for_good=True)
             raise
         began = hub.clock()
-        self._participant = joined
+        self._runs_as = joined
         self._owner.begin(participant, began, unattended=unattended)
         hub.gate.program = RunningProgram(joined.person, participant.person.key)
         self._speed = self._commanded = arm.state.speed
@@ -360,10 +360,10 @@ class ProgramRunner(Runner):
 
     def _send(self, *commands: cmd.Command) -> int | None:
         """Give ``commands`` to the arm; return the ticket of the last."""
-        assert self._participant is not None
+        assert self._runs_as is not None
         ticket = None
         for command in commands:
-            ticket = self.hub.move(self._participant, self._as_allowed(command))
+            ticket = self.hub.move(self._runs_as, self._as_allowed(command))
         return ticket
 
     def _as_allowed(self, command: cmd.Command) -> cmd.Command:
@@ -385,9 +385,9 @@ class ProgramRunner(Runner):
 
     def _leave_with(self, phase: Phase, why: str) -> None:
         """End the run and release the lease; the arm is at rest or comes to rest."""
-        assert self._participant is not None
+        assert self._runs_as is not None
         assert self._run is not None
-        joined, self._participant = self._participant, None
+        joined, self._runs_as = self._runs_as, None
         self.hub.gate.program = None
         self._run = runner.ended(self._run, phase, why)
         # The speed of a program does not outlast it.
