@@ -63,7 +63,7 @@ def test_refusals_by_limits_name_their_sender(tmp_path: Path) -> None:
         many_reads(server.url, token)
     found = [each for each in records(tmp_path / "log") if each["kind"] == "refusal"]
     told = {(each["what"]["request"], each["who"]["channel"], each["why"]) for each in found}
-    assert ("connection", "HTTP", TOO_MANY_SOCKETS) in told
+    assert ("connection", "websocket", TOO_MANY_SOCKETS) in told
     assert any(what == "connection" and channel == "TCP" for what, channel, _ in told)
     floods = [why for what, _, why in told if what != "connection"]
     assert any(why == TOO_MANY_REQUESTS or "send too many requests" in why for why in floods)

@@ -135,6 +135,9 @@ class Uploads:
         with self._places.taken(client.session, places) as free:
             if not free or not self._is_due(client.session):
                 why = "Too many files at once. Wait a moment."
+                self._hub.recorder.refuse(
+                    "upload", actor_of(sender, CommandChannel.HTTP), InputError(why)
+                )
                 return as_json(answers.Refused(why=why), TOO_MANY)
             try:
                 async with asyncio.timeout(UPLOAD_TIMEOUT):

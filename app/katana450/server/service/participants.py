@@ -47,14 +47,18 @@ class Takeover(NamedTuple):
     drivers: frozenset[str]
 
     def taker_from(self, person: Person, holder: Person | None) -> str | None:
-        """Return the name of the taker if it drove ``person`` out and is still the ``holder``."""
+        """Return the name of the taker if it took over from ``person`` and is the ``holder``."""
         took = person.key in self.drivers and holder == self.taker
         return self.taker.name if took else None
 
 
-def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
-    """Return ``identity`` as the actor of a command, without a window."""
-    return Actor(identity.person(identity.session, identity.name or "Somebody"), channel)
+def actor_of(identity: Identity, channel: CommandChannel, address: str = "") -> Actor:
+    """Return ``identity`` as the actor of a command or request, without being connected.
+
+    ``address``: network address of the client, if ``identity`` has none.
+    """
+    person = identity.person(identity.session, identity.name or "Somebody")
+    return Actor(replace(person, address=address or person.address), channel)
 
 
 def presser_of(cause: StopCause, known: Iterable[Person], *, links: bool) -> Actor | None:
@@ -84,10 +88,10 @@ def key_of(identity: Identity, page: str) -> str:
 
 
 def session_of(key: str) -> str:
-    """Return the session in the ``key`` of a window, or of an actor without a window."""
+    """Return the session in the ``key`` of a participant, or of an actor that is not connected."""
     return key.rpartition("/")[0] or key
 
 
 def is_same_person(key: str, other: str) -> bool:
-    """Return whether two keys belong to the windows of one person, or of one browser."""
+    """Return whether two keys belong to the participants of one person, or of one browser."""
     return key == other or session_of(key) == session_of(other) != SHARED_SESSION

@@ -12,9 +12,11 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
+from katana450.arm.control.actor import CommandChannel
+from katana450.errors import InputError
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE, Identity
-from katana450.server.service.participants import key_of
+from katana450.server.service.participants import actor_of, key_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.viser_bridge.flow import FlowControl
 from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot
@@ -72,6 +74,9 @@ class Proxy:
             if free:
                 await self._serve(browser, identity)
             else:
+                actor = actor_of(identity, CommandChannel.SCENE, address_of(browser))
+                error = InputError("Too many pages show the scene. Close some windows.")
+                self._hub.recorder.refuse("connection", actor, error)
                 await browser.close(1013)
 
     async def _serve(self, browser: WebSocket, identity: Identity) -> None:

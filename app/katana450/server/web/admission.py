@@ -6,8 +6,6 @@ request on a connection, the acceptor keeps it open. All others may be closed to
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -71,6 +69,14 @@ def reserved(hub: Hub, authenticator: Authenticator, client: Identity, places: i
     return places if admin or client.session in hub.drivers else 0
 
 
+def channel_of(scope: Scope) -> CommandChannel:
+    """Return the channel of the commands that come on the connection of ``scope``."""
+    if scope["type"] != "websocket":
+        return CommandChannel.HTTP
+    api = scope["path"].startswith("/api/")
+    return CommandChannel.WEBSOCKET if api else CommandChannel.PAGE
+
+
 def address_of(connection: HTTPConnection) -> str:
     """Return the host address of the client of ``connection``."""
     return "" if connection.client is None else connection.client.host
@@ -121,7 +127,7 @@ class Admission:
             self._hub.people.refused(who.session)
             error = TOO_MANY_SOCKETS if socket else TOO_MANY_REQUESTS
             what = "connection" if socket else "request"
-            actor = actor_of(replace(who, address=address_of(connection)), CommandChannel.HTTP)
+            actor = actor_of(who, channel_of(scope), address_of(connection))
             self._hub.recorder.refuse(what, actor, InputError(error))
             if socket:
                 await refuse(WebSocket(scope, receive, send), error)

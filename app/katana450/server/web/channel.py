@@ -93,15 +93,15 @@ class WebSocketJsonChannel:
 
 
 class Channel(ABC):
-    """Channel of one window. A subclass decides which messages are sent without a request."""
+    """Channel of one participant. A subclass decides which messages are sent without a request."""
 
     def __init__(
         self, hub: Hub, line: JsonChannel, budget: Budget, *, often: TokenBucket, bad: TokenBucket
     ) -> None:
         """Create a channel on ``line``.
 
-        ``budget``: that of the identity, shared by all its windows. ``often``: rate limit of all
-        requests. ``bad``: rate limit of invalid requests.
+        ``budget``: that of the identity, which all its participants share. ``often``: rate limit of
+        all requests. ``bad``: rate limit of invalid requests.
         """
         self.hub = hub
         self.budget = budget
@@ -178,7 +178,6 @@ class Channel(ABC):
             except BusyError as error:
                 if error.gone:
                     log.warning("%s exceeds its budget: disconnected.", participant.person.name)
-                    self.hub.recorder.refuse("any", participant.actor, error)
                     await self._disconnect(LIMIT_CLOSE_CODE, str(error))
                     return
                 self.refuse(str(error), request.id, retry=error.retry)

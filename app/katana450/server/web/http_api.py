@@ -71,7 +71,7 @@ RouteProvider = Callable[[RouteContext], list[BaseRoute]]
 
 
 class _HttpProgram(NamedTuple):
-    """A program that sends requests by POST; ``timer`` closes its window after its last request."""
+    """A program that sends requests by POST; ``timer`` lets it leave after its last request."""
 
     participant: Participant
     connection: Connection
@@ -220,9 +220,9 @@ class Api:
         return replace(found, address=address_of(request))
 
     def _participant(self, request: Request, identity: Identity) -> Participant:
-        """Return the window of the program that sends ``request``, and open it if necessary.
+        """Return the participant that sends ``request``, which joins if necessary.
 
-        The window closes after ``LEASE_TIMEOUT`` without a request.
+        The participant leaves after ``LEASE_TIMEOUT`` without a request.
         """
         key = self._key(request, identity)
         known = self._programs.pop(key, None)

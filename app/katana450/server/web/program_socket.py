@@ -30,7 +30,7 @@ from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.admission import address_of, identity, refuse, reserved
+from katana450.server.web.admission import address_of, client_of, refuse, reserved
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED, Authenticator
 from katana450.server.web.channel import (
     BAD_REQUEST_CLOSE_CODE,
@@ -160,8 +160,12 @@ async def serve_socket(
     def current_identity() -> Identity | None:
         return authenticator.program(name, socket.headers.get("authorization", ""), socket.cookies)
 
-    budget = budgets.of(identity(authenticator, socket) or address_of(socket))
+    found = client_of(authenticator, socket)
+    budget = budgets.of(address_of(socket) if found is None else found.session)
     if budget.is_exhausted():
+        if found is not None:
+            actor = actor_of(found, CommandChannel.WEBSOCKET, address_of(socket))
+            hub.recorder.refuse("connection", actor, InputError(BUDGET_EXHAUSTED))
         await refuse(socket, BUDGET_EXHAUSTED)
         return
     await socket.accept()
@@ -247,7 +251,7 @@ class LineServer:
             else:
                 why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
                 if found is not None:
-                    actor = actor_of(replace(found, address=client[0]), CommandChannel.TCP)
+                    actor = actor_of(found, CommandChannel.TCP, client[0])
                     self._hub.recorder.refuse("connection", actor, InputError(why))
                 await line.close(0, why)
 
