@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
+
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
@@ -17,6 +20,9 @@ from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, Plan, check_clear, plan
 from katana450.maths.planning.sampling import collision_free_paths
 from katana450.maths.planning.scaling import Bounds
+
+DETOUR_SEARCHES = 5
+"""Maximum number of searches for a detour. In a narrow region one search can fail by bad luck."""
 
 
 def path_to(
@@ -69,21 +75,25 @@ def plan_to(
     return plan_along(arm, world, state, [path_to(arm, world, state, q_goal, seed)], tool_speed)
 
 
-def detour_from(arm: ArmModel, world: CollisionWorld | None, state: State, seed: int = 0) -> Plan:
+def detour_from(arm: ArmModel, world: CollisionWorld | None, state: State) -> Plan:
     """Return the plan of a detour to the pose beyond the gap, to be sent as ``OfferDetour``.
 
-    It stays on the branch of ``state``, which has that pose. Raises BlockedError if there is none.
+    It stays on the branch of ``state``, which has that pose. Raises BlockedError if none is found.
     """
     assert state.beyond_gap is not None
-    paths = _paths_to(arm, world, state, state.beyond_gap.q, seed, state.branch)
-    return plan_along(arm, world, state, [*paths])
+    q_goal, branch = state.beyond_gap.q, state.branch
+    *seeds, last = range(DETOUR_SEARCHES)
+    for seed in seeds:
+        with suppress(BlockedError):
+            return plan_along(arm, world, state, _paths_to(arm, world, state, q_goal, seed, branch))
+    return plan_along(arm, world, state, _paths_to(arm, world, state, q_goal, last, branch))
 
 
 def plan_along(
     arm: ArmModel,
     world: CollisionWorld | None,
     state: State,
-    paths: list[Path],
+    paths: Sequence[Path],
     tool_speed: float = TOOL_SPEED,
     tool_acceleration: float | None = None,
 ) -> Plan:
