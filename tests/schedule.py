@@ -59,8 +59,10 @@ class Completeness:
         xdist ends early with the status of failed tests if its processes crash repeatedly.
         """
         distribution = session.config.pluginmanager.getplugin("dsession")
-        schedule = None if distribution is None else distribution.sched
-        if schedule is not None and schedule.has_pending:
+        if distribution is None:
+            return
+        schedule = distribution.sched
+        if schedule is None or schedule.collection is None or schedule.has_pending:
             print("\nSome tests were not run.")
             session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
 
