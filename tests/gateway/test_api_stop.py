@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from collections.abc import Callable
 
 import pytest
 
@@ -34,6 +35,30 @@ def test_any_window_can_stop_a_program(server: AppServer, program: Client) -> No
     assert program.query(answers.State).q == rest.q
     event_log = program.query(answers.EventLog)
     assert any(line.who == "bystander" and line.began for line in event_log.lines)
+
+
+def test_slow_watcher_learns_of_a_stop_at_once(server: AppServer, program: Client) -> None:
+    def watched(reach: Callable[[answers.State], bool], act: Callable[[], object]) -> float:
+        """Return the time from ``act`` until a watcher of a state per 10 s has such a state [s]."""
+
+        async def watch() -> float:
+            async with aconnect(server.url, "Watcher") as watcher, asyncio.timeout(15.0):
+                states = watcher.states(0.1)
+                await anext(states)
+                began = time.monotonic()
+                await asyncio.to_thread(act)
+                async for state in states:
+                    if reach(state):
+                        return time.monotonic() - began
+            raise AssertionError
+
+        return asyncio.run(watch())
+
+    program.ask(requests.Speed(value=0.2))
+    program.ask(requests.Joints(q=THERE.tolist()))
+    assert watched(lambda state: state.stop == "confirmed", program.stop) < 2.0
+    # The stop can be cleared only at rest, and 1 s after it.
+    assert watched(lambda state: state.stopped is None, program.clear_stop) < 4.0
 
 
 def test_silent_program_causes_a_stop(server: AppServer) -> None:

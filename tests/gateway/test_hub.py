@@ -224,11 +224,8 @@ def test_stopped_arm_moves_only_after_clear_stop(table: Table) -> None:
     table.stop("Window 2")
     assert not table.hub.gate.is_current(drag)
     assert not moves(table)
-    acts: list[Callable[[], object]] = [
-        lambda: table.touch(driver.person.key),
-        lambda: table.hub.move(driver, cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE)),
-    ]
-    for act in acts:
+    jog = cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE)
+    for act in (lambda: table.touch(driver.person.key), lambda: table.hub.move(driver, jog)):
         with pytest.raises(LeaseError, match="stopped"):
             act()
     # Only the driver may clear the stop.
@@ -256,6 +253,19 @@ def test_repeated_stop_press_counts_once(table: Table) -> None:
         table.stop("Window 1")
         assert stands_still(table)
         table.hub.move(driver, cmd.ClearStop())
+
+
+def test_listeners_are_called_when_a_stop_begins_and_ends(table: Table) -> None:
+    driver, shown = table.join(PAGES[0]), []
+    table.hub.stop_listeners.add(lambda: shown.append(table.hub.stopped is not None))
+    # A flood of STOP causes no flood of messages.
+    for press in range(5):
+        table.stop("Window 1", f"press {press}")
+        table.wait(TICK, driver)
+    assert shown in ([True], [True, True])
+    table.hub.move(driver, cmd.ClearStop())
+    table.wait(TICK, driver)
+    assert shown.pop() is False
 
 
 def test_arm_that_lost_its_stop_is_stopped_again(table: Table) -> None:

@@ -12,6 +12,7 @@ import time
 from asyncio import BaseTransport, Transport
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Any, cast
 
@@ -162,7 +163,15 @@ class Gateway:
     def attach(self, arm: ArmHandle) -> None:
         """Let clients drive ``arm`` from now on."""
         arm.listen(self.hub.recorder.outcomes)
+        arm.on_stop_change(self._follow_stop)
         self.hub.gate.arm = arm
+
+    def _follow_stop(self) -> None:
+        """Let clients see a change of the stop at once. Can be called in any thread."""
+        # RuntimeError: the server has ended.
+        if self._loop is not None:
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self.hub.follow_stop)
 
     def announce(self, why: str) -> None:
         """Notify all clients why a request is not executed. Can be called in any thread."""

@@ -74,6 +74,8 @@ class FrontEnd:
         self.state_publisher.publish(first.snapshot, first.event_log)
         self.cut = threading.Event()
         """Set once this front end is no longer the one of the arm."""
+        self.on_stop_change: Callable[[], None] = lambda: None
+        """Called in the thread of the pipe when a state is the first that is stopped, or not."""
         self._thread = threading.Thread(target=self._listen, name="pipe", daemon=True)
 
     def start(self) -> None:
@@ -213,6 +215,8 @@ class FrontEnd:
             self.state_publisher.publish(_known(message.snapshot, seen), message.event_log)
         # The state comes first: a client with an answer must find its command in the state.
         self.state_publisher.outcomes.note(message.outcomes)
+        if (message.snapshot.state.stopped is None) != (seen.state.stopped is None):
+            self.on_stop_change()
         return True
 
 

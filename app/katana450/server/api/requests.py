@@ -274,6 +274,8 @@ class Resume(Request, frozen=True):
 class Watch(Request, frozen=True, kw_only=True):
     """Send the state periodically from now on. A slow connection gets fewer states.
 
+    When a stop begins, is confirmed or is cleared, the state is sent at once.
+
     Attributes:
         hz: Number of states per second; 0 ends the stream.
         fields: Fields of the VRML world whose values each state includes.

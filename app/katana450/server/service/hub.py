@@ -78,6 +78,9 @@ class Hub:
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._participants: dict[str, Participant] = {}
+        self.stop_listeners: set[Callable[[], None]] = set()
+        """Called when a stop begins, is confirmed by the arm for the first time, or is cleared."""
+        self._stop_shown = (False, False)
         self._pictures: dict[MeasuresAge, str] = {}
         self._known = KnownPages()
         self._takeover: Takeover | None = None
@@ -346,8 +349,19 @@ class Hub:
             self.people.mutes.follow(None if stopped is None else stopped.cause)
             for entry in self.event_log.follow(arm.event_log):
                 self.recorder.finding(entry)
-            self.gate.reconcile()
+            self.follow_stop()
             self.runner.tick()
+
+    def follow_stop(self) -> None:
+        """Make gate and arm agree; call ``stop_listeners`` if that begins or ends a stop."""
+        self.gate.reconcile()
+        stopped, before = self.stopped, self._stop_shown
+        # A repeated press is no change, so that a flood of STOP causes no flood of states.
+        confirmed = stopped is not None and (stopped.confirmed or before == (True, True))
+        self._stop_shown = (stopped is not None, confirmed)
+        if self._stop_shown != before:
+            for listener in tuple(self.stop_listeners):
+                listener()
 
     def _update_lease(self) -> None:
         """Renew the lease by the newest heartbeat of the driver, at the time of its receipt."""

@@ -112,6 +112,7 @@ class Channel(ABC):
         self._bad = bad
         self._notices: deque[Any] = deque(maxlen=MAX_WAITING_ANSWERS)
         self._news = asyncio.Event()
+        self._urgent = False
         self._concluding: set[asyncio.Task[None]] = set()
 
     def notify(self, notice: Any) -> None:
@@ -120,8 +121,11 @@ class Channel(ABC):
         self._news.set()
 
     @abstractmethod
-    def unasked(self) -> tuple[Any, float | None]:
-        """Return the message to send now, or None, and the time until the next call [s]."""
+    def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
+        """Return the message to send now, or None, and the time until the next call [s].
+
+        ``urgent``: a stop has begun, was confirmed or was cleared since the last call.
+        """
 
     def answer(self, participant: Participant, request: requests.Request) -> None:
         """Execute ``request``; send the answer if it has an id or is always answered."""
@@ -143,9 +147,11 @@ class Channel(ABC):
     async def run(self, participant: Participant) -> None:
         """Receive and send until one side closes the connection."""
         tasks = [asyncio.create_task(each) for each in (self._send(), self._receive(participant))]
+        self.hub.stop_listeners.add(self._hurry)
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
+            self.hub.stop_listeners.discard(self._hurry)
             for task in (*tasks, *self._concluding):
                 task.cancel()
             for ended in await asyncio.gather(*tasks, *self._concluding, return_exceptions=True):
@@ -201,12 +207,17 @@ class Channel(ABC):
         """Wake the sender, because there may be a message to send."""
         self._news.set()
 
+    def _hurry(self) -> None:
+        self._urgent = True
+        self.wake()
+
     async def _send(self) -> None:
         while True:
             self._news.clear()
             while self._notices:
                 await self._send_json(self._notices.popleft())
-            notice, pause = self.unasked()
+            urgent, self._urgent = self._urgent, False
+            notice, pause = self.unasked(urgent=urgent)
             if notice is not None:
                 await self._send_json(notice)
             with suppress(TimeoutError):

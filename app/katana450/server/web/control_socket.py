@@ -56,10 +56,11 @@ class ControlSocket(Channel):
         if not isinstance(request, requests.Heartbeat | requests.Jog):
             self.wake()
 
-    def unasked(self) -> tuple[Any, float | None]:
+    def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
         """Return the changes of the status, or None, and the time until the next call [s]."""
         t = self.hub.clock()
-        if self.participant is None or t - self._checked_at < PUSH_EVERY / 2:
+        early = t - self._checked_at < PUSH_EVERY / 2 and not urgent
+        if self.participant is None or early:
             return None, PUSH_EVERY
         self._checked_at = t
         now = status.common(self.hub) | status.of(self.hub, self.participant)

@@ -108,14 +108,15 @@ class ProgramChannel(Channel):
         super().answer(participant, request)
         self.wake()
 
-    def unasked(self) -> tuple[Any, float | None]:
+    def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
         """Return the state if one is due, or None, and the time until the next call [s]."""
         if self._period is None or self.hub.arm is None:
             return None, self._period
         t = self.hub.clock()
-        if t < self._due:
+        if t < self._due and not urgent:
             return None, self._due - t
-        self._due = max(self._due + self._period, t)
+        if t >= self._due:
+            self._due = max(self._due + self._period, t)
         driver = "" if self.participant is None else driver_key(self.hub, self.participant)
         try:
             with self.budget.charged(driver):
