@@ -139,7 +139,13 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  const drawn = () => byId("poster").classList.add("done");
+  const canDraw = document.createElement("canvas").getContext("webgl2") !== null;
+  const drawn = () => canDraw && byId("poster").classList.add("done");
+  if (!canDraw) {
+    byId("poster").classList.add("failed");
+    byId("poster").querySelector("p").textContent =
+      "This browser cannot draw the scene: WebGL 2 is off or missing. Turn on hardware acceleration in its settings, or use another browser. STOP and Jog work without it.";
+  }
   window.katana = { key, blur, toast, drawn, view: null };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
@@ -434,7 +440,7 @@
     worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });
     if (kept?.getItem(OPEN) === "yes") showInstruments(true);
     window.addEventListener("status", ({ detail }) => {
-      if (detail.role !== "viewer" && !kept?.getItem(WELCOMED)) showWelcome();
+      if (canDraw && detail.role !== "viewer" && !kept?.getItem(WELCOMED)) showWelcome();
     }, { once: true });
   });
 })();

@@ -1,4 +1,4 @@
-"""Find the programs that read our exports, and install them if that needs no confirmation.
+"""Find the programs that read our exports, and Firefox; install them if nobody must confirm.
 
 ``python tests/exchange/tools.py`` installs them. Tests of a missing program are skipped.
 """
@@ -30,6 +30,7 @@ PACKAGES = {
     "xdotool": "xdotool",
     "tovrmlx3d": "view3dscene",
     "view3dscene": "view3dscene",
+    "firefox-esr": "firefox-esr",
 }
 """Programs and files, and the Debian packages that provide them."""
 
@@ -159,9 +160,9 @@ def main() -> None:
     print("VTK for the tests:", vtk_folder() or f"not here; {why}")
     packages = missing(list(PACKAGES))
     print(
-        f"Exports are tested less; on Debian and Ubuntu: apt-get install {' '.join(packages)}"
+        f"Some tests are skipped; on Debian and Ubuntu: apt-get install {' '.join(packages)}"
         if packages
-        else "The programs that read our exports are all here."
+        else "The programs that read our exports, and Firefox, are all here."
     )
 
 
