@@ -25,8 +25,20 @@ LIMIT_FRACTION: Final = 0.995
 ROUNDS: Final = 50
 """Number of rounds that make a path slower where it is too fast and faster where it is not."""
 
+PATIENCE: Final = 15
+"""Number of rounds without a gain after which no more follow."""
+
+LEAST_GAIN: Final = 1e-4
+"""Smallest fraction [1] of the time that counts as a gain."""
+
 TRIAL_ROUNDS: Final = 8
 """The number of rounds that compare other values of a and j."""
+
+FIRST_ROUNDS: Final = 3
+"""The number of rounds after which a trial must be nearly as fast as the best one."""
+
+NEARLY: Final = 1.05
+"""Factor [1] of the time for that."""
 
 SLOWING_POWER: Final = 0.6
 """Power [1] of the excess of a place, by which it is slowed in one round."""
@@ -64,7 +76,7 @@ def fastest(path: Path, bounds: Bounds) -> Scaling:
             for x, y in ((1, 1), (-1, -1), (1, 0), (-1, 0), (0, 1), (0, -1)):
                 fa, fj = factor**x, factor**y
                 a, j = best.acceleration * fa, best.jerk * fj
-                other = sampled.fitted(a, j, best.coefficients, TRIAL_ROUNDS)
+                other = sampled.fitted(a, j, best.coefficients, TRIAL_ROUNDS, NEARLY * best.time)
                 if other.time < (1.0 - 1e-3) * best.time:
                     best, improved = other, True
     best = sampled.fitted(best.acceleration, best.jerk, best.coefficients, ROUNDS)
@@ -84,21 +96,24 @@ class _Sampled:
     """A path at many places.
 
     Attributes:
-        q: derivatives (3, N, 5) of the joints by sigma.
-        p: derivatives (2, N, 3) of the tool point by sigma.
-        piece: number (N,) of the piece of the slowness at each place.
-        weights: weights (3, N, 4) of its four coefficients for the slowness and its first two
-            derivatives.
+        pressing: first two derivatives (2, 5, N) of the joints by sigma, as fractions of the limits
+            of their accelerations.
+        jerking: first three derivatives (3, 5, N), as fractions of the limits of their jerks.
+        moving: largest fraction (N,) of a limit of speed, of the joints and of the tool point.
+        pushing: derivatives (2, 3, N) of the tool point by sigma, as fractions of the limit of its
+            acceleration; None without one.
+        index: indices (4, N) of the coefficients of the slowness at each place.
+        weights: their weights (3, 4, N) for the slowness and its first two derivatives.
         first: index (K,) of the first place in each piece.
-        bounds: the limits of the motion.
     """
 
-    q: FloatArray
-    p: FloatArray
-    piece: npt.NDArray[np.int64]
+    pressing: FloatArray
+    jerking: FloatArray
+    moving: FloatArray
+    pushing: FloatArray | None
+    index: npt.NDArray[np.int64]
     weights: FloatArray
     first: npt.NDArray[np.int64]
-    bounds: Bounds
 
     @staticmethod
     def of(path: Path, bounds: Bounds) -> _Sampled:
@@ -113,24 +128,39 @@ class _Sampled:
         zero = np.zeros_like(fraction)
         slopes = np.stack((zero, zero + count, 2.0 * count * fraction, 3.0 * count * fraction**2))
         bends = np.stack((zero, zero, zero + 2.0 * count**2, 6.0 * count**2 * fraction))
-        weights = np.stack([each.T @ CUBIC for each in (powers, slopes, bends)])
+        weights = np.stack([CUBIC.T @ each for each in (powers, slopes, bends)])
+        # Joints and coordinates first: a maximum over them is then fast.
+        q = joint_derivatives(path, sigma)[1:].transpose(0, 2, 1)
+        p = point_derivatives(path, sigma)[1:3].transpose(0, 2, 1)
+        limits = bounds.joints
+        speed, acceleration, jerk = (
+            (LIMIT_FRACTION * each)[:, None]
+            for each in (limits.speed, limits.acceleration, limits.jerk)
+        )
+        tool = np.sqrt(np.einsum("kn,kn->n", p[0], p[0])) / (LIMIT_FRACTION * bounds.tool_speed)
+        pushed = bounds.tool_acceleration
         return _Sampled(
-            joint_derivatives(path, sigma)[1:],
-            point_derivatives(path, sigma)[1:3],
-            piece,
+            np.ascontiguousarray(q[:2] / acceleration),
+            np.ascontiguousarray(q / jerk),
+            np.maximum((np.abs(q[0]) / speed).max(axis=0), tool),
+            None if pushed is None else np.ascontiguousarray(p / (LIMIT_FRACTION * pushed)),
+            piece + np.arange(4)[:, None],
             weights,
             np.searchsorted(piece, np.arange(count)),
-            bounds,
         )
 
-    def fitted(self, a: float, j: float, start: FloatArray, rounds: int) -> _Fitted:
+    def fitted(
+        self, a: float, j: float, start: FloatArray, rounds: int, at_most: float = np.inf
+    ) -> _Fitted:
         """Return the least slowness found for the bounds `a` and `j` of tau(t).
 
-        The search begins with `start` (K + 3,).
+        The search begins with `start` (K + 3,), and ends early if it gains nothing more, or is not
+        near the time `at_most` after its first rounds.
         """
         c = start * self.excess(start, a, j).max()
         best, minimum = c, np.inf
-        for _ in range(rounds):
+        reference, gained = np.inf, 0
+        for number in range(rounds):
             checkpoint()
             excess = self.excess(c, a, j)
             maximum = float(excess.max())
@@ -138,6 +168,11 @@ class _Sampled:
             time = rest_to_rest(maximum * self._span(c), a, j)
             if time < minimum:
                 best, minimum = maximum * c, time
+            if minimum < (1.0 - LEAST_GAIN) * reference:
+                reference, gained = minimum, number
+            hopeless = number + 1 == FIRST_ROUNDS and minimum > at_most
+            if hopeless or number - gained >= PATIENCE:
+                break
             near = self.near(excess)
             c = c * np.where(near > 1.0, near**SLOWING_POWER, near**SPEEDING_POWER)
         return _Fitted(best, a, j, minimum)
@@ -147,9 +182,10 @@ class _Sampled:
 
         A coefficient affects four pieces.
         """
-        worst = np.maximum.reduceat(excess, self.first)
-        padded = np.concatenate((np.zeros(3), worst, np.zeros(3)))
-        return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
+        padded = np.zeros(len(self.first) + 6)
+        padded[3:-3] = np.maximum.reduceat(excess, self.first)
+        pairs = np.maximum(padded[:-1], padded[1:])
+        return np.asarray(np.maximum(pairs[:-2], pairs[2:]))
 
     @staticmethod
     def _span(c: FloatArray) -> float:
@@ -157,33 +193,29 @@ class _Sampled:
         return float(total) / (len(c) - 3)
 
     def excess(self, c: FloatArray, a: float, j: float) -> FloatArray:
-        """Return the factor (N,) by which each place must be slower to keep every limit."""
-        limits, bounds = self.bounds.joints, self.bounds
-        fours = np.stack([c[self.piece + k] for k in range(4)], axis=1)
-        w, w1, w2 = (np.einsum("nk,nk->n", fours, each) for each in self.weights)
-        first = 1.0 / w
-        second = -w1 * first**3
-        third = (3.0 * w1 * w1 * first - w2) * first**4
-        f, s, t = first[:, None], second[:, None], third[:, None]
-        q1, q2, q3 = self.q
-        speed = np.abs(q1) * f
-        bend = np.abs(q2 * f * f + q1 * s)
-        jerk = np.abs(q3 * f**3 + 3.0 * q2 * f * s + q1 * t)
-        spare = LIMIT_FRACTION
-        found = (speed / (spare * limits.speed)).max(axis=1)
-        A, J = spare * limits.acceleration, spare * limits.jerk
-        np.maximum(found, _quadratic(bend / A, a * speed / A).max(axis=1), out=found)
-        cubic = _cubic(jerk / J, 3.0 * a * bend / J, j * speed / J)
-        np.maximum(found, cubic.max(axis=1), out=found)
-        p1, p2 = self.p
-        moved = np.sqrt(np.einsum("nk,nk->n", p1, p1)) * first
-        np.maximum(found, moved / (spare * bounds.tool_speed), out=found)
-        if bounds.tool_acceleration is not None:
-            pushed = p2 * f * f + p1 * s
-            push = np.sqrt(np.einsum("nk,nk->n", pushed, pushed)) / bounds.tool_acceleration
-            pull = a * moved / bounds.tool_acceleration
-            np.maximum(found, _quadratic(push / spare, pull / spare), out=found)
-        return np.asarray(found)
+        """Return the factor (N,) by which each place must be slower to keep every limit.
+
+        All derivatives by tau are taken with the slowness 1, and the factor is divided by the
+        slowness at the end, to which it is inversely proportional.
+        """
+        w, w1, w2 = np.einsum("dkn,kn->dn", self.weights, c[self.index])
+        # Second and third derivative of sigma by tau.
+        second = -w1 / w
+        third = 3.0 * second * second - w2 / w
+        q1, q2 = self.pressing
+        bend = np.abs(q2 + second * q1)
+        found = _quadratic(bend, a * np.abs(q1)).max(axis=0)
+        np.maximum(found, self.moving, out=found)
+        q1, q2, q3 = self.jerking
+        jerk = np.abs(q3 + 3.0 * second * q2 + third * q1)
+        cubic = _cubic(jerk, 3.0 * a * np.abs(q2 + second * q1), j * np.abs(q1))
+        np.maximum(found, cubic.max(axis=0), out=found)
+        if self.pushing is not None:
+            p1, p2 = self.pushing
+            pushed = p2 + second * p1
+            push, pull = (np.sqrt(np.einsum("kn,kn->n", each, each)) for each in (pushed, p1))
+            np.maximum(found, _quadratic(push, a * pull), out=found)
+        return np.asarray(found / w)
 
 
 def _quadratic(x: FloatArray, y: FloatArray) -> FloatArray:
