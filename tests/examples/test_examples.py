@@ -126,3 +126,11 @@ def test_every_example_is_listed() -> None:
     listed = (EXAMPLES / "README.md").read_text(encoding="utf-8")
     for file in set(EXAMPLES.iterdir()) - {EXAMPLES / "README.md"}:
         assert file.name in listed, file.name
+
+
+@pytest.mark.parametrize(
+    "script", sorted((EXAMPLES / "programs").glob("*.yaml")), ids=lambda p: p.stem
+)
+def test_scripts_are_planned(tmp_path: Path, script: Path) -> None:
+    printed = run(tmp_path, "-m", "katana450", "run", script, "--dry-run")
+    assert re.search(r"^\d+ steps, [\d.]+ s of motion", printed, re.MULTILINE)

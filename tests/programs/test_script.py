@@ -11,8 +11,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
+from katana450.extensions.programs.blocks import MAX_STEPS
 from katana450.extensions.programs.moves import Move
-from katana450.extensions.programs.script import MAX_STEPS, parse
+from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
 from katana450.extensions.programs.steps import STEPS
 from katana450.extensions.programs.tool_moves import Circle, Line

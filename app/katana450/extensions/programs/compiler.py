@@ -11,8 +11,9 @@ import numpy as np
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.blocks import LocatedStep
 from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder, UntimedPath
-from katana450.extensions.programs.script import LocatedStep, Script
+from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.situation import Situation
 from katana450.extensions.programs.source import Problem, ScriptError
 

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from katana450.errors import InputError
+from katana450.extensions.programs.expression import ANGLE, LENGTH, PLAIN, TIME, with_article
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
@@ -23,6 +24,9 @@ MAX_ANGLE = 3600.0
 """[deg] Maximum magnitude of an angle."""
 
 XYZ = ("x", "y", "z")
+
+KINDS = {"mm": (LENGTH,), "deg": (ANGLE,), "s": (TIME,), "deg or mm": (ANGLE, LENGTH)}
+"""The kinds of quantities that can be given where a number in a unit is expected."""
 
 
 class Fields:
@@ -99,7 +103,11 @@ def number(low: float, high: float, unit: str = "") -> Callable[[YamlValue], flo
     def read(value: YamlValue) -> float:
         found = value.number if value.kind in ("whole", "number") else _plain(value)
         if found is None or not math.isfinite(found):
-            raise value.wrong(f"Expected a number from {low:g} to {high:g}{of}, not {value}.")
+            why = f": {value.why}." if value.why else "."
+            raise value.wrong(f"Expected a number from {low:g} to {high:g}{of}, not {value}{why}")
+        if value.unit != PLAIN and value.unit not in KINDS.get(unit, ()):
+            wanted = f"a number in {unit}" if unit else "a number without a unit"
+            raise value.wrong(f"Expected {wanted}, not {with_article(value.unit)}: {value}.")
         if not low <= found <= high:
             raise value.wrong(f"{found:g} is not between {low:g} and {high:g}{of}.")
         return found

@@ -4,40 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from katana450.arm.control.commands import MIN_SPEED
 from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.blocks import LocatedStep, StepReader
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.places import place
 from katana450.extensions.programs.plan_builder import StepTarget
+from katana450.extensions.programs.scope import Scope
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.settings_steps import Tool
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.extensions.programs.source import read as read_text
-from katana450.extensions.programs.step import Step
-from katana450.extensions.programs.steps import STEPS
-
-MAX_STEPS = 1000
-"""Maximum number of steps, with all repetitions."""
-
-MAX_REPETITIONS = 1000
-"""Maximum count of a ``repeat``."""
 
 MAX_NAME_LENGTH = 40
 """Maximum number of characters of a name."""
 
 NOTHING: dict[str, tuple[float, float]] = {}
 """The expectations of a script that has none."""
-
-
-class LocatedStep(NamedTuple):
-    """A step and its place in the text, from 1."""
-
-    step: Step
-    line: int
-    column: int
 
 
 @dataclass(frozen=True)
@@ -70,59 +55,34 @@ def parse(text: str) -> Script:
     frame = top.take("frame", read.choice("shoulder", "base"), "shoulder")
     speed = top.take("speed", read.number(MIN_SPEED, 1.0), 1.0)
     in_base = frame == "base"
+    scope = top.take("let", _let, Scope())
     no_poses: dict[str, StepTarget] = {}
-    poses = top.take("poses", lambda value: _poses(value, in_base=in_base), no_poses)
+    poses = top.take("poses", lambda value: _poses(scope.bound(value), in_base=in_base), no_poses)
     setting = ScriptContext(in_base, poses)
     tool = top.take("tool", lambda value: LocatedStep(Tool.read(value, setting), *_at(value)), None)
     expected = top.take("expect", _expected, NOTHING)
+    reader = StepReader(setting, scope)
+    reader = top.take("define", reader.defining, reader)
     steps: tuple[LocatedStep, ...]
-    steps = top.need("steps", lambda value: _steps(value, setting), ())
+    steps = top.need("steps", reader.steps, ())
     top.done()
     if tool is not None:
         steps = (tool, *steps)
     return Script(name, about, fitted == "none", speed, steps, expected)
 
 
-def _steps(value: YamlValue, setting: ScriptContext) -> tuple[LocatedStep, ...]:
-    found: list[LocatedStep] = []
-    problems: list[Problem] = []
-    for item in value.items if value.kind == "list" else ():
+def _let(value: YamlValue) -> Scope:
+    """Return the named values; each may use those before it."""
+    scope = Scope()
+    problems: list[Problem] = list(Fields(value, "the values").problems)
+    for name, inner in value.fields:
         try:
-            found += _step(item, setting)
+            scope = scope.having(name, inner)
         except ScriptError as error:
             problems += error.problems
-        if len(found) > MAX_STEPS:
-            text = f"A script has at most {MAX_STEPS} steps, repetitions counted."
-            problems += item.wrong(text).problems
-            break
-    if value.kind != "list" or not value.items:
-        what = "an empty one" if value.kind == "list" else value
-        problems += value.wrong(f"Expected a list of steps, not {what}.").problems
     if problems:
         raise ScriptError(tuple(problems))
-    return tuple(found)
-
-
-def _step(item: YamlValue, setting: ScriptContext) -> tuple[LocatedStep, ...]:
-    """Return one step, or the steps of a ``repeat``."""
-    name, value = item, YamlValue(item.line, item.column, None, "nothing")
-    if item.kind == "mapping":
-        if len(item.fields) != 1:
-            names = ", ".join(str(name.held) for name, _ in item.fields)
-            raise item.wrong(f"A step must be one name with its value, not {names or 'none'}.")
-        ((name, value),) = item.fields
-    known = (*STEPS, "repeat")
-    if name.held not in known:
-        raise name.wrong(f"There is no step {name}{read.or_known(str(name.held), known)}")
-    if name.held != "repeat":
-        return (LocatedStep(STEPS[str(name.held)].read(value, setting), *_at(name)),)
-    fields = Fields(value, "a repeat")
-    times = fields.need("times", read.whole(1, MAX_REPETITIONS), 1)
-    steps = fields.need("steps", lambda inner: _steps(inner, setting), ())
-    fields.done()
-    if times * len(steps) > MAX_STEPS:
-        raise name.wrong(f"This gives {times * len(steps)} steps; the maximum is {MAX_STEPS}.")
-    return steps * times
+    return scope
 
 
 def _poses(value: YamlValue, *, in_base: bool) -> dict[str, StepTarget]:

@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from katana450.errors import InputError
+from katana450.extensions.programs.expression import PLAIN
 
 MAX_BYTES = 64 * 1024
 """[bytes] Maximum size of a script."""
@@ -56,6 +57,8 @@ class YamlValue:
         held: a text, a list, or pairs of name and value; None for null.
         kind: ``text``, ``whole``, ``number``, ``list``, ``mapping``, ``nothing`` or ``other``.
         number: the number that the text stands for; None if it stands for none.
+        unit: kind of quantity of the number, see ``expression.Quantity``.
+        why: why a text is not an expression with a value; empty if that was not tried.
     """
 
     line: int
@@ -63,6 +66,8 @@ class YamlValue:
     held: str | tuple[YamlValue, ...] | tuple[tuple[YamlValue, YamlValue], ...] | None
     kind: str
     number: float | None = None
+    unit: str = PLAIN
+    why: str = ""
 
     @property
     def items(self) -> tuple[YamlValue, ...]:

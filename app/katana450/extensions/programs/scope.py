@@ -1,0 +1,86 @@
+"""The named values of a script: numbers for expressions, and anything else by name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from katana450.extensions.programs.expression import (
+    FUNCTIONS,
+    UNITS,
+    ExpressionError,
+    Quantity,
+    evaluate,
+)
+from katana450.extensions.programs.source import YamlValue
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+"""Pattern of a name."""
+
+RESERVED = frozenset(
+    {*UNITS, *FUNCTIONS, "x", "y", "z", "pi", "open", "closed", "keep", "roomiest"}
+)
+"""Words with a meaning of their own."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """The values that names stand for at one place of a script.
+
+    Attributes:
+        values: all values by their names.
+        numbers: those that are numbers, and the numbers in mappings and lists, by names such as
+            ``corner.x`` and ``corner.0``.
+    """
+
+    values: Mapping[str, YamlValue] = field(default_factory=dict)
+    numbers: Mapping[str, Quantity] = field(default_factory=dict)
+
+    def having(self, name: YamlValue, value: YamlValue) -> Scope:
+        """Return the scope with one more value, in which the names so far may be used.
+
+        Raises ScriptError if ``name`` is no name for a value.
+        """
+        word = str(name.held)
+        if name.kind != "text" or not NAME.fullmatch(word):
+            raise name.wrong(f"Expected a name of letters, digits and _, not {name}.")
+        if word in RESERVED:
+            raise name.wrong(f"{word!r} has a meaning of its own. Choose another name.")
+        bound = self.bound(value)
+        numbers = {key: n for key, n in self.numbers.items() if not key.startswith(f"{word}.")}
+        numbers.pop(word, None)
+        if bound.number is not None:
+            numbers[word] = Quantity(bound.number, bound.unit)
+        parts: list[tuple[object, YamlValue]] = []
+        if bound.kind == "mapping":
+            parts = [(part.held, inner) for part, inner in bound.fields]
+        elif bound.kind == "list":
+            parts = list(enumerate(bound.items))
+        for part, inner in parts:
+            if inner.number is not None:
+                numbers[f"{word}.{part}"] = Quantity(inner.number, inner.unit)
+        return Scope({**self.values, word: bound}, numbers)
+
+    def bound(self, value: YamlValue) -> YamlValue:
+        """Return ``value`` with names and expressions in it replaced by what they stand for."""
+        match value.kind:
+            case "mapping":
+                pairs = tuple((name, self.bound(inner)) for name, inner in value.fields)
+                return replace(value, held=pairs)
+            case "list":
+                return replace(value, held=tuple(self.bound(inner) for inner in value.items))
+            case "text":
+                return self._bound_text(value)
+        return value
+
+    def _bound_text(self, value: YamlValue) -> YamlValue:
+        text = str(value.held)
+        if text in self.values:
+            # Errors are reported where the name is used.
+            return replace(self.values[text], line=value.line, column=value.column)
+        try:
+            found = evaluate(text, self.numbers)
+        except ExpressionError as error:
+            return replace(value, why=str(error))
+        return replace(value, kind="number", number=found.value, unit=found.kind)
