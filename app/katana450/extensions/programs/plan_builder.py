@@ -17,14 +17,13 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.reaching import branches_near, reaching, unreached
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.tracker import leap
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.curve import Curve
@@ -272,7 +271,7 @@ class PlanBuilder:
         """Return the joints (5,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
             return self.plan_context.arm.chain.check_q(place.joints)
-        return self.joints_of(self.target_at(place), place.branch)
+        return self.joints_of(self.target_at(place), place.branch, in_base=place.in_base)
 
     def target_at(self, place: StepTarget, now: ToolTarget | None = None) -> ToolTarget:
         """Return the tool pose at ``place``, which has no joints; ``now`` gives absent values."""
@@ -283,34 +282,19 @@ class PlanBuilder:
         pitch = now.pitch if place.pitch is None else place.pitch
         return ToolTarget(p, pitch, now.roll if place.roll is None else place.roll)
 
-    def joints_of(self, target: ToolTarget, branch: Branch | None = None) -> FloatArray:
+    def joints_of(
+        self, target: ToolTarget, branch: Branch | None = None, *, in_base: bool = False
+    ) -> FloatArray:
         """Return the joints (5,) [rad] for ``target``, on the present branch if possible.
 
-        Raises InputError with the smallest error found.
+        Raises InputError with the nearest places; ``in_base``: it gives them in the base frame.
         """
-        here = branch_of(self.chain, self.q)
-        nearest = ""
-        for tried in self.branches(branch):
-            # With the other shoulder posture the same tool pose has other pitch and roll values.
-            turned = branch is None and tried.shoulder != here.shoulder
-            pose = target.turned_round() if turned else target
-            best = leap(self.chain, self.q, pose, tried, Priority.POSE)
-            if max(best.position_error, best.rotation_error) <= EXACT:
-                return best.q
-            if not nearest:
-                millimetres, angle = 1e3 * best.position_error, np.degrees(best.rotation_error)
-                nearest = f"{millimetres:.3g} mm and {angle:.3g} deg off on the branch {tried}"
-        x, y, z = (1e3 * target.position).tolist()
-        raise InputError(
-            f"The tool {self.state.tool} cannot be at ({x:.1f}, {y:.1f}, {z:.1f}) mm in the "
-            f"shoulder frame with a pitch of {np.degrees(target.pitch):.1f} deg: the nearest is "
-            f"{nearest}."
-        )
+        found = reaching(self.chain, self.q, target, branch)
+        if found is None:
+            T = self.plan_context.T_base_shoulder if in_base else None
+            raise InputError(unreached(self.chain, self.q, target, branch, self.state.tool, T))
+        return found
 
     def branches(self, wanted: Branch | None) -> tuple[Branch, ...]:
         """Return the branches to try, in their order; only ``wanted`` if it is given."""
-        if wanted is not None:
-            return (wanted,)
-        here = branch_of(self.chain, self.q)
-        near = sorted(BRANCHES, key=lambda each: (each.shoulder != here.shoulder, each != here))
-        return tuple(near)
+        return branches_near(self.chain, self.q) if wanted is None else (wanted,)

@@ -1,0 +1,57 @@
+"""Test the message for a place out of reach: what it suggests can be copied, and is reached."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from katana450.errors import InputError
+from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.script import parse
+from tests.programs.conftest import Stage
+
+PLACE = "frame: {frame}\nsteps:\n  - move: {{x: {x}, y: {y}, z: {z}, pitch: {pitch}, roll: 0}}\n"
+PITCH = re.compile(r"`pitch: (\S+?)`")
+POINT = re.compile(r"`\{x: (\S+), y: (\S+), z: (\S+)\}`")
+
+
+@pytest.fixture
+def builder(stage: Stage) -> PlanBuilder:
+    return PlanBuilder(stage.plan_context, stage.begin())
+
+
+def refusal(builder: PlanBuilder, frame: str, p: tuple[float, ...], pitch: float) -> str:
+    """Return why the tool cannot be at ``p`` [mm] with ``pitch`` [deg]; empty if it can."""
+    text = PLACE.format(frame=frame, x=p[0], y=p[1], z=p[2], pitch=pitch)
+    (step,) = parse(text).steps
+    try:
+        # Only whether it can be reached; the way there is not planned.
+        builder.joints_at(step.step.place)  # type: ignore[attr-defined]
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("frame", ["shoulder", "base"])
+def test_suggested_places_are_reached(builder: PlanBuilder, frame: str) -> None:
+    rng = np.random.default_rng(19)
+    pitches = points = 0
+    for _ in range(60):
+        *p, pitch = np.round(rng.uniform((-600, -600, -300, -90), (700, 600, 600, 90)), 1).tolist()
+        why = refusal(builder, frame, tuple(p), pitch)
+        if found := PITCH.search(why):
+            pitches += 1
+            assert refusal(builder, frame, tuple(p), float(found[1])) == ""
+        if found := POINT.search(why):
+            points += 1
+            assert refusal(builder, frame, tuple(map(float, found.groups())), pitch) == ""
+        assert not why or f"({p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f}) mm in the {frame} frame" in why
+    assert pitches > 2
+    assert points > 20
+
+
+def test_metres_are_suspected(builder: PlanBuilder) -> None:
+    why = refusal(builder, "base", (0.3, 0.0, 0.2), 0.0)
+    assert "Lengths are in mm here" in why
