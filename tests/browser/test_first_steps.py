@@ -12,6 +12,7 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, clear_stop, prepare, take
+from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, in_sizes_and_schemes
 from tests.gateway.slow_link import SlowLink
 
 WORKER = """
@@ -49,7 +50,7 @@ SETTINGS = """
 """
 """Script that counts the frames with viser's settings for developers in an open panel."""
 
-SIZES = {"wide": (1440, 900), "portrait": (390, 844), "landscape": (844, 390)}
+SIZES = {"wide": WIDE, "portrait": PORTRAIT, "landscape": LANDSCAPE}
 
 NO_STORAGE = """for (const each of ["localStorage", "sessionStorage"])
     Object.defineProperty(window, each, {get() {
@@ -246,21 +247,11 @@ def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
     assert hit == "welcome"
 
 
-@pytest.mark.parametrize(
-    ("size", "scheme"),
-    [
-        ("wide", "light"),
-        ("portrait", "dark"),
-        pytest.param("landscape", "light", marks=pytest.mark.long),
-        pytest.param("wide", "dark", marks=pytest.mark.long),
-        pytest.param("portrait", "light", marks=pytest.mark.long),
-        pytest.param("landscape", "dark", marks=pytest.mark.long),
-    ],
-)
+@in_sizes_and_schemes(SIZES, ("wide", "light"), ("portrait", "dark"))
 def test_card_fits_every_size(
     server: AppServer, open_page: OpenPage, size: str, scheme: str, artefacts: Path
 ) -> None:
-    touch = {} if size == "wide" else {"has_touch": True, "is_mobile": True}
+    touch = {} if size == "wide" else PHONE
     page = open_page(
         server.url,
         nodes=("/arm", MOVE),
