@@ -18,6 +18,7 @@
   const sheet = new CSSStyleSheet();
   sheet.replaceSync(`${Viser.STEADY}
     html[data-theme=dark] { color-scheme: dark; background: #14181d }
+    html[data-used] ${Viser.HINT} { visibility: hidden !important }
     input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
   document.adoptedStyleSheets.push(sheet);
 
@@ -71,6 +72,17 @@
   // viser's own settings fold away slowly. They are shown again when a person asks for them.
   for (const kind of ["pointerdown", "keydown"])
     window.addEventListener(kind, () => loaded && delete document.documentElement.dataset.loading, { capture: true });
+
+  // The hint of a control goes when the control is used, and may return when the pointer has left it.
+  let used = null;
+  for (const kind of ["pointerdown", "keydown"])
+    window.addEventListener(kind, ({ target }) => {
+      used = Viser.rowOf(target);
+      document.documentElement.dataset.used = "";
+    }, { capture: true });
+  window.addEventListener("pointerover", ({ target, buttons }) => {
+    if (!buttons && Viser.rowOf(target) !== used) delete document.documentElement.dataset.used;
+  });
 
   // The server sends every window the light theme. It is changed to the window's theme here, before
   // viser gets it. This needs no answer of the server, which a slow page would miss.

@@ -146,7 +146,8 @@
     byId("poster").querySelector("p").textContent =
       "This browser cannot draw the scene: WebGL 2 is off or missing. Turn on hardware acceleration in its settings, or use another browser. STOP and Jog work without it.";
   }
-  window.katana = { key, blur, toast, drawn, view: null };
+  const closeSheets = () => ["jog", "objects"].forEach((id) => byId(id).hidden || show(id, false));
+  window.katana = { key, blur, toast, drawn, closeSheets, view: null };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
   window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page}`));
@@ -162,7 +163,7 @@
   function act(label, request, main) {
     const button = document.createElement("button");
     button.type = "button";
-    button.textContent = label;
+    button.textContent = button.title = label;
     button.classList.toggle("main", Boolean(main));
     button.addEventListener("click", () => say(request));
     return button;
@@ -172,13 +173,17 @@
     const { mine, holder, role, asked, asking: requests, others } = status;
     if (role === "viewer") return [];
     // Requests are shown only to the driver and to the owner of a driving program, which ends when the arm is given away.
-    const whom = (name) => (requests.length > 1 ? ` ${name}` : "");
-    const buttons = requests.flatMap(({ number, name }) => [
-      act(mine ? `Give to ${name}` : `Allow${whom(name)}`, { do: "give", to: number }, true),
-      act(`Refuse${whom(name)}`, { do: "decline", to: number }),
-    ]);
+    // They are answered one after the other.
+    const [first] = requests;
+    /** @type {HTMLElement[]} */
+    const buttons = first
+      ? [
+          act(mine ? `Give to ${first.name}` : "Allow", { do: "give", to: first.number }, true),
+          act("Refuse", { do: "decline", to: first.number }),
+        ]
+      : [];
     if (mine) {
-      const more = others.filter(({ number }) => !requests.some((each) => each.number === number));
+      const more = others.filter(({ number }) => number !== first?.number);
       if (more.length) buttons.push(handOver(more));
       return [...buttons, act("Release", { do: "release_lease" })];
     }
@@ -240,8 +245,8 @@
     clear.title = status.wait;
     byId("go").hidden = !mayGo();
     const { mine, holder, participants, asking: requests } = status;
-    const names = requests.map(({ name }) => name).join(", ");
-    const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
+    const waiting = requests.length > 1 ? `, ${requests.length - 1} more` : "";
+    const request = requests.length ? `${requests[0].name} asks for it${waiting}` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : status.own_program ? "Your program drives" : `${holder} drives`);
     // Programs are included.
     const connected = participants > 1 ? `, ${participants} connected` : "";
@@ -356,6 +361,7 @@
     byId(id).hidden = !shown;
     byId(`${id}-button`).setAttribute("aria-expanded", String(shown));
     if (id === "jog") Jog.show(shown);
+    if (shown) scene.contentWindow.katanaScene?.fold?.();
   }
   // Both sheets lie in the same corner.
   for (const [id, other] of [["jog", "objects"], ["objects", "jog"]])

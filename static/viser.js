@@ -5,11 +5,15 @@ const Viser = (() => {
   // Parameters of the page's address that set camera and resolution.
   const PARAMETER = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr)$/;
   const NUMBER_BOX = "input.mantine-NumberInput-input";
-  // Below this width the panel lies over the scene. Selectors of the panel's box, handle and content.
+  // Below this width the panel lies over the scene. Selectors of the panel's box, handle and content,
+  // and its colour.
   const NARROW = "(max-width: 36em)";
   const PANEL = '.mantine-Paper-root[style*="position: fixed"]';
   const PANEL_HANDLE = `${PANEL} [style*="height: 3.5em"]`;
   const PANEL_CONTENT = `${PANEL} [style*="width: 20em"]`;
+  const PANEL_GROUND = "var(--mantine-color-body)";
+  // The hint of a control, which lies over other ones.
+  const HINT = "[role=tooltip]";
   // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
   // miscounts and the picture stays faint. It also starts with the light theme. Without controls from
   // the server, as before each connection, its panel shows settings for developers.
@@ -119,9 +123,12 @@ const Viser = (() => {
     }
   }
 
+  // Return the row of the control in which `element` is, or a larger part of the page outside of them.
+  const rowOf = (element) => element.closest?.(":has(label[for])");
+
   // Return id and label of the control of a number box, and the index of the box in it.
   function controlOf(box) {
-    const row = box.closest(":has(label[for])");
+    const row = rowOf(box);
     const label = row?.querySelector("label[for]");
     const index = row ? [...row.querySelectorAll(NUMBER_BOX)].indexOf(box) : 0;
     return { id: label?.htmlFor, label: label?.textContent ?? "", index };
@@ -147,8 +154,8 @@ const Viser = (() => {
   }
 
   return {
-    PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, STEADY,
-    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, controlOf, fill, type, picture,
+    PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, HINT, STEADY,
+    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,
     // Return the three.js object of a node; "" is viser's world.

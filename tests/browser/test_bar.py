@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import itertools
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -12,13 +13,47 @@ import pytest
 from playwright.sync_api import Page
 
 from katana450.arm.control.lease import Role
+from katana450.client import connect
 from katana450.resources import STATIC
+from katana450.server.api import requests
 from katana450.server.web.access_links import AccessFile
+from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
-from tests.browser.session import Truth, clear_stop
+from tests.browser.session import Truth, bar, clear_stop, take
+from tests.browser.sight import contrast, overlap
+from tests.browser.sizes import (
+    LANDSCAPE,
+    PHONE,
+    PORTRAIT,
+    SCHEMES,
+    WIDE,
+    in_sizes_and_schemes,
+)
 
 SIZES = {"phone": (390, 844), "tablet": (820, 1180), "desk": (1440, 900)}
+
+ROOM = {WIDE: 240, (1280, 800): 240, (820, 1180): 240, PORTRAIT: 180, LANDSCAPE: 180}
+"""Sizes of the window, and the minimum width of the reason of a stop in the bar [px]."""
+
+AA = 4.5
+"""Minimum contrast of a text to its background (WCAG 2.2, 1.4.3)."""
+
+PARTS = """() => {
+    const shown = (each) => each.checkVisibility() && each.getBoundingClientRect().width > 0;
+    const found = (selector) => [...document.querySelectorAll(selector)].filter(shown);
+    const parts = found("header button, header select, #speed, #mode, #who p");
+    const cut = found("header button").filter((each) => each.scrollWidth > each.clientWidth + 1);
+    return {
+        height: document.querySelector("header").offsetHeight,
+        boxes: Object.fromEntries(parts.map((each) => {
+            const { x, y, width, height } = each.getBoundingClientRect();
+            return [each.id || each.textContent, { x, y, width, height }];
+        })),
+        cut: cut.map((each) => each.textContent),
+    };
+}"""
+"""Script that returns the height of the bar, the boxes of its parts, and texts that are cut."""
 
 
 @pytest.fixture
@@ -31,17 +66,7 @@ def sized(window: ViserPage) -> Iterator[Page]:
     window.page.emulate_media(color_scheme="light")
 
 
-@pytest.mark.parametrize(
-    ("size", "scheme"),
-    [
-        ("phone", "dark"),
-        ("tablet", "light"),
-        ("desk", "light"),
-        pytest.param("phone", "light", marks=pytest.mark.long),
-        pytest.param("tablet", "dark", marks=pytest.mark.long),
-        pytest.param("desk", "dark", marks=pytest.mark.long),
-    ],
-)
+@in_sizes_and_schemes(SIZES, ("phone", "dark"), ("tablet", "light"), ("desk", "light"))
 def test_stop_is_always_visible_and_the_largest_button(
     page: ViserPage, sized: Page, truth: Truth, artefacts: Path, size: str, scheme: str
 ) -> None:
@@ -80,6 +105,80 @@ def test_stop_is_always_visible_and_the_largest_button(
         places.append(sized.locator("#scene").bounding_box())
     assert places[0] == places[1]
     clear_stop(page, truth)
+
+
+@pytest.mark.parametrize("size", ROOM)
+def test_bar_keeps_its_height_and_the_reason_its_room(
+    server: AppServer, open_page: OpenPage, artefacts: Path, size: tuple[int, int]
+) -> None:
+    truth = Truth(server)
+    options = PHONE if size in (PORTRAIT, LANDSCAPE) else {}
+    page = open_page(server.url, nodes=("/arm",), window=size, **options)
+    heights = set()
+
+    def look(state: str) -> None:
+        """Note the height of the bar, and check that its parts neither overlap nor are cut."""
+        page.page.wait_for_timeout(300)
+        page.keep(artefacts / f"bar-{size[0]}-{state}.png")
+        found = page.page.evaluate(PARTS)
+        heights.add(found["height"])
+        for one, other in itertools.combinations(found["boxes"].items(), 2):
+            assert not overlap(one[1], *other[1].values()), (state, one, other)
+        for name, box in found["boxes"].items():
+            assert 0.0 <= box["x"] <= size[0] - box["width"] + 0.5, (state, name)
+        assert not [each for each in found["cut"] if "long name" not in each], state
+
+    look("free")
+    take(page)
+    look("driving")
+    with (
+        connect(server.url, "Ben") as ben,
+        connect(server.url, "An arm driver with a long name") as other,
+    ):
+        look("others")
+        ben.ask(requests.Ask())
+        page.page.get_by_role("button", name="Give to Ben").wait_for()
+        look("asked")
+        page.press_in_bar("STOP")
+        truth.wait(mood="stopped")
+        page.page.wait_for_selector("#clear-stop:not([hidden])")
+        assert page.page.evaluate("document.getElementById('why').clientWidth") >= ROOM[size]
+        look("stopped")
+        # Requests are answered one after the other.
+        other.ask(requests.Ask())
+        page.wait_until(lambda: bar(page, "name") == "Ben asks for it, 1 more", "both")
+        look("two")
+        page.press_in_bar("Refuse")
+        page.wait_until(lambda: "long name asks for it" in bar(page, "name"), "the other")
+        look("long")
+        page.press_in_bar("Refuse")
+        clear_stop(page, truth)
+    assert len(heights) == 1, heights
+    assert page.errors == []
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_refusals_can_be_read(window: ViserPage, sized: Page, scheme: str) -> None:
+    take(window)
+    sized.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+    sized.click("#more-button")
+    sized.get_by_label("Your name").fill("")
+    sized.keyboard.press("Enter")
+    sized.locator("#own-name-why", has_text="empty").wait_for()
+    colours = """(each) => [getComputedStyle(each).color,
+        getComputedStyle(each.closest("dialog, section")).backgroundColor]"""
+    assert contrast(*sized.locator("#own-name-why").evaluate(colours)) >= AA
+    sized.click("#more-button")
+    sized.click("#objects-button")
+    sized.set_input_files(
+        "#object-file", {"name": "part.stl", "mimeType": "model/stl", "buffer": b"not a part"}
+    )
+    sized.locator("#read.bad").wait_for()
+    assert contrast(*sized.locator("#read").evaluate(colours)) >= AA
+    sized.click("#objects-button")
+    # The browser reports the answer to the file.
+    assert all("422" in each for each in window.errors)
+    window.errors.clear()
 
 
 def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import FloatRect
 
 from katana450.arm.control.state import Status
 from katana450.client import connect
@@ -21,13 +18,13 @@ from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import take
+from tests.browser.sight import contrast, overlap, wait_whole, whole
+from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, WIDER
 from tests.conftest import LONG
 from tests.gateway.slow_link import SlowLink
 
 MOVE = "/target/move"
-WIDE, WIDER, PORTRAIT, LANDSCAPE = (1440, 900), (1920, 1080), (390, 844), (844, 390)
 SIZES = (WIDE, WIDER, PORTRAIT, LANDSCAPE)
-PHONE = {"has_touch": True, "is_mobile": True}
 
 MOODS = {*(status.value for status in Status), "moving", "program", "planning", "lost"}
 """All moods of an arm whose state is known."""
@@ -44,32 +41,6 @@ PRESSABLE = """() => Object.fromEntries(
 
 LEAST_CONTRAST = 3.0
 """Minimum contrast of a lamp to its background (WCAG 2.2, 1.4.11)."""
-
-SHOWN = """() => {
-    // Each vertex of the arm and of the gizmo, as the camera sees it: pixels of viser's document.
-    const { camera, canvas, nodeRefFromName } = __viserMutable;
-    const { left, top, width, height } = canvas.getBoundingClientRect();
-    camera.updateMatrixWorld();
-    const found = [];
-    for (const name of ["/arm", "/target/move"])
-        nodeRefFromName[name].traverseVisible((object) => {
-            const attributes = object.geometry?.attributes;
-            const vertices = attributes?.instanceStart ?? attributes?.position;
-            if (!vertices) return;
-            object.updateWorldMatrix(true, false);
-            const step = Math.ceil(vertices.count / 200);
-            for (let i = 0; i < vertices.count; i += step) {
-                const point = camera.position.clone()
-                    .set(vertices.getX(i), vertices.getY(i), vertices.getZ(i))
-                    .applyMatrix4(object.matrixWorld).project(camera);
-                found.push([left + (1 + point.x) / 2 * width, top + (1 - point.y) / 2 * height]);
-            }
-        });
-    const outermost = [0, 1].flatMap((axis) => [Math.min, Math.max].map((pick) =>
-        found.reduce((a, b) => pick(a[axis], b[axis]) === a[axis] ? a : b)));
-    const uncovered = outermost.every(([x, y]) => document.elementFromPoint(x, y) === canvas);
-    return { outermost, uncovered, canvas: [left, top, width, height], count: found.length };
-}"""
 
 NOTED = """
     window.shades = new Set();
@@ -103,39 +74,6 @@ def desk(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
     with windows.open(server.url, nodes=("/arm", MOVE), window=WIDE, own_camera=True) as page:
         yield page
         assert page.errors == []
-
-
-def shown(page: ViserPage) -> dict[str, Any]:
-    page.wait_drawn()
-    found: dict[str, Any] = page.frame.evaluate(SHOWN)
-    return found
-
-
-def whole(page: ViserPage) -> bool:
-    """Return whether arm and gizmo are in the picture and not covered by either document."""
-    found = shown(page)
-    assert found["count"] > 1000
-    left, top, width, height = found["canvas"]
-    frame = page.frame.frame_element().bounding_box()
-    assert frame is not None
-    window = page.page.viewport_size
-    assert window is not None
-    for x, y in found["outermost"]:
-        if not (left < x < left + width and top < y < top + height):
-            return False
-        place = [frame["x"] + x, frame["y"] + y]
-        if not (0 < place[0] < window["width"] and 0 < place[1] < window["height"]):
-            return False
-        if page.page.evaluate("(at) => document.elementFromPoint(...at)?.id", place) != "scene":
-            return False
-    return bool(found["uncovered"])
-
-
-def wait_whole(page: ViserPage, what: str) -> None:
-    page.wait_until(lambda: whole(page), f"arm and gizmo in the picture {what}", seconds=15.0)
-    # The state must last.
-    page.page.wait_for_timeout(300)
-    assert whole(page), what
 
 
 def resize(page: ViserPage, size: tuple[int, int]) -> None:
@@ -186,7 +124,7 @@ def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
     assert np.allclose(eye(desk), turned, atol=1e-3)
     assert not whole(desk)
     # After a view button, the view is fitted again, also at later sizes.
-    desk.frame.get_by_text("Katana450", exact=True).first.click()
+    desk.frame.locator("#k450-sheet").click()
     desk.page.wait_for_timeout(500)
     desk.open_tab("Scene")
     desk.click_button("Front")
@@ -225,18 +163,6 @@ def test_every_mood_has_a_visible_lamp(desk: ViserPage) -> None:
         assert lamp("blocked") == lamp("limited") == ("rgb(196, 117, 0)", ground)
 
 
-def contrast(one: str, other: str) -> float:
-    """Return the contrast ratio (WCAG 2.2) of two colours in CSS notation."""
-
-    def luminance(colour: str) -> float:
-        parts = [int(part) / 255 for part in colour[4:-1].split(",")]
-        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
-        return math.fsum(k * c for k, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
-
-    low, high = sorted(map(luminance, (one, other)))
-    return (high + 0.05) / (low + 0.05)
-
-
 def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
@@ -260,12 +186,11 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
         sky = np.median(page.scene_picture()[5:15].reshape(-1, 3), axis=0)
         assert sky.max() < max(DARK.floor) + 30
         # The panel is folded until a person opens it; the scene then gets the remaining height.
-        assert not in_view(page, "Home")
-        page.frame.get_by_text("Katana450", exact=True).first.tap()
-        page.wait_until(lambda: in_view(page, "Home"), "the panel")
+        assert not in_view(page, "1 base turn")
+        page.frame.locator("#k450-sheet").tap()
+        page.wait_until(lambda: in_view(page, "1 base turn"), "the panel")
         wait_whole(page, "above the panel")
         page.keep(artefacts / "phone-panel.png")
-        page.frame.get_by_text("Katana450", exact=True).first.tap()
         page.page.tap("#jog-button")
         wait_whole(page, "above the pads")
         for key in page.page.locator("#jog kbd").all():
@@ -330,12 +255,6 @@ def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
     page.page.tap("#help button")
     assert not page.page.get_by_role("dialog").is_visible()
     page.press_in_bar("Clear stop")
-
-
-def overlap(box: FloatRect, x: float, y: float, width: float, height: float) -> bool:
-    """Return whether a box and a rectangle overlap."""
-    across = min(box["x"] + box["width"], x + width) - max(box["x"], x)
-    return across > 0 and min(box["y"] + box["height"], y + height) > max(box["y"], y)
 
 
 def overhang(page: ViserPage) -> float:

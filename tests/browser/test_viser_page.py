@@ -218,6 +218,26 @@ def test_number_boxes_are_found_and_filled(page: ViserPage) -> None:
         assert float(ask(page, f"Viser.shownIn({boxes}[0])")) == 1.2
 
 
+def test_hint_belongs_to_the_row_of_its_control(page: ViserPage) -> None:
+    page.frame.get_by_role("button", name="Front", exact=True).hover()
+    shown = "document.querySelectorAll(Viser.HINT).length"
+    with part("HINT"):
+        page.wait_until(lambda: ask(page, shown) == 1, "the hint")
+        assert ask(page, "document.querySelector(Viser.HINT).textContent") == "Where to look from"
+    with part("rowOf"):
+        row = """(() => {
+            const [view, other] = ["Side", "Front"].map((text) =>
+                [...document.querySelectorAll("button")].find((each) => each.textContent === text));
+            const box = document.querySelector(Viser.NUMBER_BOX);
+            const row = Viser.rowOf(view);
+            const labels = row.querySelectorAll("label[for]").length;
+            return [row === Viser.rowOf(other), row === Viser.rowOf(box), labels];
+        })()"""
+        assert ask(page, row) == [True, False, 1]
+    page.page.mouse.move(300, 300)
+    page.wait_until(lambda: ask(page, shown) == 0, "no hint")
+
+
 def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=NODES, window=PORTRAIT, script=script())
     count = "document.querySelectorAll(Viser.{}).length"
@@ -237,6 +257,15 @@ def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page
         )
     with part("PANEL_CONTENT"):
         assert ask(page, count.format("PANEL_CONTENT")) >= 1
+    with part("PANEL_GROUND"):
+        colour = """(() => {
+            const panel = document.querySelector(Viser.PANEL);
+            const before = getComputedStyle(panel).backgroundColor;
+            panel.style.background = Viser.PANEL_GROUND;
+            return [before, getComputedStyle(panel).backgroundColor];
+        })()"""
+        shown, ours = ask(page, colour)
+        assert shown == ours != "rgba(0, 0, 0, 0)"
     page.page.set_viewport_size({"width": 1280, "height": 800})
     with part("NARROW"):
         page.wait_until(lambda: ask(page, count.format("PANEL")) == 0, "the docked panel")

@@ -26,7 +26,7 @@ def furnish(server: viser.ViserServer) -> None:
     server.initial_camera.look_at = TARGET
     slider = gui.add_slider("Height", min=-1.0, max=2.0, step=0.1, initial_value=0.0)
     gui.add_vector3("Point", (1.0, 2.0, 3.0), min=(-5.0, -6.0, -7.0), max=(5.0, 6.0, 7.0), step=0.5)
-    view = gui.add_button_group("View", ("Front", "Side"))
+    view = gui.add_button_group("View", ("Front", "Side"), hint="Where to look from")
 
     async def lift(_: object) -> None:
         box.position = (0.0, 0.0, slider.value)
