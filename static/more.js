@@ -79,6 +79,10 @@ const More = (() => {
       if (view) copyView(view);
       else toast("There is no view yet. Wait until the scene is shown.");
     });
+    byId("phone-button").addEventListener("click", async () => {
+      const { toggle } = await import("./more/phone.js");
+      toggle(toast);
+    });
   }
 
   // Take the name in a status; use the kept one for a person whom the server has named.

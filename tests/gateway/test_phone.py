@@ -1,0 +1,81 @@
+"""The address of this server for a phone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from urllib.parse import unquote_to_bytes
+
+import pytest
+
+from katana450.server.web import phone
+from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
+from katana450.server.web.phone import LINK_REQUIRED, LOOPBACK_ONLY, phone_address
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import ask, enter
+
+LOOPBACK = Address(LOOPBACK_NAMES, any_address=False, secure=False)
+OPEN = Address(LOOPBACK_NAMES | {"robot"}, any_address=True, secure=False)
+
+
+@pytest.fixture(autouse=True)
+def in_a_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(phone, "own_address", lambda: "192.168.1.5")
+
+
+@pytest.mark.parametrize(
+    ("address", "host", "url"),
+    [
+        (OPEN, "robot:8080", "http://robot:8080"),
+        (OPEN, "10.0.0.7:8080", "http://10.0.0.7:8080"),
+        # The name of this machine for itself is no address for a phone.
+        (OPEN, "127.0.0.1:8080", "http://192.168.1.5:8080"),
+        (OPEN, "localhost:9000", "http://192.168.1.5:8080"),
+        (OPEN, "[::1]:8080", "http://192.168.1.5:8080"),
+        (
+            Address(LOOPBACK_NAMES, any_address=True, secure=True),
+            "127.0.0.1:8080",
+            "https://192.168.1.5:8080",
+        ),
+        (
+            Address(LOOPBACK_NAMES, any_address=False, secure=False, public="https://arm.example"),
+            "127.0.0.1:8080",
+            "https://arm.example",
+        ),
+    ],
+)
+def test_address_is_one_that_a_phone_can_open(address: Address, host: str, url: str) -> None:
+    found = phone_address(address, host, 8080, requires_link=True)
+    assert found.url == url
+    assert LINK_REQUIRED in found.note
+    assert ("Without https" in found.note) == url.startswith("http:")
+    assert found.code is not None
+    assert unquote_to_bytes(found.code.partition(",")[2]).startswith(b"<svg ")
+
+
+def test_server_on_loopback_says_how_to_let_a_phone_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = phone_address(LOOPBACK, "localhost:8080", 8080, requires_link=False)
+    assert (found.url, found.code, found.note) == (None, None, LOOPBACK_ONLY)
+    for option in ("--host", "--access", "--tls-cert"):
+        assert option in found.note
+    monkeypatch.setattr(phone, "own_address", lambda: None)
+    assert phone_address(OPEN, "localhost:8080", 8080, requires_link=False).url is None
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer((*APP, "--host", "0.0.0.0", "--insecure")) as server:
+        yield server
+
+
+def test_address_is_told_to_people_who_are_signed_in(server: AppServer) -> None:
+    url = f"{server.url}/phone"
+    assert ask(url)[0] == 401
+    cookie = enter(server.url)
+    code, _, body = ask(url, Cookie=cookie, Host=f"10.0.0.7:{server.port}")
+    assert code == 200
+    found = json.loads(body)
+    assert found["url"] == f"http://10.0.0.7:{server.port}"
+    assert "Everybody who opens" in found["note"]
+    codes = {ask(url, Cookie=cookie)[0] for _ in range(20)}
+    assert codes == {200, 429}
