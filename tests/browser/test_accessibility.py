@@ -9,9 +9,12 @@ from typing import Any
 import pytest
 from playwright.sync_api import Frame, Page
 
+from katana450.arm.control.messages import PRIORITIES
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.session import take
+from tests.browser.sizes import WIDE
 
 MOVE = "/target/move"
 TABS = ("Drive", "Programs", "Scene")
@@ -85,6 +88,49 @@ def test_every_control_of_the_panel_has_a_name_and_can_be_hit(
     for label in ("x", "y", "z", "p"):
         assert page.frame.get_by_role("textbox", name=label, exact=True).count() >= 1
     assert page.errors == []
+
+
+def test_chosen_option_of_a_list_is_shown_whole(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), window=WIDE)
+    take(page)
+    cut = """() => [...document.querySelectorAll("input[aria-haspopup=listbox]")]
+        .filter((each) => each.checkVisibility())
+        .map((each) => {
+            const style = getComputedStyle(each);
+            const pen = document.createElement("canvas").getContext("2d");
+            pen.font = style.font;
+            // The letters end where the arrow of the list begins.
+            const arrow = each.parentElement.lastElementChild.getBoundingClientRect();
+            const start = each.getBoundingClientRect().left + parseFloat(style.paddingLeft);
+            return [each.value, start + pen.measureText(each.value).width - arrow.left];
+        }).filter(([, over]) => over > 0)"""
+    for priority in PRIORITIES.values():
+        page.choose("Priority", priority)
+        page.wait_until(lambda priority=priority: page.chosen("Priority") == priority, priority)  # type: ignore[misc]
+        assert page.frame.evaluate(cut) == []
+    page.open_tab("Scene")
+    assert page.frame.evaluate(cut) == []
+
+
+def test_hint_goes_when_its_control_is_used(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE))
+    hint = page.frame.get_by_role("tooltip")
+    home = page.frame.get_by_role("button", name="Home", exact=True)
+    fingers = page.frame.get_by_role("button", name="Close", exact=True)
+    for button in (home, fingers):
+        button.hover()
+        hint.wait_for()
+        page.page.mouse.down()
+        hint.wait_for(state="hidden")
+        page.page.mouse.up()
+        # It does not return while the pointer rests there, in viser's delay of 0.5 s.
+        page.page.wait_for_timeout(800)
+        assert not hint.is_visible()
+    # A key counts as use, too.
+    home.hover()
+    hint.wait_for()
+    home.press("Tab")
+    hint.wait_for(state="hidden")
 
 
 def findings(document: Page | Frame) -> Any:

@@ -91,11 +91,11 @@ def test_panel_previews_steers_and_teaches(
     panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
     program_runner.progress = Progress(name="x", by="me", status="running")
-    for label in ("Run", "End"):
+    for label in ("Run", "Step"):
         panel._orders.value = label  # type: ignore[misc]  # as above
         panel._order(ANNA)
     assert [order for _, order in program_runner.requests] == [
-        ProgramOrder.RUN, ProgramOrder.RUN, ProgramOrder.END
+        ProgramOrder.RUN, ProgramOrder.RUN, ProgramOrder.STEP
     ]  # fmt: skip
     assert parse(program_runner.requests[0][0]).name == "Circle with gripper"
 

@@ -129,10 +129,11 @@ STATUS: dict[Status, str] = {
     Status.FAULT: "Fault",
 }
 
+# What comes first is named first. Longer texts are cut in the panel.
 PRIORITIES: dict[Priority, str] = {
-    Priority.POSE: "Position, then orientation",
-    Priority.PITCH: "Pitch, then position",
-    Priority.POSITION: "Position, then pitch",
+    Priority.POSE: "Position, orientation",
+    Priority.PITCH: "Pitch, position",
+    Priority.POSITION: "Position, pitch",
 }
 
 PRIORITY_HINTS: dict[Priority, str] = {

@@ -1,4 +1,4 @@
-"""The panel of programs: choose, preview, run, step and end a script; teach a new one."""
+"""The panel of programs: choose, preview, run and step a script; teach a new one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,6 @@ MAX_TAUGHT_POSTURES = 200
 ORDERS = {
     "Run": ProgramOrder.RUN,
     "Step": ProgramOrder.STEP,
-    "End": ProgramOrder.END,
 }
 """The order that each button gives to the program."""
 
@@ -109,7 +108,7 @@ class ProgramsPanel:
             "Program",
             ("Preview", *ORDERS),
             hint="Preview: plan the script and show the tool's path. Step: run one step, then "
-            "wait. End: end the run or the planning",
+            "wait. The bar pauses and ends the run, and cancels the planning",
         )
         self._orders.on_click(self._guarded(self._order))
         self._look = gui.add_slider(
@@ -176,7 +175,7 @@ class ProgramsPanel:
         button = self._orders.value
         progress = self._steering.progress
         status = "" if progress is None else progress.status
-        if button == "End" or (button != "Preview" and status in RUNS):
+        if button != "Preview" and status in RUNS:
             self._steering.steer(ORDERS[button], actor)
             return
         text = self._scripts.text(self._choice.value)
