@@ -3,7 +3,7 @@
 
 // Name and height of each; the scene leaves at most half of the page. Above the sheet at full height
 // there is room for the buttons and messages that the surrounding page lays over the scene.
-const HEIGHTS = [["folded", "3.5rem"], ["half height", "50vh"], ["full height", "calc(100vh - 120px)"]];
+const HEIGHTS = [["folded", "3.5rem"], ["half height", "50vh"], ["full height", "max(50vh, 100vh - 120px)"]];
 const [HALF, ABOVE] = [0.5, 120]; // fraction of the page, and px, as above
 const TAP = 6; // px, movement up to which a touch is a tap
 const COAST = 120; // ms for which the finger's speed counts as if it moved on
@@ -55,9 +55,11 @@ function choose(next) {
   panel().animate([{ translate: `0 ${change}px` }, { translate: "none" }], { duration: QUICK, easing: "ease-out" });
 }
 
+const highest = () => Math.max(HALF * innerHeight, innerHeight - ABOVE);
+
 // Return the index of the height that is nearest to `tall` px.
 function nearest(tall) {
-  const heights = [button.offsetHeight, HALF * innerHeight, innerHeight - ABOVE];
+  const heights = [button.offsetHeight, HALF * innerHeight, highest()];
   const away = heights.map((each) => Math.abs(each - tall));
   return away.indexOf(Math.min(...away));
 }
@@ -78,7 +80,7 @@ button.addEventListener("pointermove", (event) => {
   if (event.pointerId !== drag?.id) return;
   const up = drag.y - event.clientY;
   if (!dragged && Math.abs(up) < TAP) return;
-  const tall = Math.max(button.offsetHeight, Math.min(innerHeight - ABOVE, drag.from + up));
+  const tall = Math.max(button.offsetHeight, Math.min(highest(), drag.from + up));
   if (dragged && event.timeStamp > drag.at) drag.speed = (tall - drag.tall) / (event.timeStamp - drag.at);
   Object.assign(drag, { tall, at: event.timeStamp });
   dragged = true;
