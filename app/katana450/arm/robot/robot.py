@@ -78,6 +78,13 @@ class Robot:
         """Pose (4, 4) of each link in the root with every joint at zero [m]."""
         return self.frames({})
 
+    def path_to(self, link: Link) -> tuple[Link, ...]:
+        """Return the links from the root to ``link``."""
+        if link.parent is None:
+            return (link,)
+        parent = next(other for other in self.links if other.name == link.parent)
+        return (*self.path_to(parent), link)
+
     def axis(self, joint: Joint) -> FloatArray:
         """Return the unit direction (3,) of ``joint`` in the root's frame at zero."""
         link = next(link for link in self.links if link.joint is joint)

@@ -226,6 +226,20 @@ class State(Answer, frozen=True, kw_only=True):
     fields: tuple[Value, ...] = ()
 
 
+class JointLink(msgspec.Struct, frozen=True, kw_only=True):
+    """The link that a joint moves.
+
+    Attributes:
+        label: Number and name of the joint, for people.
+        path: Names of the links from the root to the link.
+        axis: (3,) Unit direction of the joint in the frame of the link, whose origin is on it.
+    """
+
+    label: str
+    path: list[str]
+    axis: Numbers
+
+
 class Arm(Answer, frozen=True, kw_only=True):
     """The description of the arm.
 
@@ -247,6 +261,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         T_base_shoulder: (4, 4) Frame {S} in the base frame; null for a mechanism that has only
             joints.
         slides: (n,) Whether each joint slides.
+        links: (n,) The link that each joint moves.
         joints_only: Reason for which no tool can be moved to a pose; empty where one can.
     """
 
@@ -264,6 +279,7 @@ class Arm(Answer, frozen=True, kw_only=True):
     gripper_slides: bool
     T_base_shoulder: list[Numbers] | None
     slides: list[bool]
+    links: list[JointLink]
     joints_only: str
 
 

@@ -15,6 +15,7 @@ from katana450.arm.control.messages import finding_text, sentence
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
+from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -175,11 +176,11 @@ def arm(robot: Robot, ready: list[float]) -> answers.Arm:
     if found is None:
         joints = robot.joint_group
         jointed = _Jointed(joints.names, joints.slides, joints.limits, joints.why)
-        return jointed.description(robot.name, ready)
+        return jointed.description(robot, ready)
     names, gripper = found.chain.names, found.gripper
     jointed = _Jointed(names, (False,) * len(names), found.limits)
     return msgspec.structs.replace(
-        jointed.description(robot.name, ready),
+        jointed.description(robot, ready),
         tools={name: M.tolist() for name, M in found.tools.items()},
         default_tool=found.default_tool,
         gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
@@ -196,10 +197,10 @@ class _Jointed(NamedTuple):
     limits: Limits
     why: str = ""
 
-    def description(self, name: str, ready: list[float]) -> answers.Arm:
+    def description(self, robot: Robot, ready: list[float]) -> answers.Arm:
         """Return the description of a mechanism without tools."""
         return answers.Arm(
-            name=name,
+            name=robot.name,
             joints=list(self.names),
             lower=self.limits.lower.tolist(),
             upper=self.limits.upper.tolist(),
@@ -213,8 +214,22 @@ class _Jointed(NamedTuple):
             gripper_slides=False,
             T_base_shoulder=None,
             slides=list(self.slides),
+            links=_joint_links(robot, self.names),
             joints_only=self.why,
         )
+
+
+def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
+    """Return the link that each of the joints ``names`` moves."""
+    moved = {link.joint.name: link for link in robot.links if link.joint is not None}
+    return [
+        answers.JointLink(
+            label=label,
+            path=[each.name for each in robot.path_to(moved[name])],
+            axis=robot.joints[name].axis.tolist(),
+        )
+        for name, label in zip(names, joint_labels(robot), strict=True)
+    ]
 
 
 def event_log(lines: Sequence[LogLine]) -> answers.EventLog:

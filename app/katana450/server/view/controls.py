@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -12,8 +11,6 @@ import viser
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.messages import AXIS_NAMES
-from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError, LeaseError
 
 WORTH_SENDING = 2e-6
@@ -113,18 +110,6 @@ def refuse(
         event.client.add_notification(
             "Not done", str(error), color="red", auto_close_seconds=READ_IN
         )
-
-
-def joint_labels(robot: Robot) -> tuple[str, ...]:
-    """Return the label of each joint: its number, as in messages, and its name.
-
-    Joints of an arm that the robot description only numbers have the names of a five-axis arm.
-    """
-    arm = robot.arm
-    names = robot.joint_group.names if arm is None else arm.chain.names
-    if arm is not None and all(re.fullmatch(r"axis_?\d+", name) for name in names):
-        names = AXIS_NAMES
-    return tuple(f"{number} {name}" for number, name in enumerate(names, start=1))
 
 
 def ends(lower: float, upper: float) -> tuple[float, float]:

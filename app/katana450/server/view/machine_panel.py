@@ -13,12 +13,12 @@ from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.messages import signed
 from katana450.arm.control.state import State
+from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.controls import (
     GestureGate,
     Listen,
     ends,
-    joint_labels,
     listener,
     set_slider,
 )

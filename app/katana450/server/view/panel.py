@@ -10,10 +10,11 @@ import viser
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import UNCHECKED, degrees, millimetres
 from katana450.arm.control.state import State
+from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
 from katana450.server.view import readout
 from katana450.server.view.branches import BranchList, Find
-from katana450.server.view.controls import GestureGate, ends, joint_labels, listener, set_slider
+from katana450.server.view.controls import GestureGate, ends, listener, set_slider
 from katana450.server.view.pose_form import PoseForm
 from katana450.server.view.view_updater import READOUT_INTERVAL
 
