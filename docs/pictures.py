@@ -22,11 +22,12 @@ from tests.browser.camera import Camera, Drawing
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import AXES
+from tests.browser.session import AXES, turn
 
 IMAGES = Path(__file__).with_name("images")
 WINDOW = (1440, 900)
 MOVE = "/target/move"
+VIEWS = (Preset.FREE, Preset.FRONT, Preset.SIDE, Preset.TOP, Preset.TOOL)
 
 
 def at_rest(page: ViserPage) -> None:
@@ -86,13 +87,13 @@ def gallery(page: ViserPage) -> None:
             at_rest(page)
             page.open_tab("Scene")
             row = []
-            for preset in Preset:
+            for preset in VIEWS:
                 if preset is Preset.TOOL:
                     # Take the view from behind first: this preset keeps control of the camera.
                     page.look_from(BACK)
                     page.page.wait_for_timeout(700)
                     row.append(tile(page))
-                page.click_button(preset.value)
+                turn(page, preset.value)
                 page.page.wait_for_timeout(700)
                 row.append(tile(page))
             rows.append(np.hstack(row))

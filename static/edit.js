@@ -1,14 +1,11 @@
-// Direct changes to the scene: a dropped file, a click on an object, Delete, and Ctrl-Z.
+// Direct changes to the scene: a dropped file, Delete, and Ctrl-Z.
 "use strict";
 const Edit = (() => {
-  const CLICK = 5; // px, within which a press and its release count as a click
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   const scene = byId("scene");
-  let page = null; // {say, toast, connected}
+  let page = null; // {say, toast, connected, scene}
   let undoable = []; // names of the changes that can be undone, the newest first
-  let selection = null; // loaded with the first click into the scene
-  let pressed = null;
   let leaving = null;
 
   function undo() {
@@ -26,7 +23,7 @@ const Edit = (() => {
       if (!event.repeat) undo();
       return true;
     }
-    return !event.repeat && event.key === "Delete" && Boolean(selection?.remove());
+    return !event.repeat && event.key === "Delete" && Boolean(page.scene()?.remove());
   }
 
   function note({ detail: status }) {
@@ -51,17 +48,6 @@ const Edit = (() => {
     if (file) Objects.take(file);
   }
 
-  async function click(event) {
-    const still = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < CLICK;
-    pressed = null;
-    if (!still || event.button) return;
-    if (!selection) {
-      const { Selection } = await import("./selection/selection.js");
-      selection ??= new Selection(byId("stage"), scene, page.say);
-    }
-    selection.pick(event.clientX, event.clientY);
-  }
-
   function listen(target) {
     for (const kind of ["dragenter", "dragover", "drop"]) target.addEventListener(kind, drag, { capture: true });
   }
@@ -74,12 +60,7 @@ const Edit = (() => {
     scene.addEventListener("load", () => {
       // A page that could not be loaded gives no access.
       if (!scene.contentDocument) return;
-      const inner = scene.contentWindow;
-      listen(inner);
-      inner.addEventListener("pointerdown", ({ target, clientX, clientY }) => {
-        pressed = target.matches?.("canvas") ? [clientX, clientY] : null;
-      }, { capture: true });
-      inner.addEventListener("pointerup", click, { capture: true });
+      listen(scene.contentWindow);
     });
   }
 

@@ -44,8 +44,9 @@ const Fit = (() => {
     return found;
   }
 
-  // Return the view in the same direction, no nearer than `view`, with all `points` in the picture.
-  function fitted(view, points) {
+  // Return the view in the same direction with all `points` in the picture; no nearer than `view`, but if
+  // `filling` as near as possible.
+  function fitted(view, points, filling = false) {
     const { camera, canvas } = viewer();
     const [eye, target] = [vector(view.position), vector(view.look_at)];
     const forward = target.clone().sub(eye).normalize();
@@ -62,29 +63,37 @@ const Fit = (() => {
       const [across, depth] = [axis.dot(eye), forward.dot(eye)];
       return most <= across - slope * depth && least <= -across - slope * depth;
     });
-    if (inside || !points.length) return view;
+    if ((inside && !filling) || !points.length) return view;
     const depths = sides.map(([, slope, most, least]) => -(most + least) / (2 * slope));
-    const depth = Math.min(forward.dot(eye), ...depths);
+    const depth = Math.min(filling ? Infinity : forward.dot(eye), ...depths);
     const placed = forward.clone().multiplyScalar(depth);
     for (const [axis, , most, least] of sides) placed.addScaledVector(axis, (most - least) / 2);
     const away = points.reduce((sum, p) => sum + forward.dot(p), 0) / points.length - depth;
     return { position: placed.toArray(), look_at: placed.clone().addScaledVector(forward, away).toArray() };
   }
 
-  function refit() {
-    if (!base?.position || !base.look_at || riding) return;
-    const { cameraControl, canvas } = viewer();
-    if (!canvas.clientHeight) return;
+  // Return the camera's present view.
+  function seen() {
+    const { cameraControl } = viewer();
     const inverse = root().clone().invert();
     const inWorld = (three) => three.applyMatrix4(inverse).toArray();
-    const now = {
+    return {
       position: inWorld(cameraControl.getPosition(vector([0, 0, 0]))),
       look_at: inWorld(cameraControl.getTarget(vector([0, 0, 0]))),
     };
-    if (!same(now, put ?? base)) return;
+  }
+
+  function look(view) {
+    const { cameraControl } = viewer();
+    cameraControl.setPosition(...vector(view.position).applyMatrix4(root()).toArray(), false);
+    cameraControl.setTarget(...vector(view.look_at).applyMatrix4(root()).toArray(), false);
+  }
+
+  function refit() {
+    if (!base?.position || !base.look_at || riding) return;
+    if (!viewer().canvas.clientHeight || !same(seen(), put ?? base)) return;
     put = fitted(base, corners());
-    cameraControl.setPosition(...vector(put.position).applyMatrix4(root()).toArray(), false);
-    cameraControl.setTarget(...vector(put.look_at).applyMatrix4(root()).toArray(), false);
+    look(put);
   }
 
   return {
@@ -115,6 +124,13 @@ const Fit = (() => {
       const { x, y, z } = point.project(camera);
       const { left, top, width, height } = canvas.getBoundingClientRect();
       return z < 1 ? [left + ((1 + x) / 2) * width, top + ((1 - y) / 2) * height] : null;
+    },
+    seen,
+    look,
+    // Fill the picture with arm and gizmo, in the present direction.
+    fit() {
+      base = put = fitted(seen(), corners(), true);
+      look(put);
     },
     // Note that the person has chosen the view of this name.
     choose: (view) => (riding = view === "Tool"),

@@ -142,7 +142,7 @@
     },
   });
 
-  window.katanaScene = { pixelOf: Fit.pixelOf };
+  window.katanaScene = { ...Viser, ...Fit };
   Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

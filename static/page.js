@@ -114,6 +114,7 @@
     if (ends && event.type === "keydown" && !event.repeat) stop();
     if (ends) {
       if (event.key === "Escape") for (const each of document.querySelectorAll("dialog")) each.close();
+      if (event.key === "Escape") stage?.clear();
     } else if (event.key === "Enter" && event.repeat && event.target?.closest?.("button")) {
       // A key that stays pressed is one click.
     } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
@@ -140,7 +141,11 @@
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
   const canDraw = document.createElement("canvas").getContext("webgl2") !== null;
-  const drawn = () => canDraw && byId("poster").classList.add("done");
+  const drawn = () => {
+    if (!canDraw) return;
+    byId("poster").classList.add("done");
+    takeHold();
+  };
   if (!canDraw) {
     byId("poster").classList.add("failed");
     byId("poster").querySelector("p").textContent =
@@ -321,6 +326,7 @@
       trip = null;
       unknown();
       Jog.quiet();
+      stage?.drop();
       if (data.code === SIGN_IN) enter().catch(() => {});
     } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;
     else if (data.silent !== undefined) silent = data.silent;
@@ -329,7 +335,10 @@
     else if (data.heard?.is === "people") people.heard(data.heard);
     else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard))) return drawLink();
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
-    else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
+    else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) {
+      toast(data.heard.why);
+      stage?.refused(data.heard);
+    }
     else if (data.heard?.is === "status") {
       // The message has only the changes.
       const stood = status?.stopped;
@@ -374,7 +383,13 @@
   More.begin({ say, toast, kept, view: () => window.katana.view });
   Jog.begin({ say, stop });
   Objects.begin({ say });
-  Edit.begin({ say, toast, connected: () => up });
+  Edit.begin({ say, toast, connected: () => up, scene: () => stage });
+  // What a pointer does in the scene; loaded when the scene is drawn.
+  let stage = null;
+  async function takeHold() {
+    const { Stage } = await import("./scene/stage.js");
+    stage ??= new Stage(byId("stage"), scene, { say, toast, status: () => (up ? status : null) });
+  }
   // Who is connected, for admins; loaded on first use.
   byId("people-button").addEventListener("click", async () => {
     help.close();

@@ -24,6 +24,7 @@ const Viser = (() => {
 
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const groups = new Map(); // labels of the rows of buttons, by id
+  let page = null; // the page's worker
   const viewer = () => window.__viserMutable;
 
   // viser's page reconnects only while it has the focus.
@@ -59,6 +60,7 @@ const Viser = (() => {
 
       constructor(url, options) {
         super(url, options);
+        page = this;
         // This listener runs before viser's own, which is set later.
         this.addEventListener("message", ({ data }) => {
           if (data?.type === CONNECTED) {
@@ -86,6 +88,12 @@ const Viser = (() => {
   // Return {label, value} of the button that `message` of the page presses; null for another message.
   const choiceOf = ({ uuid, updates }) =>
     groups.has(uuid) ? { label: groups.get(uuid), value: updates.value } : null;
+
+  // Press the button `value` of the row `label`, which need not be shown.
+  function press(label, value) {
+    for (const [uuid, name] of groups)
+      if (name === label) page.postMessage({ type: SEND, message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
+  }
 
   // Return the server's last messages that place and turn the camera; each may be missing.
   const viewsIn = (messages) =>
@@ -153,9 +161,25 @@ const Viser = (() => {
     return canvas ? new Promise((done) => canvas.toBlob(done, "image/png")) : null;
   }
 
+  // Return the {object, point} of three.js that a ray from a pixel of this document meets first in one
+  // of the nodes `names`; null if it meets none, or a handle or a node with an action of its own.
+  function pick([x, y], names) {
+    const { camera, canvas, scene, nodeRefFromName: nodes } = viewer();
+    const { raycaster, pointer, internal } = scene.__r3f.root.getState();
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    const ray = new raycaster.constructor();
+    ray.setFromCamera(pointer.clone().set((2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height), camera);
+    const found = (object, what) => object && (what(object) || found(object.parent, what));
+    const acts = ({ object }) => found(object, (each) => each.__r3f?.handlers?.onPointerDown);
+    if (ray.intersectObjects(internal.interaction, true).some(acts)) return null;
+    const there = names.map((name) => nodes[name]).filter(Boolean);
+    const hidden = ({ object }) => found(object, (each) => !each.visible);
+    return ray.intersectObjects(there, true).find((hit) => !hidden(hit)) ?? null;
+  }
+
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, HINT, STEADY,
-    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture,
+    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,
     // Return the three.js object of a node; "" is viser's world.

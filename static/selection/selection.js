@@ -33,7 +33,7 @@ export class Selection {
     const remove = html("button", { type: "button" }, "Remove ", html("kbd", {}, "Del"));
     const clear = html("button", { type: "button", "aria-label": "Deselect" }, "×");
     remove.addEventListener("click", () => this.remove());
-    clear.addEventListener("click", () => this.#show(null));
+    clear.addEventListener("click", () => this.clear());
     this.#bar = html("div", { role: "group", "aria-label": "Selected object" }, this.#name, remove, clear);
     this.#frame = html("div", { id: "selection", hidden: "" }, this.#bar);
     stage.append(this.#frame);
@@ -57,6 +57,11 @@ export class Selection {
     this.#say({ do: "remove", name: this.#object.name });
     this.#show(null);
     return true;
+  }
+
+  // Select nothing.
+  clear() {
+    this.#show(null);
   }
 
   async #objects() {

@@ -19,6 +19,11 @@ MOVE = "/target/move"
 AXES = tuple(f"{number} {name}" for number, name in enumerate(AXIS_NAMES, start=1))
 """Labels of the joints' sliders."""
 READY = np.array(Settings().ready)
+VIEW_LABELS = {
+    "3D": "View from above and the side",
+    "Side": "View: right",
+    "Tool": "View that follows the tool until another one is chosen",
+}
 THIN = 15_000.0
 """Rate of a slow connection [bytes/s], on which viser alone shows pictures half a minute old."""
 
@@ -110,3 +115,11 @@ def set_speed(page: ViserPage, percent: float) -> None:
 def camera(page: ViserPage) -> Any:
     body = page.sent("ViewerCameraMessage")[-1].body
     return np.array([body["position"], body["look_at"]])
+
+
+def turn(page: ViserPage, view: str) -> None:
+    """Press a button below the view cube, or one of its faces, by its view on the server."""
+    label = VIEW_LABELS.get(view, f"View: {view.lower()}")
+    button = page.page.get_by_role("group", name="Camera").get_by_label(label)
+    # Also on a face that points away.
+    button.evaluate("(each) => each.click()")

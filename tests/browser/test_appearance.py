@@ -18,7 +18,7 @@ from katana450.settings import Settings
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import bar
+from tests.browser.session import bar, turn
 
 READY = np.array(Settings().ready)
 MOVE = "/target/move"
@@ -54,13 +54,12 @@ def test_each_window_looks_from_where_its_person_asks(
     chain = arm.chain
     page, other = pair
     others = seen_from(other)
-    page.open_tab("Scene")
     for preset, look in CAMERA_POSES.items():
-        page.click_button(preset.value)
+        turn(page, preset.value)
         wait_for_look(page, np.array(look.position), np.array(look.target))
         page.keep(artefacts / f"look-{preset.value.lower()}.png")
 
-    page.click_button(Preset.TOOL.value)
+    turn(page, Preset.TOOL.value)
 
     def on_tool(q: FloatArray) -> FloatArray:
         T = arm.T_base_shoulder @ forward(chain, q)
@@ -69,15 +68,13 @@ def test_each_window_looks_from_where_its_person_asks(
 
     page.wait_until(lambda: np.allclose(seen_from(page)[1], on_tool(READY), atol=1e-3), "it")
     page.keep(artefacts / "look-tool.png")
-    page.open_tab("Drive")
     page.click_button("Go to zero")
     page.wait_until(
         lambda: np.allclose(seen_from(page)[1], on_tool(np.zeros(5)), atol=1e-3),
         "the camera to ride along",
     )
     # The gizmo of the stretched arm would be cut off: same direction, from farther away.
-    page.open_tab("Scene")
-    page.click_button(Preset.SIDE.value)
+    turn(page, Preset.SIDE.value)
     side = np.array(CAMERA_POSES[Preset.SIDE].position)
 
     def from_the_side() -> bool:
@@ -87,7 +84,6 @@ def test_each_window_looks_from_where_its_person_asks(
 
     page.wait_until(from_the_side, "a camera at the side")
     fitted = np.stack(seen_from(page))
-    page.open_tab("Drive")
     page.click_button("Home")
     page.wait_until(lambda: "Moving" not in bar(page, "headline"), "the arm to arrive")
     assert np.allclose(np.stack(seen_from(page)), fitted, atol=1e-3)

@@ -17,7 +17,7 @@ from katana450.server.viser_bridge.themes import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import take
+from tests.browser.session import take, turn
 from tests.browser.sight import contrast, overlap, wait_whole, whole
 from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, WIDER
 from tests.conftest import LONG
@@ -124,15 +124,11 @@ def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
     assert np.allclose(eye(desk), turned, atol=1e-3)
     assert not whole(desk)
     # After a view button, the view is fitted again, also at later sizes.
-    desk.frame.locator("#k450-sheet").click()
-    desk.page.wait_for_timeout(500)
-    desk.open_tab("Scene")
-    desk.click_button("Front")
+    turn(desk, "Front")
     wait_whole(desk, "from the front")
     resize(desk, WIDE)
     wait_whole(desk, "from the front and wide")
-    desk.open_tab("Scene")
-    desk.click_button("3D")
+    turn(desk, "3D")
     wait_whole(desk, "again")
 
 

@@ -115,6 +115,41 @@ def test_page_offers_its_scene(page: ViserPage) -> None:
         assert ask(page, "Viser.node('/none') === undefined")
 
 
+def test_page_finds_what_is_under_a_pixel(page: ViserPage) -> None:
+    def found(name: str, others: str = "") -> bool:
+        """Return whether the ray to the middle of a node meets its surface."""
+        x, y = page.project(page.node_pose(name)[:3, 3])
+        return bool(
+            page.frame.evaluate(
+                """([pixel, name, names]) => {
+                    const hit = Viser.pick(pixel, names);
+                    if (!hit) return false;
+                    const place = Viser.node(name).getWorldPosition(hit.point.clone());
+                    let owner = hit.object;
+                    while (owner && owner !== Viser.node(name)) owner = owner.parent;
+                    const away = hit.point.distanceTo(place);
+                    return Boolean(owner) && away > 0.04 && away < 0.1;
+                }""",
+                [[x, y], name, [others or name]],
+            )
+        )
+
+    with part("pick"):
+        assert found("/box")
+        assert not found("/box", "/held")
+        assert not found("/box", "/none")
+        # The handle is in front of this one, and takes the pointer.
+        assert not found("/held")
+        # What is not shown is not met.
+        shapes = "Viser.node('/box').traverse((each) => each.isMesh && (each.visible = {}))"
+        ask(page, shapes.format("false"))
+        assert not found("/box")
+        ask(page, shapes.format("true"))
+        assert found("/box")
+    with part("viewer"):
+        assert ask(page, "typeof Viser.viewer().requestRender") == "function"
+
+
 def test_page_speaks_to_its_worker_as_the_tap_expects(page: ViserPage, server: AppServer) -> None:
     with part("tap"):
         assert ask(page, "tapped.address") == server.url.replace("http", "ws", 1)
@@ -156,6 +191,10 @@ def test_page_tells_and_takes_views(page: ViserPage) -> None:
         assert len(target["look_at"]) == 3
     with part("choiceOf"):
         assert ask(page, "tapped.choices") == [{"label": "View", "value": "Front"}]
+    with part("press"):
+        ask(page, "Viser.press('View', 'Side')")
+        page.wait_until(lambda: ask(page, "tapped.sets.length") == 3, "the view of the server")
+        assert ask(page, "tapped.choices.at(-1)") == {"label": "View", "value": "Side"}
     with part("viewing"):
         view = {"position": [0.0, 1.5, 1.0], "look_at": [0, 0, 0], "up_direction": [0, 0, 1]}
         page.frame.evaluate("(view) => tapped.line.show(Viser.viewing(view))", view)

@@ -21,6 +21,9 @@ def furnish(server: viser.ViserServer) -> None:
     scene.add_grid("/floor")
     scene.set_background_image(np.full((4, 4, 3), 200, np.uint8))
     box = scene.add_box("/box", color=(225, 140, 40), dimensions=(0.1, 0.1, 0.1))
+    # A handle in front of a box of its own.
+    scene.add_box("/held", color=(40, 140, 225), dimensions=(0.1, 0.1, 0.1), position=(0, 0.4, 0))
+    scene.add_transform_controls("/handle", position=(0.0, 0.4, 0.0), scale=0.3)
     gui.configure_theme(dark_mode=False)
     server.initial_camera.position = EYE
     server.initial_camera.look_at = TARGET
@@ -33,7 +36,8 @@ def furnish(server: viser.ViserServer) -> None:
 
     async def look(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
         assert event.client is not None
-        event.client.camera.position, event.client.camera.look_at = (2.0, 0.0, 0.5), TARGET
+        eye = (2.0, 0.0, 0.5) if view.value == "Front" else (0.0, -2.0, 0.5)
+        event.client.camera.position, event.client.camera.look_at = eye, TARGET
 
     slider.on_update(lift)
     view.on_click(look)

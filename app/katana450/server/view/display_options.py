@@ -31,13 +31,11 @@ class DisplayOptions:
 
 
 def add_views(gui: viser.GuiApi, shows: DisplayOptions) -> None:
-    """Add the buttons of the camera views. A click changes only its own browser."""
-    views = gui.add_button_group(
-        "View",
-        tuple(preset.value for preset in Preset),
-        hint="Camera of this window. Tool follows the tool until you choose another view. "
-        "Drag to turn, right-drag to shift, wheel to zoom",
-    )
+    """Add the buttons of the camera views. A click changes only its own browser.
+
+    The view cube of the page presses them, so the panel does not show them.
+    """
+    views = gui.add_button_group("View", tuple(preset.value for preset in Preset), visible=False)
 
     @views.on_click
     def _(event: viser.GuiEvent[Any]) -> None:

@@ -1,4 +1,4 @@
-"""The tab "Scene" of the panel: views, objects, display options, and the event list."""
+"""The tab "Scene" of the panel: objects, display options, and the event list."""
 
 from __future__ import annotations
 

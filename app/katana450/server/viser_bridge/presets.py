@@ -25,6 +25,8 @@ class Preset(Enum):
     FREE = "3D"
     FRONT = "Front"
     SIDE = "Side"
+    LEFT = "Left"
+    BACK = "Back"
     TOP = "Top"
     TOOL = "Tool"
 
@@ -33,6 +35,8 @@ CAMERA_POSES = {
     Preset.FREE: CameraPose((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
     Preset.FRONT: CameraPose((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
     Preset.SIDE: CameraPose((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
+    Preset.LEFT: CameraPose((0.0, 1.64, 0.46), (0.0, 0.0, 0.36)),
+    Preset.BACK: CameraPose((-1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
     # Not exactly from above: a camera that looks along its up direction is undefined.
     Preset.TOP: CameraPose((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
 }

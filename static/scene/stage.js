@@ -1,0 +1,147 @@
+// The pointer in the scene: a click selects a link or an object, a drag of a link turns its joint, and a
+// double-click looks at a point. Everything else turns the camera.
+import { html } from "../instruments/shape.js";
+import { Joints } from "./joints.js";
+import { Views } from "./views.js";
+
+const CLICK = 5; // px, within which a press and its release count as a click
+const SOLID = ["/arm", "/cup", "/basin", "/objects", "/table"]; // nodes that a ray can meet
+const STYLE = new URL("scene.css", import.meta.url).href;
+
+export class Stage {
+  #stage;
+  #scene;
+  #page; // {say, toast, status}
+  #joints;
+  #views;
+  #selection = null; // the selected object, loaded with the first click beside the arm
+  #press = null; // [x, y] of a press that may become a click
+  #over = null; // pixel of the pointer, to be looked up in the next frame
+
+  constructor(stage, scene, page) {
+    this.#stage = stage;
+    this.#scene = scene;
+    this.#page = page;
+    document.head.append(html("link", { rel: "stylesheet", href: STYLE }));
+    this.#joints = new Joints(stage, scene, page);
+    this.#load();
+    this.#views = new Views(stage, scene);
+    this.#listen();
+    scene.addEventListener("load", () => this.#listen());
+    // What is held at a stop, or when another person drives, moves nothing afterwards.
+    window.addEventListener("status", ({ detail }) => {
+      if (detail.stopped || (!detail.mine && detail.holder !== null)) this.drop();
+    });
+    document.addEventListener("visibilitychange", () => document.hidden && this.#joints.lose());
+    window.addEventListener("blur", () => this.#blur());
+  }
+
+  async #load() {
+    const answer = await fetch("api/v1/arm").catch(() => null);
+    if (answer?.ok) this.#joints.arm = await answer.json();
+  }
+
+  // Remove the selected object. Return whether there is one.
+  remove() {
+    return Boolean(this.#selection?.remove());
+  }
+
+  // Select nothing.
+  clear() {
+    this.#joints.select(null);
+    this.#selection?.clear();
+  }
+
+  // Release what the pointer holds.
+  drop() {
+    this.#joints.drop();
+  }
+
+  refused(answer) {
+    this.#joints.refused(answer);
+  }
+
+  #listen() {
+    const inner = this.#scene.contentWindow;
+    const on = (kind, act) => inner.addEventListener(kind, act.bind(this), { capture: true });
+    on("pointerdown", this.#down);
+    on("pointermove", this.#move);
+    on("pointerup", this.#up);
+    on("pointercancel", ({ pointerId }) => this.#joints.holds(pointerId) && this.#joints.lose());
+    on("pointerout", ({ relatedTarget }) => relatedTarget || this.#hover(null));
+    on("blur", this.#blur);
+    on("dblclick", this.#focus);
+  }
+
+  // The focus may only have moved between the two documents.
+  #blur() {
+    setTimeout(() => document.hasFocus() || this.#joints.lose());
+  }
+
+  #down(event) {
+    const { target, pointerId, pointerType, button, isPrimary } = event;
+    this.#press = null;
+    if (button || !isPrimary || this.#joints.dragging || !target.matches?.("canvas")) return;
+    const pixel = [event.clientX, event.clientY];
+    this.#press = pixel;
+    const hit = this.#pick(pixel);
+    const joint = hit && this.#joints.of(hit.object);
+    if (!hit || !this.#joints.takes(joint, pointerType === "touch")) return;
+    // Neither the camera nor a node behind the link gets the press.
+    event.stopImmediatePropagation();
+    target.setPointerCapture(pointerId);
+    this.#joints.take(joint, hit, pixel, pointerId, pointerType === "touch");
+  }
+
+  #move(event) {
+    const pixel = [event.clientX, event.clientY];
+    if (this.#joints.holds(event.pointerId)) {
+      event.stopImmediatePropagation();
+      this.#joints.move(pixel);
+    } else if (event.pointerType !== "touch") this.#hover(event.buttons || !event.target.matches?.("canvas") ? null : pixel);
+  }
+
+  // Look up the link under the pointer once per frame.
+  #hover(pixel) {
+    const waits = this.#over !== null;
+    this.#over = { pixel };
+    if (waits) return;
+    requestAnimationFrame(() => {
+      const { pixel } = this.#over;
+      this.#over = null;
+      const hit = pixel && this.#pick(pixel);
+      this.#joints.hover(hit ? this.#joints.of(hit.object) : null, pixel);
+    });
+  }
+
+  #up(event) {
+    const pixel = [event.clientX, event.clientY];
+    if (this.#joints.holds(event.pointerId) && this.#joints.release()) this.#press = null;
+    const press = this.#press;
+    this.#press = null;
+    if (press && !event.button && Math.hypot(pixel[0] - press[0], pixel[1] - press[1]) < CLICK) this.#click(pixel);
+  }
+
+  // Select the link or the object at a pixel; nothing beside both.
+  async #click(pixel) {
+    const hit = this.#pick(pixel);
+    const joint = hit && this.#joints.of(hit.object);
+    this.#joints.select(joint, pixel);
+    if (joint !== null) return this.#selection?.clear();
+    if (!this.#selection) {
+      const { Selection } = await import("../selection/selection.js");
+      this.#selection ??= new Selection(this.#stage, this.#scene, this.#page.say);
+    }
+    this.#selection.pick(...pixel);
+  }
+
+  // Look at the point of a part or an object under the pointer.
+  #focus({ target, clientX, clientY }) {
+    const hit = target.matches?.("canvas") && this.#pick([clientX, clientY]);
+    if (hit) this.#views.focus(hit.point);
+  }
+
+  #pick(pixel) {
+    return this.#scene.contentWindow.katanaScene.pick(pixel, SOLID);
+  }
+}

@@ -1,0 +1,127 @@
+// The view cube: it turns as the scene does, and its faces turn the camera. Below it are the views that are
+// no face, and Fit. For fingers, to which some faces are too narrow, a list replaces it.
+import { html } from "../instruments/shape.js";
+
+const NEAR = 0.6; // m, maximum distance to a point that is looked at
+const EDGE = 12; // px from the cube to the edges of the scene
+/** @typedef {[number, number, number]} Direction */
+// Name, view of the server, outward direction, and the direction that is up on the face; in the base frame.
+/** @type {[string, string, Direction, Direction][]} */
+const FACES = [
+  ["Front", "Front", [1, 0, 0], [0, 0, 1]],
+  ["Back", "Back", [-1, 0, 0], [0, 0, 1]],
+  ["Left", "Left", [0, 1, 0], [0, 0, 1]],
+  ["Right", "Side", [0, -1, 0], [0, 0, 1]],
+  ["Top", "Top", [0, 0, 1], [0, 1, 0]],
+];
+/** @type {[Direction, Direction]} */
+const BELOW = [[0, 0, -1], [0, -1, 0]]; // the face without a view: the table is in front of it
+const MORE = [
+  ["Iso", "3D", "View from above and the side"],
+  ["Tool", "Tool", "View that follows the tool until another one is chosen"],
+];
+
+/** @type {(a: Direction, b: Direction) => Direction} */
+const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+// The y axis of CSS points down. A direction of the base frame as one of the cube's box:
+const boxed = ([x, y, z]) => [x, -y, z];
+const matrix = (...columns) => `matrix3d(${columns.map((each) => each.map((x) => x.toFixed(5)).join()).join()})`;
+
+// Return the transform of a face at half the cube's edge from its centre.
+function facing(out, up) {
+  const right = boxed(cross(up, out));
+  const down = boxed(up).map((x) => -x);
+  return `${matrix([...right, 0], [...down, 0], [...boxed(out), 0], [0, 0, 0, 1])} translateZ(calc(var(--edge) / 2))`;
+}
+
+export class Views {
+  #scene;
+  #group;
+  #cube = html("div", { id: "cube" });
+  #riding = false; // the camera follows the tool
+  #shown = ""; // transform of the cube
+  #placed = "";
+
+  constructor(stage, scene) {
+    this.#scene = scene;
+    const button = (label, view, name) => {
+      const made = html("button", { type: "button", "aria-label": name, title: name }, label);
+      made.addEventListener("click", () => this.#choose(view));
+      return made;
+    };
+    for (const [label, view, out, up] of FACES) {
+      const face = button(label, view, `View: ${label.toLowerCase()}`);
+      face.style.transform = facing(out, up);
+      this.#cube.append(face);
+    }
+    const below = html("i", { "aria-hidden": "true" });
+    below.style.transform = facing(...BELOW);
+    this.#cube.append(below);
+    const fit = html("button", { type: "button", title: "Show all of arm and handle" }, "Fit");
+    fit.addEventListener("click", () => this.#fit());
+    const more = MORE.map(([label, view, name]) => button(label, view, name));
+    const list = html("select", { "aria-label": "View" }, new Option("View", ""));
+    for (const [label, view] of [...FACES, ...MORE]) list.add(new Option(label, view));
+    list.addEventListener("change", () => {
+      this.#choose(list.value);
+      // The same view can be chosen again.
+      list.value = "";
+    });
+    const row = html("div", {}, ...more, list, fit);
+    this.#group = html("div", { id: "views", role: "group", "aria-label": "Camera" }, this.#cube, row);
+    stage.append(this.#group);
+    const turn = () => {
+      this.#follow();
+      requestAnimationFrame(turn);
+    };
+    turn();
+  }
+
+  // Look at a point of three.js's world from nearer, in the same direction.
+  focus(point) {
+    const { viewer, node, seen, look } = this.#inner;
+    const at = point.clone().applyMatrix4(node("").matrixWorld.clone().invert()).toArray();
+    const { position, look_at } = seen();
+    const away = position.map((x, i) => x - look_at[i]);
+    const nearer = Math.min(1, NEAR / Math.hypot(...away));
+    look({ position: at.map((x, i) => x + nearer * away[i]), look_at: at });
+    viewer().requestRender();
+  }
+
+  #choose(view) {
+    this.#riding = view === "Tool";
+    this.#inner.press("View", view);
+  }
+
+  #fit() {
+    // The camera on the tool would return at the next step.
+    if (this.#riding) this.#choose("3D");
+    else this.#inner.fit();
+  }
+
+  // Turn the cube as the camera sees the base frame, and keep it in the corner of the picture.
+  #follow() {
+    const viewer = this.#inner?.viewer();
+    const world = viewer?.cameraControl && this.#inner.node("");
+    if (!world) return;
+    const { camera, canvas } = viewer;
+    const { elements: m } = camera.matrixWorldInverse.clone().multiply(world.matrixWorld);
+    // From the box of the cube to the base frame, to the camera, and to the screen, whose y points down.
+    const [x, y, z] = [0, 1, 2].map((column) => {
+      const sign = column === 1 ? -1 : 1;
+      return [sign * m[4 * column], -sign * m[4 * column + 1], sign * m[4 * column + 2], 0];
+    });
+    const shown = matrix(x, y, z, [0, 0, 0, 1]);
+    if (shown !== this.#shown) this.#cube.style.transform = this.#shown = shown;
+    const { left, bottom } = canvas.getBoundingClientRect();
+    const { offsetLeft, offsetTop } = this.#scene;
+    const placed = `${offsetLeft + left + EDGE}px ${offsetTop + bottom - EDGE}px`;
+    if (placed === this.#placed) return;
+    this.#placed = placed;
+    this.#group.style.translate = placed;
+  }
+
+  get #inner() {
+    return this.#scene.contentWindow?.katanaScene;
+  }
+}

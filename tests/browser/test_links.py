@@ -1,0 +1,343 @@
+"""Joints that are turned by their links in the scene, by mouse, finger and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.client import connect
+from katana450.server.api import answers
+from tests.browser.camera import Camera
+from tests.browser.conftest import OpenPage
+from tests.browser.page import Pixel, ViserPage
+from tests.browser.server import AppServer
+from tests.browser.session import AXES, MOVE, READY, Truth, bar, camera, clear_stop, prepare, take
+from tests.browser.spots import Spot, seen_at, spot
+
+SIDE = Camera((0.25, -1.6, 0.45), (0.25, 0.0, 0.4))
+BEHIND = Camera((-1.3, 0.0, 0.45), (0.0, 0.0, 0.35))
+TURN = -0.5
+"""Angle [rad] by which the mouse goes round the axis, anticlockwise on the screen."""
+
+FOLLOWS = 2.0
+"""Maximum distance [px] between a grabbed point and the mouse."""
+
+EMISSIVE = """(name) => {
+    const lit = new Set();
+    katanaScene.node(name).traverse((each) => each.material?.emissiveIntensity < 1
+        && each.material.emissive.getHex() && lit.add(each));
+    return lit.size;
+}"""
+
+
+@pytest.fixture
+def page(server: AppServer, open_page: OpenPage, truth: Truth) -> Iterator[ViserPage]:
+    """Return a new window with the camera at the side, whose person drives."""
+    page = open_page(server.url, nodes=("/arm", MOVE), camera=SIDE)
+    page.page.wait_for_selector("#cube", state="attached")
+    prepare(page, truth)
+    yield page
+    assert page.errors == []
+
+
+@pytest.fixture
+def links(server: AppServer) -> list[str]:
+    """Return the node of the link that each joint moves."""
+    with connect(server.url, "Reader") as reader:
+        return ["/arm/" + "/".join(each.path) for each in reader.query(answers.Arm).links]
+
+
+def q(truth: Truth) -> Any:
+    return np.array(truth.status()["q"])
+
+
+def rest(truth: Truth) -> Any:
+    truth.wait(20.0, moving=False)
+    return q(truth)
+
+
+def on_axis(page: ViserPage, link: str, place: Spot) -> Pixel:
+    """Return the pixel on the axis (y of the link) nearest to ``place``."""
+    return page.project((page.node_pose(link) @ [0.0, place.point[1], 0.0, 1.0])[:3])
+
+
+def hover(page: ViserPage, pixel: Pixel) -> None:
+    page.page.mouse.move(pixel[0] - 3.0, pixel[1])
+    page.page.mouse.move(*pixel)
+
+
+def label(page: ViserPage) -> str:
+    shown = page.page.locator("#joint-label")
+    return shown.inner_text() if shown.is_visible() else ""
+
+
+def drag(page: ViserPage, start: Pixel, by: Pixel, *, steps: int = 10) -> None:
+    """Press the mouse and move it; it stays pressed."""
+    hover(page, start)
+    page.page.mouse.down()
+    page.page.wait_for_timeout(150)
+    for step in range(1, steps + 1):
+        page.page.mouse.move(start[0] + by[0] * step / steps, start[1] + by[1] * step / steps)
+        page.page.wait_for_timeout(30)
+
+
+def test_link_under_the_mouse_is_named_and_highlighted(
+    page: ViserPage, links: list[str], artefacts: Path
+) -> None:
+    for joint, name in enumerate(AXES):
+        hover(page, spot(page, links, joint).pixel)
+        page.wait_until(lambda name=name: label(page) == name, name)  # type: ignore[misc]
+        assert page.frame.evaluate("katanaScene.viewer().canvas.style.cursor") == "pointer"
+        assert page.frame.evaluate(EMISSIVE, links[joint]) > 0
+    page.keep(artefacts / "link-hover.png")
+    hover(page, (500.0, 300.0))
+    page.wait_until(lambda: label(page) == "", "the name to go")
+    assert page.frame.evaluate(EMISSIVE, "/arm") == 0
+    assert page.frame.evaluate("katanaScene.viewer().canvas.style.cursor") == ""
+
+
+def test_grabbed_point_follows_the_mouse_and_one_undo_brings_it_back(
+    page: ViserPage, links: list[str], truth: Truth, artefacts: Path
+) -> None:
+    grabbed, seen = spot(page, links, 2), camera(page)
+    axis = on_axis(page, links[2], grabbed)
+    start = np.subtract(grabbed.pixel, axis)
+    c, s = np.cos(TURN), np.sin(TURN)
+    end = np.array(((c, -s), (s, c))) @ start
+    drag(page, grabbed.pixel, tuple(end - start))
+    assert label(page).startswith("3 elbow")
+    rest(truth)
+    away = np.subtract(seen_at(page, links[2], grabbed), axis + end)
+    assert np.hypot(*away) < FOLLOWS
+    page.keep(artefacts / "link-drag.png")
+    page.page.mouse.up()
+    moved = rest(truth)
+    assert list(np.abs(moved - READY) > 1e-6) == [False, False, True, False, False]
+    assert abs(moved[2] - READY[2]) > 0.3
+    assert np.allclose(camera(page), seen, atol=1e-3)
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: np.allclose(q(truth), READY, atol=1e-6), "the way back")
+
+
+def test_joint_seen_edge_on_turns_by_the_movement_across(
+    page: ViserPage, links: list[str], truth: Truth
+) -> None:
+    page.look_from(BEHIND)
+    page.page.wait_for_timeout(500)
+    # The base turns about the vertical. Its near side follows the mouse: to the right is -y.
+    drag(page, spot(page, links, 0).pixel, (60.0, 0.0))
+    page.page.mouse.up()
+    assert rest(truth)[0] > 0.3
+    assert np.allclose(q(truth)[1:], READY[1:], atol=1e-6)
+
+
+def test_drag_stops_at_the_limit_of_the_joint(
+    page: ViserPage, server: AppServer, links: list[str], truth: Truth
+) -> None:
+    with connect(server.url, "Reader") as reader:
+        upper = reader.query(answers.Arm).upper[1]
+    start = spot(page, links, 1).pixel
+    drag(page, start, (150.0, 250.0), steps=20)
+    page.page.mouse.up()
+    assert rest(truth)[1] <= upper + 1e-9
+    assert truth.status()["goal"][1] <= upper + 1e-9
+
+
+def test_first_drag_takes_the_free_arm(
+    server: AppServer, open_page: OpenPage, links: list[str], truth: Truth
+) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), camera=SIDE)
+    prepare(page, truth)
+    page.press_in_bar("Release")
+    page.wait_until(lambda: bar(page, "holder") == "Nobody drives", "the release")
+    drag(page, spot(page, links, 2).pixel, (0.0, -40.0))
+    page.page.mouse.up()
+    page.wait_until(lambda: bar(page, "holder") == "You drive", "the lease")
+    assert abs(rest(truth)[2] - READY[2]) > 0.1
+
+
+def test_drag_beside_the_arm_turns_the_camera_and_the_handle_stays_a_handle(
+    page: ViserPage, truth: Truth
+) -> None:
+    seen = camera(page)
+    drag(page, (150.0, 350.0), (80.0, 20.0))
+    page.page.mouse.up()
+    page.wait_until(lambda: not np.allclose(camera(page), seen, atol=1e-2), "another view")
+    assert np.allclose(rest(truth), READY, atol=1e-6)
+    # The handle covers the fingers, which belong to joint 5.
+    page.drag_arrow(MOVE, "z", 0.05)
+    rest(truth)
+    assert truth.status()["T"][2][3] > 0.03
+    assert label(page) == ""
+
+
+def test_clicked_link_gets_a_bar_with_steps(
+    page: ViserPage, links: list[str], truth: Truth, artefacts: Path
+) -> None:
+    page.page.mouse.click(*spot(page, links, 1).pixel)
+    chosen = page.page.get_by_role("group", name="Selected joint")
+    assert chosen.locator("b").inner_text() == "2 shoulder"
+    page.wait_until(lambda: chosen.locator("output").inner_text() == "−68.0°", "the angle")
+    assert np.allclose(q(truth), READY, atol=1e-6)
+    page.page.get_by_role("button", name="2 shoulder plus 1°").click()
+    page.wait_until(lambda: chosen.locator("output").inner_text() == "−67.0°", "one degree more")
+    page.keep(artefacts / "link-selected.png")
+    # By the keyboard, and by the step that is chosen in Jog.
+    page.page.click("#jog-button")
+    page.page.locator("#jog [name=step][value='10'] + span").click()
+    page.page.get_by_role("button", name="2 shoulder minus 10°").focus()
+    page.page.keyboard.press("Enter")
+    page.wait_until(lambda: chosen.locator("output").inner_text() == "−77.0°", "ten degrees less")
+    page.page.locator("#jog [name=step][value='0'] + span").click()
+    page.page.click("#jog-button")
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: chosen.locator("output").inner_text() == "−67.0°", "one undo")
+    chosen.get_by_role("button", name="Deselect").click()
+    assert not chosen.is_visible()
+    # A click on an object selects it instead, and Esc selects nothing.
+    page.page.mouse.click(*spot(page, links, 1).pixel)
+    assert chosen.is_visible()
+    page.page.mouse.click(*page.project(page.node_pose("/cup")[:3, 3] + (0.0, 0.0, 0.05)))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    assert not chosen.is_visible()
+    page.page.mouse.click(*spot(page, links, 1).pixel)
+    page.page.wait_for_selector("#selection", state="hidden")
+    page.page.keyboard.press("Escape")
+    assert not chosen.is_visible()
+    truth.wait(mood="stopped")
+    page.page.wait_for_timeout(1100)
+    clear_stop(page, truth)
+
+
+def test_stop_ends_a_drag_and_a_stopped_arm_refuses_another(
+    page: ViserPage, links: list[str], truth: Truth
+) -> None:
+    start = spot(page, links, 2).pixel
+    drag(page, start, (0.0, -40.0))
+    page.page.keyboard.press("Space")
+    truth.wait(mood="stopped")
+    stopped = rest(truth)
+    # What is held at a stop moves nothing, also after it is cleared.
+    page.page.wait_for_timeout(1100)
+    # The mouse still holds the link.
+    page.page.locator("#clear-stop").evaluate("(each) => each.click()")
+    truth.wait(stopped=None)
+    page.page.mouse.move(start[0], start[1] + 60.0, steps=5)
+    page.page.wait_for_timeout(300)
+    page.page.mouse.up()
+    assert np.allclose(rest(truth), stopped, atol=1e-6)
+    page.page.keyboard.press("Space")
+    truth.wait(mood="stopped")
+    drag(page, spot(page, links, 2).pixel, (0.0, 50.0))
+    page.wait_until(lambda: "stop" in bar(page, "toast").lower(), "the refusal")
+    page.page.mouse.up()
+    assert np.allclose(rest(truth), stopped, atol=1e-6)
+    page.page.wait_for_timeout(1100)
+    clear_stop(page, truth)
+
+
+@pytest.mark.parametrize("loss", ["pointercancel", "blur"])
+def test_lost_pointer_ends_the_drag_and_the_arm_holds(
+    page: ViserPage, links: list[str], truth: Truth, loss: str
+) -> None:
+    start = spot(page, links, 1).pixel
+    drag(page, start, (120.0, 20.0), steps=4)
+    page.frame.evaluate(
+        """(loss) => {
+            if (loss === "blur") {
+                parent.document.hasFocus = () => false;
+                dispatchEvent(new Event("blur"));
+            } else dispatchEvent(new PointerEvent("pointercancel", { pointerId: 1 }));
+        }""",
+        loss,
+    )
+    held = rest(truth)
+    page.page.mouse.move(start[0] - 100.0, start[1], steps=5)
+    page.page.wait_for_timeout(300)
+    assert np.allclose(rest(truth), held, atol=1e-6)
+    # It came to rest on the way.
+    assert np.allclose(truth.status()["goal"], held, atol=1e-3)
+    page.page.mouse.up()
+
+
+@pytest.mark.usefixtures("page")
+def test_who_does_not_drive_turns_the_camera_and_gets_reasons(
+    server: AppServer, open_page: OpenPage, links: list[str], truth: Truth
+) -> None:
+    other = open_page(server.url, nodes=("/arm", MOVE), camera=SIDE)
+    other.wait_until(lambda: "drives" in bar(other, "holder"), "the driver's name")
+    other.page.wait_for_selector("#cube", state="attached")
+    where, seen = spot(other, links, 2).pixel, camera(other)
+    hover(other, where)
+    other.page.wait_for_timeout(300)
+    assert label(other) == ""
+    assert other.frame.evaluate(EMISSIVE, "/arm") == 0
+    drag(other, where, (60.0, 20.0))
+    other.page.mouse.up()
+    other.wait_until(lambda: not np.allclose(camera(other), seen, atol=1e-2), "another view")
+    # The selected link says what a drag would do, so its drag is refused with the reason.
+    where = spot(other, links, 2).pixel
+    other.page.mouse.click(*where)
+    other.page.get_by_role("button", name="3 elbow plus 1°").click()
+    other.wait_until(lambda: "ask for it" in bar(other, "toast"), "the refusal")
+    other.page.wait_for_selector("#toast:not(.shown)", state="attached")
+    drag(other, where, (0.0, -50.0))
+    other.page.wait_for_selector("#toast.shown", state="attached")
+    other.page.mouse.up()
+    assert np.allclose(rest(truth), READY, atol=1e-6)
+    assert other.errors == []
+
+
+@pytest.mark.parametrize("size", [(390, 844), pytest.param((844, 390), marks=pytest.mark.long)])
+def test_finger_takes_hold_of_the_selected_link_only(
+    server: AppServer,
+    open_page: OpenPage,
+    links: list[str],
+    truth: Truth,
+    size: tuple[int, int],
+    artefacts: Path,
+) -> None:
+    page = open_page(
+        server.url, nodes=("/arm", MOVE), window=size, camera=SIDE, has_touch=True, is_mobile=True
+    )
+    page.page.wait_for_selector("#cube", state="attached")
+    take(page)
+    start = rest(truth)
+    touch = page.page.context.new_cdp_session(page.page)
+
+    def swipe(from_: Pixel, by: Pixel) -> None:
+        def send(kind: str, *points: Pixel) -> None:
+            sent = [{"x": x, "y": y} for x, y in points]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": sent})
+            page.page.wait_for_timeout(60)
+
+        send("touchStart", from_)
+        page.page.wait_for_timeout(150)
+        for step in range(1, 11):
+            send("touchMove", (from_[0] + by[0] * step / 10, from_[1] + by[1] * step / 10))
+        send("touchEnd")
+
+    seen = camera(page)
+    swipe(spot(page, links, 2).pixel, (30.0, 20.0))
+    page.wait_until(lambda: not np.allclose(camera(page), seen, atol=1e-2), "another view")
+    assert np.allclose(rest(truth), start, atol=1e-6)
+    page.look_from(SIDE)
+    page.page.wait_for_timeout(500)
+    page.page.touchscreen.tap(*spot(page, links, 2).pixel)
+    chosen = page.page.get_by_role("group", name="Selected joint")
+    chosen.wait_for()
+    for button in chosen.get_by_role("button").all():
+        box = button.bounding_box()
+        assert box is not None
+        assert min(box["width"], box["height"]) >= 44.0
+    page.keep(artefacts / f"link-selected-{size[0]}.png")
+    swipe(spot(page, links, 2).pixel, (0.0, -30.0))
+    turned = rest(truth) - start
+    assert abs(turned[2]) > 0.1
+    assert np.allclose(np.delete(turned, 2), 0.0, atol=1e-6)
+    assert chosen.is_visible()
+    assert page.errors == []
