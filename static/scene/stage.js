@@ -1,6 +1,7 @@
 // The pointer in the scene: a click selects a link or an object, a drag of a link turns its joint, and a
 // double-click looks at a point. Everything else turns the camera.
 import { html } from "../instruments/shape.js";
+import { Branches } from "./branches.js";
 import { Joints } from "./joints.js";
 import { Views } from "./views.js";
 
@@ -14,6 +15,7 @@ export class Stage {
   #page; // {say, toast, status}
   #joints;
   #views;
+  #branches = null; // only for an arm that has some
   #selection = null; // the selected object, loaded with the first click beside the arm
   #press = null; // [x, y] of a press that may become a click
   #over = null; // pixel of the pointer, to be looked up in the next frame
@@ -38,7 +40,12 @@ export class Stage {
 
   async #load() {
     const answer = await fetch("api/v1/arm").catch(() => null);
-    if (answer?.ok) this.#joints.arm = await answer.json();
+    if (!answer?.ok) return;
+    const arm = await answer.json();
+    this.#joints.arm = arm;
+    if (arm.joints_only) return;
+    this.#branches = new Branches(this.#stage, this.#scene, arm, this.#page.status);
+    this.#branches.listen(this.#scene.contentWindow);
   }
 
   // Remove the selected object. Return whether there is one.
@@ -71,6 +78,7 @@ export class Stage {
     on("pointerout", ({ relatedTarget }) => relatedTarget || this.#hover(null));
     on("blur", this.#blur);
     on("dblclick", this.#focus);
+    this.#branches?.listen(inner);
   }
 
   // The focus may only have moved between the two documents.
