@@ -19,6 +19,7 @@ from tests.browser.session import AXES, MOVE, READY, Truth, bar, camera, clear_s
 from tests.browser.spots import Spot, seen_at, spot
 
 SIDE = Camera((0.25, -1.6, 0.45), (0.25, 0.0, 0.4))
+AHEAD = Camera((1.3, -0.25, 0.4), (0.3, 0.0, 0.3))
 BEHIND = Camera((-1.3, 0.0, 0.45), (0.0, 0.0, 0.35))
 TURN = -0.5
 """Angle [rad] by which the mouse goes round the axis, anticlockwise on the screen."""
@@ -168,10 +169,14 @@ def test_drag_beside_the_arm_turns_the_camera_and_the_handle_stays_a_handle(
     page.page.mouse.up()
     page.wait_until(lambda: not np.allclose(camera(page), seen, atol=1e-2), "another view")
     assert np.allclose(rest(truth), READY, atol=1e-6)
-    # The handle covers the fingers, which belong to joint 5.
+    # From ahead, the arrow upwards is in front of the arm.
+    page.look_from(AHEAD)
+    page.page.wait_for_timeout(500)
+    start = np.array(truth.status()["T"])[:3, 3]
     page.drag_arrow(MOVE, "z", 0.05)
     rest(truth)
-    assert truth.status()["T"][2][3] > 0.03
+    moved = np.array(truth.status()["T"])[:3, 3] - start
+    assert np.allclose(moved, (0.0, 0.0, 0.05), atol=0.005)
     assert label(page) == ""
 
 
