@@ -6,12 +6,13 @@ const Edit = (() => {
   const scene = byId("scene");
   let page = null; // {say, toast, connected, scene}
   let undoable = []; // names of the changes that can be undone, the newest first
+  let revocations = 0; // number of stops and changes of driver: an undo from before the next one is refused
   let leaving = null;
 
   function undo() {
     if (!page.connected()) return page.toast("No connection to the arm.");
     if (undoable.length) page.toast(`Undo: ${undoable[0]}`);
-    page.say({ do: "undo", id: "undo" });
+    page.say({ do: "undo", revocations, id: "undo" });
   }
 
   // Return whether the key was handled.
@@ -28,6 +29,7 @@ const Edit = (() => {
 
   function note({ detail: status }) {
     undoable = status.undo ?? [];
+    revocations = status.revocations;
     const list = undoable.slice(0, 5).join(", ") || "nothing yet";
     if (byId("undoable").textContent !== list) byId("undoable").textContent = list;
     byId("undo").disabled = !undoable.length;

@@ -145,6 +145,23 @@ def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> 
     assert np.allclose(truth.status()["q"], moved, atol=1e-6)
 
 
+def test_undo_names_the_stops_that_its_page_knows(new_page: ViserPage, truth: Truth) -> None:
+    """An undo that waits on its way while the arm is stopped and cleared is refused."""
+    page, start = new_page, np.array(truth.status()["goal"])
+    page.drag_arrow(MOVE, "y", 0.1)
+    truth.wait(10.0, moving=False)
+    moved = np.array(truth.status()["q"])
+    # The page shows an old status, and holds the drag for undoable, as while its connection hangs.
+    page.page.evaluate(
+        """(old) => window.dispatchEvent(new CustomEvent("status", {detail: old}))""",
+        {"undo": ["arm (drag)"], "revocations": truth.status()["revocations"] - 1},
+    )
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: "Do it again" in bar(page, "toast"), "the refusal")
+    assert np.allclose(truth.status()["q"], moved, atol=1e-6)
+    assert not np.allclose(moved, start, atol=1e-2)
+
+
 def test_undo_is_on_the_letter_z_and_needs_a_connection(page: ViserPage) -> None:
     press = """([code, key]) => document.body.dispatchEvent(
         new KeyboardEvent("keydown", {code, key, ctrlKey: true, bubbles: true}))"""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -16,8 +17,9 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, Grounds
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import Role
+from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason
+from katana450.arm.control.state import ACCEPTED, Finding, Outcome, Reason
 from katana450.errors import LeaseError
 from katana450.server.service import serialize
 from katana450.server.service.hub import TICK
@@ -260,3 +262,28 @@ def test_event_of_a_browser_without_a_gesture_has_no_actor(
     for client_id in (None, CLIENT):
         with pytest.raises(LeaseError, match="start page"):
             gestures.actor(client_id)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "meanwhile", "left"),
+    [(ACCEPTED, False, []), (DROPPED, False, ["speed"]), (DROPPED, True, [])],
+)
+def test_undone_change_is_kept_only_if_the_arm_refuses_its_inverse(
+    table: Table, outcome: Outcome, meanwhile: bool, left: list[str]
+) -> None:
+    gate, driver = table.hub.gate, table.join(PAGES[0])
+    reported: Future[Outcome] = Future()
+    table.arm.outcome = lambda _ticket: reported
+
+    def undoable() -> list[str]:
+        return [each.name for each in gate.undo.changes(driver.person.key, gate.revocations)]
+
+    table.hub.move(driver, cmd.SpeedScale(0.5))
+    assert undoable() == ["speed"]
+    gate.undo_last(driver.actor)
+    assert undoable() == []
+    if meanwhile:
+        # Its undoing would now also undo this one.
+        table.hub.move(driver, cmd.Hold())
+    reported.set_result(outcome)
+    assert undoable() == left

@@ -107,11 +107,11 @@ class CommandGate:
     def undo_last(self, actor: Actor) -> int:
         """Undo the last change of ``actor``; return the ticket. Raises as ``submit`` does."""
         with self._lock:
-            state = self.check_runs().state
+            arm = self.check_runs()
             self.check_current(actor)
-            change, command = self.undo.inverse(actor.key, self.revocations, state)
+            change, command = self.undo.inverse(actor.key, self.revocations, arm.state)
             ticket = self.submit(command, actor)
-            self.undo.forget(change)
+            self.undo.forget(change, arm.outcome(ticket))
             return ticket
 
     def _checked(self, command: cmd.Command, actor: Actor) -> Actor:

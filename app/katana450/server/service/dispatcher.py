@@ -113,6 +113,7 @@ class Dispatcher:
         if about_people is not None:
             return about_people
         if isinstance(request, hub.runner.request_types):
+            hub.gate.check_current(replace(participant.actor, seen=request.revocations))
             return hub.runner.handle(participant, request)
         if isinstance(request, requests.Undo):
             # Read before the undo: a stop in between is newer than the answer.

@@ -106,6 +106,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "speed": 1.0 if state is None else state.speed,
         "paused": state is not None and state.paused,
         "participants": len(hub.participants),
+        "revocations": hub.gate.revocations,
     }
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.scene_objects import SceneObject, named
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Outcome, State, Verdict
 from katana450.errors import InputError
 from katana450.server.service.interfaces import ArmInterface
 
@@ -77,12 +79,21 @@ class UndoHistory:
         """Begin without changes. ``clock`` is in seconds."""
         self._clock = clock
         self._changes: tuple[Change, ...] = ()
+        # Number of commands so far.
+        self._count = 0
+        # Outcomes are reported in the thread of the pipe.
+        self._lock = threading.Lock()
 
     @contextmanager
     def noted(self, arm: ArmInterface, command: cmd.Command, actor: Actor) -> Iterator[None]:
         """Note what ``command`` of ``actor`` changes, if the block delivers it without an error."""
         state, caught_up = arm.state, arm.caught_up
         yield
+        with self._lock:
+            self._note(state, command, actor, caught_up=caught_up)
+
+    def _note(self, state: State, command: cmd.Command, actor: Actor, *, caught_up: bool) -> None:
+        self._count += 1
         if isinstance(command, cmd.ReplaceScene):
             self._changes = ()
         found = _inverse(state, command)
@@ -134,12 +145,27 @@ class UndoHistory:
             command = cmd.PlaceObject(placed)
         return changes[0], command
 
-    def forget(self, change: Change) -> None:
-        """Remove ``change`` and everything after it: its inverse was accepted."""
-        # The inverse itself may have continued the change.
-        kept = [each.inverse is not change.inverse for each in self._changes]
-        if not all(kept):
-            self._changes = self._changes[: kept.index(False)]
+    def forget(self, change: Change, outcome: Future[Outcome]) -> None:
+        """Remove ``change`` and everything after it: its inverse was delivered.
+
+        It returns if the arm refuses the inverse, unless another command was given meanwhile.
+        ``outcome``: that of the inverse.
+        """
+        with self._lock:
+            # The inverse itself may have continued the change.
+            earlier = [each.inverse is not change.inverse for each in self._changes]
+            if all(earlier):
+                return
+            count, place = self._count, earlier.index(False)
+            undone, self._changes = self._changes[: place + 1], self._changes[:place]
+
+        def restore(outcome: Future[Outcome]) -> None:
+            refused = not outcome.cancelled() and outcome.result().verdict is Verdict.REFUSED
+            with self._lock:
+                if refused and self._count == count:
+                    self._changes = undone
+
+        outcome.add_done_callback(restore)
 
 
 def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | None:
