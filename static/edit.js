@@ -17,7 +17,8 @@ const Edit = (() => {
 
   // Return whether the key was handled.
   function key(event) {
-    if (event.type !== "keydown" || event.altKey) return false;
+    // Teach undoes its own changes.
+    if (event.type !== "keydown" || event.altKey || event.target?.closest?.("#teach")) return false;
     // The letter on the key, which is elsewhere on other keyboards; the place of the key if it has no such letter.
     const isZ = /^[a-z]$/i.test(event.key) ? event.key.toLowerCase() === "z" : event.code === "KeyZ";
     if (isZ && (event.ctrlKey || event.metaKey) && !event.shiftKey) {

@@ -108,7 +108,7 @@
 
   // Called for keys in both documents. Space and Esc only stop the arm, whatever has the focus.
   function key(event) {
-    const ends = event.key === " " || event.key === "Escape";
+    const ends = (event.key === " " && !mayType(event.target)) || event.key === "Escape";
     // Also in a text box, to which the focus may have moved.
     if (event.type === "keyup") Jog.release(event.code);
     if (ends && event.type === "keydown" && !event.repeat) stop();
@@ -122,6 +122,11 @@
     } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event))) return;
     event.preventDefault();
     event.stopImmediatePropagation();
+  }
+
+  // Whether a blank is typed: in a box for texts with blanks, while the arm is known to be at rest.
+  function mayType(target) {
+    return up && silent < QUIET && ["ok", "stopped"].includes(status?.mood) && target?.matches?.("[data-typed]");
   }
 
   // Whether this window may take the detour that the arm offers.
@@ -151,7 +156,7 @@
     byId("poster").querySelector("p").textContent =
       "This browser cannot draw the scene: WebGL 2 is off or missing. Turn on hardware acceleration in its settings, or use another browser. STOP and Jog work without it.";
   }
-  const closeSheets = () => ["jog", "objects"].forEach((id) => byId(id).hidden || show(id, false));
+  const closeSheets = () => ["jog", "objects", "teach"].forEach((id) => byId(id)?.hidden === false && show(id, false));
   window.katana = { key, blur, toast, drawn, closeSheets, view: null };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
@@ -244,6 +249,7 @@
     const cause = status.stopped ? [at, status.stopped] : [proven];
     text("why", [status.taken, status.why, ...cause, status.until].filter(Boolean).join(" "));
     byId("objects-button").hidden = status.role === "viewer";
+    byId("teach-button").hidden = status.role === "viewer" || !status.scripts;
     const clear = byId("clear-stop");
     clear.hidden = !status.stopped || !status.may_clear_stop;
     clear.disabled = status.wait !== "";
@@ -333,7 +339,7 @@
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
-    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard))) return drawLink();
+    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard))) return drawLink();
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) {
       toast(data.heard.why);
@@ -371,13 +377,24 @@
     byId(`${id}-button`).setAttribute("aria-expanded", String(shown));
     if (id === "jog") Jog.show(shown);
     if (shown) scene.contentWindow.katanaScene?.fold?.();
+    if (id === "teach") teach.show(shown);
   }
-  // Both sheets lie in the same corner.
-  for (const [id, other] of [["jog", "objects"], ["objects", "jog"]])
-    byId(`${id}-button`).addEventListener("click", () => {
-      show(other, false);
-      show(id, byId(id).hidden);
+  // The sheets lie in the same corner. On a wide screen Jog has room beside Teach.
+  const wide = matchMedia("(min-width: 1200px) and (min-height: 501px)");
+  for (const id of ["jog", "objects", "teach"])
+    byId(`${id}-button`).addEventListener("click", async () => {
+      if (id === "teach") await loadTeach();
+      const shown = byId(id).hidden;
+      for (const other of ["jog", "objects", "teach"])
+        if (other !== id && byId(other) && !(wide.matches && id !== "objects" && other !== "objects")) show(other, false);
+      show(id, shown);
     });
+  // The sheet of taught poses, loaded on first use.
+  let teach = null;
+  async function loadTeach() {
+    const { Teach } = await import("./teach/teach.js");
+    teach ??= await Teach.in(byId("stage"), { say, kept, scene, status: () => status });
+  }
   const kept = storage();
   Pace.begin({ say, toast });
   More.begin({ say, toast, kept, view: () => window.katana.view });

@@ -177,9 +177,27 @@ const Viser = (() => {
     return ray.intersectObjects(there, true).find((hit) => !hidden(hit)) ?? null;
   }
 
+  // Return the part round a pixel (x, y) of the page in `frame`, `high` pixels high, as a data URL of
+  // `width` by `height` pixels; empty before the first picture.
+  function thumbnail(frame, x, y, high, width, height) {
+    const canvas = frame.contentWindow?.__viserMutable?.canvas;
+    if (!canvas?.height) return "";
+    const { left, top, height: shown } = canvas.getBoundingClientRect();
+    const scale = canvas.height / shown;
+    const part = Math.min(high * scale, canvas.height, (canvas.width * height) / width);
+    const size = [(part * width) / height, part];
+    // Inside the picture.
+    const corner = [(x - left) * scale, (y - top) * scale].map((middle, axis) =>
+      Math.max(0, Math.min(middle - size[axis] / 2, [canvas.width, canvas.height][axis] - size[axis])),
+    );
+    const small = Object.assign(document.createElement("canvas"), { width, height });
+    small.getContext("2d").drawImage(canvas, corner[0], corner[1], size[0], size[1], 0, 0, width, height);
+    return small.toDataURL("image/jpeg", 0.8);
+  }
+
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, HINT, STEADY,
-    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press,
+    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, thumbnail,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,
     // Return the three.js object of a node; "" is viser's world.

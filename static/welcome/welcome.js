@@ -1,10 +1,10 @@
 // The first steps: a card over the scene with three things to try, each with one click.
 import { html, write } from "../instruments/shape.js";
+import { parts } from "../teach/run.js";
 
 const KEPT = "katana450.welcome"; // in the browser's storage, once the card was dismissed
 const STYLE = new URL("welcome.css", import.meta.url).href;
 const SCRIPT = "api/v1/scripts/Pour";
-const PART = 400; // characters of a script in one request
 const LOOK_EVERY = 400; // ms
 const PULSE_EVERY = 50; // ms
 const BEGINS = 5000; // ms within which the server takes up a program
@@ -119,10 +119,7 @@ export class Welcome {
       const answer = await fetch(SCRIPT);
       if (!answer.ok) throw new Error(await answer.text());
       const text = await answer.text();
-      for (let at = 0; at < text.length; at += PART) {
-        const more = at + PART < text.length;
-        this.#page.say({ do: "program", text: text.slice(at, at + PART), more, ...(more ? {} : { id: ID }) });
-      }
+      for (const part of parts(text)) this.#page.say(part.more ? part : { ...part, id: ID });
       await this.#watch();
     } catch (error) {
       write(this.#says, `The program cannot be run: ${error.message}`);

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from katana450.client import Client, connect
-from katana450.extensions.programs.script import parse
 from katana450.server.api import answers
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
@@ -143,17 +142,3 @@ def test_pause_during_planning_lasts_until_resume(
     wait(arm, lambda state: state.stopped is not None and not state.moving)
     page.press_in_bar("Clear stop")
     until(page, "On target", 5.0)
-
-
-def test_taught_poses_are_downloaded_where_there_is_no_folder(
-    page: ViserPage, tmp_path: Path
-) -> None:
-    page.click_button("Add pose")
-    page.wait_until(lambda: "1 pose" in page.text_of(".k450.program"), "the pose")
-    with page.page.expect_download() as downloading:
-        page.click_button("Save")
-    assert downloading.value.suggested_filename == "My script.yaml"
-    path = tmp_path / "My script.yaml"
-    downloading.value.save_as(path)
-    script = parse(path.read_text(encoding="utf-8"))
-    assert (script.name, len(script.steps)) == ("My script", 1)

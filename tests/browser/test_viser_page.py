@@ -110,6 +110,10 @@ def test_page_offers_its_scene(page: ViserPage) -> None:
     with part("picture"):
         kind = "Viser.picture({ contentWindow: window }).then(({ type }) => type)"
         assert ask(page, kind) == "image/png"
+    with part("thumbnail"):
+        place = "{ contentWindow: window }, 640, 400, 300, 96, 72"
+        assert ask(page, f"Viser.thumbnail({place})").startswith("data:image/jpeg;base64,")
+        assert ask(page, "Viser.thumbnail({}, 0, 0, 9, 9, 9)") == ""
     with part("node"):
         assert ask(page, "Viser.node('/box').isObject3D && Viser.node('').isObject3D")
         assert ask(page, "Viser.node('/none') === undefined")

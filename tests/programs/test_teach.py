@@ -1,4 +1,4 @@
-"""Tests of scripts from taught postures."""
+"""Tests of taught poses as scripts, and of the folder in which scripts are saved."""
 
 from __future__ import annotations
 
@@ -12,27 +12,81 @@ from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import LIBRARY, Scripts
-from katana450.extensions.programs.teach import script_from_postures
+from katana450.extensions.programs.teach import TaughtPose, taught
 from tests.programs.conftest import Stage
 
+TAUGHT = """\
+name: "Shown"
+steps:
+  - repeat:
+      times: 3
+      steps:
+        - speed: 0.5
+        - joints: [10, -68, 85, 8, 0]
+        - gripper: 3
+        - wait: 1.5
+        - via: {through: [{joints: [20, -68, 85, 8, 0]}, {joints: [30, -68, 85, 8, 0]}]}
+        - speed: 1
+        - joints: [40, -68, 85, 8, 0]
+"""
 
-def test_a_taught_script_goes_through_the_postures(stage: Stage) -> None:
-    ready = stage.session.ready
-    postures = [ready + 0.1, ready - 0.123456, ready]
-    program = compiled(
-        parse(script_from_postures("Shown", postures)), stage.plan_context, stage.begin()
+
+def test_a_script_of_poses_is_read_as_poses() -> None:
+    found = taught(parse(TAUGHT))
+    assert found is not None
+    assert (found.name, found.times) == ("Shown", 3)
+    rest = (-68.0, 85.0, 8.0, 0.0)
+    assert found.poses == (
+        TaughtPose((10.0, *rest), 0.5, gripper=3.0, wait=1.5),
+        TaughtPose((20.0, *rest), 0.5, blend=True),
+        TaughtPose((30.0, *rest), 0.5),
+        TaughtPose((40.0, *rest)),
     )
+
+
+def test_a_script_of_poses_goes_through_them(stage: Stage) -> None:
+    program = compiled(parse(TAUGHT), stage.plan_context, stage.begin())
     ends = [task.action.plan.end for task in program.tasks if isinstance(task.action, FollowPlan)]
-    assert program.name == "Shown"
-    assert np.abs(np.array(ends) - postures).max() < np.radians(6e-4)
+    assert np.degrees([q[0] for q in ends]) == pytest.approx([10.0, 30.0, 40.0] * 3)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "steps: [home]",
+        "about: x\nsteps:\n  - joints: [0, 0, 0, 0, 0]",
+        "gripper: none\nsteps:\n  - joints: [0, 0, 0, 0, 0]",
+        "speed: 0.5\nsteps:\n  - joints: [0, 0, 0, 0, 0]",
+        "steps:\n  - joints: [0, 0, 0, 0, 0]\n  - gripper: open",
+        "steps:\n  - wait: 1\n  - joints: [0, 0, 0, 0, 0]",
+        "steps:\n  - joints: [0, 0, 0, 0, 0]\n  - wait: 1\n  - gripper: 3",
+        "steps:\n  - joints: [0, 0, 0, 0, 0]\n  - wait: 1\n  - wait: 1",
+        "steps:\n  - via: {through: [{joints: [0, 0, 0, 0, 0]}, {x: 1, y: 1, z: 1}]}",
+        "steps: [{via: {through: [{joints: [0,0,0,0,0]}, {joints: [1,1,1,1,1]}], blend: 0.2}}]",
+        "steps: [{speed: 0.5}]",
+    ],
+)
+def test_a_script_that_says_more_is_no_list_of_poses(text: str) -> None:
+    assert taught(parse(text)) is None
+
+
+def test_poses_of_a_partial_repetition_are_written_out() -> None:
+    text = (
+        "steps:\n  - repeat: {times: 2, steps: [{joints: [1, 0, 0, 0, 0]}]}\n"
+        "  - joints: [2, 0, 0, 0, 0]\n"
+    )
+    found = taught(parse(text))
+    assert found is not None
+    assert (found.times, [pose.joints[0] for pose in found.poses]) == (1, [1.0, 1.0, 2.0])
 
 
 def test_a_saved_script_is_listed(tmp_path: Path) -> None:
     scripts = Scripts(tmp_path)
-    text = script_from_postures("Mine", [np.zeros(5)])
-    scripts.save("Mine", text)
+    before = scripts.changed
+    scripts.save("Mine", TAUGHT)
+    assert scripts.changed > before
     assert next(iter(scripts.paths)) == "Mine"
-    assert scripts.text("Mine") == text
+    assert scripts.text("Mine") == TAUGHT
     assert len(scripts.paths) == 1 + len(list(LIBRARY.glob("*.yaml")))
 
 
@@ -50,5 +104,6 @@ def test_without_a_folder_nothing_is_saved(tmp_path: Path) -> None:
         Scripts().save("Mine", "steps: [home]")
     with pytest.raises(InputError, match="no longer exists"):
         Scripts().text("Mine")
+    assert Scripts().changed == 0
     with pytest.raises(ConfigurationError, match="--programs"):
         Scripts(tmp_path / "none")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,9 +13,12 @@ import viser
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
@@ -25,9 +29,12 @@ from katana450.extensions.programs.server.step_list import ListedStep, steps_of
 from katana450.extensions.programs.server.step_list import page as step_page
 from katana450.extensions.programs.timeline import Timeline
 from katana450.maths.kinematics.forward import forward
+from katana450.resources import URDF_PATH
 from katana450.server.api.answers import Progress
+from katana450.settings import Settings
 from tests.browser.server import free_port
 from tests.view.gestures import ANNA, RecordedGestures
+from tests.viser_bridge.internals import nodes
 
 
 class ProgramRunner:
@@ -53,27 +60,30 @@ def server() -> Iterator[viser.ViserServer]:
 
 
 def test_texts_are_escaped_in_markup() -> None:
-    page = _page(
-        Progress(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"), 2
-    )
+    page = _page(Progress(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"))
     assert "&lt;b&gt;x" in page
     assert "<script>" not in page
-    assert "2 poses" in page
-    assert "a while" in _page(Progress(name="", by="me", status="planning"), 0)
+    assert "a while" in _page(Progress(name="", by="me", status="planning"))
     progress = Progress(
         name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", fraction=0.5
     )
-    assert "Step 2 of 3, line 7: line, 50%" in _page(progress, 0)
-    assert _page(None, 0) == ""
+    assert "Step 2 of 3, line 7: line, 50%" in _page(progress)
+    assert _page(None) == ""
 
 
-def test_panel_previews_steers_and_teaches(
+def test_panel_previews_and_steers(
     server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
     program_runner = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(
-        server, robot, program_runner, Scripts(tmp_path), RecordedGestures(), lambda: state
+        server,
+        robot,
+        program_runner,
+        Scripts(tmp_path),
+        RecordedGestures(),
+        lambda: state,
+        lambda: session,
     )
     # The first choice is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
@@ -99,12 +109,6 @@ def test_panel_previews_steers_and_teaches(
     ]  # fmt: skip
     assert parse(program_runner.requests[0][0]).name == "Circle with gripper"
 
-    for label in ("Add pose", "Add pose", "Save"):
-        panel._teach.value = label  # type: ignore[misc]  # as above
-        panel._on_teach(ANNA)
-    assert len(parse((tmp_path / "My script.yaml").read_text(encoding="utf-8")).steps) == 2
-    assert panel._choice.value == "My script"
-
 
 def marked(panel: ProgramsPanel) -> list[str]:
     """Return the names of the steps that the list marks as current."""
@@ -124,7 +128,13 @@ def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
     program_runner = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(
-        server, robot, program_runner, Scripts(tmp_path), RecordedGestures(), lambda: state
+        server,
+        robot,
+        program_runner,
+        Scripts(tmp_path),
+        RecordedGestures(),
+        lambda: state,
+        lambda: session,
     )
     plan_context = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
@@ -180,3 +190,97 @@ def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
     assert panel._look.disabled
     preview.look(1.0)
     assert not looked_at()
+
+
+def test_preview_shows_cup_and_water_at_the_time_in_words(
+    server: viser.ViserServer, robot: Robot, arm: MountedArm, tmp_path: Path
+) -> None:
+    program_runner = ProgramRunner()
+    session = describe_robot(Settings(), URDF_PATH, None).session
+    state = session.begin(session.ready, 0.0, 0.0)
+    panel = ProgramsPanel(
+        server,
+        robot,
+        program_runner,
+        Scripts(tmp_path),
+        RecordedGestures(),
+        lambda: state,
+        lambda: session,
+    )
+    plan_context = PlanContext(session, arm.T_base_shoulder)
+    program = compiled(parse(PourDemo().text), plan_context, state)
+    panel._with_ghosts = True
+    program_runner.program = program
+    panel.follow()
+    for thread in [each for each in threading.enumerate() if each.name == "preview"]:
+        thread.join(60.0)
+    assert panel._seek_time.visible
+    assert f"0.0 s of {panel._look.max:.1f} s" in panel._seek_time.content
+
+    def look(t: float) -> State:
+        panel._look.value = t  # type: ignore[misc]  # viser declares it read-only
+        panel._seek()
+        shown = panel._preview._shown
+        assert shown is not None
+        seen = shown.at(t)
+        assert seen is not None
+        return seen
+
+    def ghosts() -> tuple[bool, bool]:
+        """Return whether ghosts of the cup and of the water are shown."""
+        found = nodes(server)
+        cup, water = found["/path/objects/0"], found.get("/path/water")
+        return cup.visible, water is not None and water.visible
+
+    assert ghosts() == (False, False)
+    before, carried, emptied = 2.0, 0.35 * program.duration, 0.6 * program.duration
+    look(before)
+    # Filled, but still in its place.
+    assert ghosts() == (False, True)
+
+    def filled() -> tuple[bool, bool]:
+        """Return whether water is shown in the cup and in the basin."""
+        found = nodes(server)
+        return found["/path/water/cup"].visible, found["/path/water/basin"].visible
+
+    for t in (carried, emptied):
+        seen = look(t)
+        assert f"{t:.1f} s of" in panel._seek_time.content
+        assert ghosts() == (True, True)
+        (cup,) = (each for each in seen.objects if each.name == "cup")
+        assert cup.held
+        T = session.environment.pose(cup, seen.x)
+        assert nodes(server)["/path/objects/0"].position == pytest.approx(T[:3, 3])
+        assert seen.poured is not None
+        assert filled() == (seen.poured.water.cup > 0, seen.poured.water.basin > 0)
+    assert filled() == (False, True)
+    look(carried)
+    assert filled() == (True, False)
+    panel._preview.look(0.0)
+    assert ghosts() == (False, False)
+    look(carried)
+    program_runner.progress = Progress(name="x", by="me", status="running", step=2)
+    panel.follow()
+    assert ghosts() == (False, False)
+    assert not panel._seek_time.visible
+
+
+def test_list_follows_the_folder(
+    server: viser.ViserServer, robot: Robot, session: Session, tmp_path: Path
+) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    scripts = Scripts(tmp_path)
+    panel = ProgramsPanel(
+        server,
+        robot,
+        ProgramRunner(),
+        scripts,
+        RecordedGestures(),
+        lambda: state,
+        lambda: session,
+    )
+    chosen = panel._choice.value
+    scripts.save("Mine", "steps: [home]")
+    panel.follow()
+    assert panel._choice.options[0] == "Mine"
+    assert panel._choice.value == chosen

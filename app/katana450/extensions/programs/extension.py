@@ -72,6 +72,7 @@ def _folder(context: FolderContext) -> PanelFolder | None:
             Scripts(context.options.programs),
             context.gestures,
             context.state,
+            lambda: context.hub.present().session,
         )
 
 

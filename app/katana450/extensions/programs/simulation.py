@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +54,34 @@ class Trace:
     margin: FloatArray
 
 
+def simulated(
+    program: Program,
+    session: Session,
+    start: State,
+    period: float,
+    drive: Callable[[State], State],
+) -> Iterator[tuple[State, Run]]:
+    """Run ``program`` from ``start``; yield the state and the run after each tick.
+
+    ``period``: of the ticks [s]. ``drive`` gives the setpoint of a state to a driver and returns
+    the state with the place of the arm; ``follow_exactly`` does so without a driver. Raises
+    InputError if the program takes longer than MAX_DURATION.
+    """
+    state, run, tick = start, Run(start.t), 0
+    while run.phase is Phase.RUNNING:
+        tick += 1
+        if tick * period > MAX_DURATION:
+            raise InputError(f"The program takes more than {MAX_DURATION / 3600.0:g} hours.")
+        run, commands = runner.step(program, run, state, state.t)
+        state = drive(session.step(state, commands, start.t + tick * period))
+        yield state, run
+
+
+def follow_exactly(state: State) -> State:
+    """Return ``state`` of an arm that is at its setpoint."""
+    return Session.observe(state, state.setpoint, state.gripper_setpoint)
+
+
 class Simulation:
     """A run of a program, tick by tick."""
 
@@ -69,20 +97,18 @@ class Simulation:
     def ticks(self) -> Iterator[float]:
         """Run the program; yield the completed fraction after each tick, from 0 to 1."""
         sent = self._driver.start(0.0)
-        state = self._session.begin(sent.q, sent.gripper, 0.0)
-        self._records = [(state, 0)]
+        start = self._session.begin(sent.q, sent.gripper, 0.0)
+        self._records = [(start, 0)]
         count = len(self._program.tasks)
-        while self.run.phase is Phase.RUNNING:
-            t = len(self._records) * self._period
-            if t > MAX_DURATION:
-                raise InputError(f"The program takes more than {MAX_DURATION / 3600.0:g} hours.")
-            self.run, commands = runner.step(self._program, self.run, state, state.t)
-            state = self._session.step(state, commands, t)
-            sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
-            state = self._session.observe(state, sent.q, sent.gripper)
+        ticks = simulated(self._program, self._session, start, self._period, self._driven)
+        for state, self.run in ticks:
             self._records.append((state, self.run.number))
             fraction = runner.progress(self._program, self.run, state).fraction
             yield min((self.run.number + fraction) / count, 1.0)
+
+    def _driven(self, state: State) -> State:
+        sent = self._driver.send(state.setpoint, state.gripper_setpoint, state.t)
+        return self._session.observe(state, sent.q, sent.gripper)
 
     @property
     def states(self) -> tuple[State, ...]:

@@ -1,17 +1,34 @@
-"""The posture of the arm at a time of a program."""
+"""The arm, the objects and the water at a time of a program."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 
+from katana450.arm.control.modes import IDLE
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.simulation import follow_exactly, simulated
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.plan import Segment
+
+TICK = 0.02
+"""[s] Period of the simulation of objects and water."""
+
+MAX_MOMENTS = 3000
+"""Maximum number of states that are kept of a simulation."""
+
+TAU_SAMPLES = 65
+"""Number of points at which the place on a segment is tabulated by time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,18 +40,27 @@ class Timeline:
     Attributes:
         pieces: segments in their order, each with its finger joint [rad].
         begins: start times of the segments and the end of the last [s].
+        firsts: index of the first segment of each task of the program; of tasks without motion,
+            that of the next segment.
     """
 
     pieces: tuple[tuple[Segment, float], ...]
     begins: tuple[float, ...]
+    firsts: tuple[int, ...]
 
     @staticmethod
     def of(program: Program) -> Timeline:
         """Return the timeline of ``program``."""
-        plans = [task.action.plan for task in program.tasks if isinstance(task.action, FollowPlan)]
-        pieces = tuple((segment, plan.fingers) for plan in plans for segment in plan.segments)
+        pieces: list[tuple[Segment, float]] = []
+        firsts: list[int] = []
+        for task in program.tasks:
+            firsts.append(len(pieces))
+            if isinstance(task.action, FollowPlan):
+                plan = task.action.plan
+                pieces += [(segment, plan.fingers) for segment in plan.segments]
         durations = (segment.scaling.duration for segment, _ in pieces)
-        return Timeline(pieces, tuple(accumulate(durations, initial=0.0)))
+        begins = tuple(accumulate(durations, initial=0.0))
+        return Timeline(tuple(pieces), begins, tuple(firsts))
 
     @property
     def span(self) -> float:
@@ -53,3 +79,55 @@ class Timeline:
     def postures(self, count: int) -> list[tuple[FloatArray, float]]:
         """Return ``count`` postures (joints and fingers [rad]), evenly spaced in time."""
         return [self.at(t) for t in np.linspace(0.0, self.span, count).tolist()]
+
+    def time_of(self, state: State, task: int) -> float:
+        """Return the time [s] of ``state``, in which the program is at its ``task``."""
+        first, following = self.firsts[task], state.following
+        segment = None if following is None else following.segment
+        number = first if following is None else first + following.number
+        if following is None or number >= len(self.pieces) or self.pieces[number][0] is not segment:
+            # No segment of this task is under way.
+            return self.begins[first]
+        times, taus = self._tables[number]
+        return self.begins[number] + float(np.interp(following.local, taus, times))
+
+    @cached_property
+    def _tables(self) -> list[tuple[FloatArray, FloatArray]]:
+        """The times since the start of each segment [s], and tau [s] at these."""
+        tables = []
+        for segment, _ in self.pieces:
+            times = np.linspace(0.0, segment.scaling.duration, TAU_SAMPLES)
+            tables.append((times, np.array([segment.scaling.tau_after(t) for t in times.tolist()])))
+        return tables
+
+
+class Moment(NamedTuple):
+    """A state of the simulation, and its time on the timeline [s]."""
+
+    t: float
+    state: State
+
+
+def moments(
+    program: Program, timeline: Timeline, session: Session, state: State
+) -> Iterator[Moment]:
+    """Simulate ``program`` from ``state``; yield moments at increasing times of ``timeline``.
+
+    Of the time between two motions only the end is yielded. A program that fails ends early, and
+    one that takes longer than a day raises InputError.
+    """
+    at_rest = JointMotion.rest(state.setpoint)
+    start = replace(
+        state, stopped=None, paused=False, blocked=False, findings=(), mode=IDLE, motion=at_rest,
+        goal=state.setpoint, gripper_goal=state.gripper_setpoint,
+    )  # fmt: skip
+    apart = max(TICK, timeline.span / MAX_MOMENTS)
+    last = Moment(0.0, start)
+    yielded = -apart
+    for now, run in simulated(program, session, start, TICK, follow_exactly):
+        t = max(timeline.time_of(now, run.number), last.t)
+        if t > last.t and last.t - yielded >= apart:
+            yield last
+            yielded = last.t
+        last = Moment(t, now)
+    yield last

@@ -42,9 +42,10 @@ class Runner:
     request_types: ClassVar[tuple[type[Request], ...]] = ()
     controls: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, hub: Hub, options: Namespace) -> None:  # noqa: ARG002
+    def __init__(self, hub: Hub, options: Namespace) -> None:
         """Create a runner for ``hub``. ``options``: those of ``katana450 serve``."""
         self.hub = hub
+        self.options = options
 
     def handle(self, participant: Participant, request: Request) -> answers.Answer:  # noqa: ARG002
         """Execute ``request``, one of ``request_types``, and return its answer.

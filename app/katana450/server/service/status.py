@@ -107,6 +107,8 @@ def common(hub: Hub) -> dict[str, Any]:
         "paused": state is not None and state.paused,
         "participants": len(hub.participants),
         "revocations": hub.gate.revocations,
+        # A robot without a tool has only joints, which scripts do not move.
+        "scripts": bool(hub.runner.request_types) and state is not None and state.tool != "",
     }
 
 

@@ -66,7 +66,7 @@ class SceneObjectNodes:
         self._gestures = gestures
         self._meshes = meshes
         self._frames: dict[str, viser.FrameHandle] = {}
-        self._shapes: dict[str, _Shape] = {}
+        self._shapes: dict[str, ObjectShape] = {}
         self._handles: dict[str, viser.TransformControlsHandle] = {}
         self._made = 0
         self._objects: dict[str, SceneObject] = {}
@@ -122,7 +122,7 @@ class SceneObjectNodes:
         self._made += 1
         path = f"/{name}" if name in self._props else f"/objects/{self._made}"
         self._frames[name] = self._server.scene.add_frame(path, show_axes=False)
-        self._shapes[name] = _Shape(self._server, path, self._meshes, self._props.get(name))
+        self._shapes[name] = ObjectShape(self._server, path, self._meshes, self._props.get(name))
         self._handles[name] = self._handle(name)
 
     def _take_away(self, name: str) -> None:
@@ -184,7 +184,7 @@ class SceneObjectNodes:
         return dragged is not None and dragged[0] == name and self._gestures.is_current(dragged[1])
 
 
-class _Shape:
+class ObjectShape:
     """The drawn shape of an object: a file in its own colours, or a surface in one colour."""
 
     def __init__(

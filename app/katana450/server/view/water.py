@@ -49,15 +49,19 @@ TWIST = 2.4
 class WaterNodes:
     """The nodes of the water. Only visible changes are sent, and nothing of water at rest."""
 
-    def __init__(self, server: viser.ViserServer, water_environment: WaterEnvironment) -> None:
+    def __init__(
+        self, server: viser.ViserServer, water_environment: WaterEnvironment, path: str = "/water"
+    ) -> None:
+        """Add the hidden nodes below the new node ``path``."""
         self._server = server
+        self._path = path
         self._water_environment = water_environment
         self._flow = WaterFlow(water_environment)
         self._shown: Water | None = None
         self._body: FloatArray | None = None
         self._level = 0.0
         inside = water_environment.cup.inside
-        self._root = server.scene.add_frame("/water", show_axes=False, visible=False)
+        self._root = server.scene.add_frame(path, show_axes=False, visible=False)
         surface = self._flow.surface(self._flow.begin(inside.capacity / 2.0, np.eye(4)))
         self._cup = self._add("cup", body(inside, surface), BODY_FACES, IN_VESSEL)
         corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
@@ -135,7 +139,7 @@ class WaterNodes:
     ) -> viser.GlbHandle:
         """Add water of a fixed shape as GLB, which mirrors the room; viser's meshes cannot."""
         return self._server.scene.add_glb(
-            f"/water/{name}",
+            f"{self._path}/{name}",
             _glossy(corners, faces, opacity),
             cast_shadow=False,
             receive_shadow=False,
@@ -145,7 +149,7 @@ class WaterNodes:
         self, name: str, corners: FloatArray, faces: Faces, opacity: float
     ) -> viser.MeshHandle:
         return self._server.scene.add_mesh_simple(
-            f"/water/{name}",
+            f"{self._path}/{name}",
             corners,
             faces,
             color=COLOUR,

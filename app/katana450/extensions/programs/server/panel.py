@@ -1,4 +1,4 @@
-"""The panel of programs: choose, preview, run and step a script; teach a new one."""
+"""The panel of programs: choose, preview, run and step a script."""
 
 from __future__ import annotations
 
@@ -12,27 +12,20 @@ from typing import Any, Protocol
 import viser
 
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.errors import InputError, KatanaError
+from katana450.errors import KatanaError
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import Scripts, file_name
+from katana450.extensions.programs.script_files import Scripts
 from katana450.extensions.programs.server import step_list
-from katana450.extensions.programs.server.preview import Preview
+from katana450.extensions.programs.server.preview import TIME_STEP, Preview
 from katana450.extensions.programs.server.state_line import RUNS
 from katana450.extensions.programs.server.step_list import ListedStep
-from katana450.extensions.programs.teach import script_from_postures
-from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api.answers import Progress
 from katana450.server.view.controls import GestureGate, refuse
-
-TIME_STEP = 0.1
-"""[s] Step of the slider that chooses a time of the preview, and resolution of shown durations."""
-
-MAX_TAUGHT_POSTURES = 200
-"""Maximum number of postures in a taught script."""
 
 ORDERS = {
     "Run": ProgramOrder.RUN,
@@ -77,13 +70,16 @@ class ProgramsPanel:
         scripts: Scripts,
         gestures: GestureGate,
         state: Callable[[], State],
+        session: Callable[[], Session],
     ) -> None:
-        """Add the controls to the tab that is being built. ``state`` returns the newest state."""
+        """Add the controls to the tab that is being built.
+
+        ``state`` returns the newest state, and ``session`` the rules of the arm.
+        """
         self._steering = steering
         self._scripts = scripts
         self._gestures = gestures
         self._state = state
-        self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
         self._steps: tuple[ListedStep, ...] = ()
         # The text of the script that was last requested.
@@ -92,9 +88,9 @@ class ProgramsPanel:
         self._order_lock = threading.Lock()
         # Whether the program was requested by Preview, which also shows ghosts.
         self._with_ghosts = False
-        self._preview = Preview(server, robot)
+        self._preview = Preview(server, robot, session)
         gui = server.gui
-        names = tuple(scripts.paths)
+        self._listed, names = scripts.changed, tuple(scripts.paths)
         # Some scripts of the library need an arm without its gripper.
         suitable = (name for name in names if _suits(scripts, name, robot))
         self._choice = gui.add_dropdown(
@@ -118,24 +114,20 @@ class ProgramsPanel:
             step=TIME_STEP,
             initial_value=0.0,
             disabled=True,
-            hint="Show the arm at this time [s] of the preview, at full speed",
+            hint="Show arm, objects and water at this time [s] of the preview, at full speed",
         )
-        self._look.on_update(lambda _: self._preview.look(self._look.value))
+        self._look.on_update(lambda _: self._seek())
+        self._seek_time = gui.add_html("", visible=False)
         self._status = gui.add_html("")
         self._list = gui.add_html("", visible=False)
-        self._teach = gui.add_button_group(
-            "Teach",
-            ("Add pose", "Forget", "Save"),
-            hint="Add pose: add the present pose. Forget: drop all poses. Save: save a script that "
-            "moves through all poses, in the folder of --programs or else as a download",
-        )
-        self._teach.on_click(self._guarded(self._on_teach))
-        self._name = gui.add_text("Name", "My script", hint="Name of the script that Save writes")
 
     def follow(self) -> None:
-        """Update the display of the program's progress."""
+        """Update the display of the program's progress, and the list of scripts."""
+        if self._scripts.changed != self._listed:
+            self._listed = self._scripts.changed
+            self._choice.options = tuple(self._scripts.paths)
         progress = self._steering.progress
-        status = _page(progress, len(self._taught))
+        status = _page(progress)
         if status != self._status.content:
             self._status.content = status
         if self._order_lock.acquire(blocking=False):
@@ -147,6 +139,7 @@ class ProgramsPanel:
         if not self._look.disabled and progress is not None and progress.status in RUNS:
             self._preview.begin()
             self._look.disabled = True
+            self._show_time()
 
     def _follow_program(self) -> None:
         program = self._steering.program
@@ -165,13 +158,24 @@ class ProgramsPanel:
     def _draw(self, program: Program | None) -> None:
         """Show the preview and the steps of ``program``."""
         self._steps = () if program is None else step_list.steps_of(program)
-        span = self._preview.show(program, self._state().tool, ghosts=self._with_ghosts)
+        span = self._preview.show(program, self._state(), ghosts=self._with_ghosts)
         self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
         if span > 0.0:
             self._look.max = shown_seconds(span)
+        self._show_time()
 
-    def _order(self, actor: Actor, _client: viser.ClientHandle | None = None) -> None:
+    def _seek(self) -> None:
+        self._preview.look(self._look.value)
+        self._show_time()
+
+    def _show_time(self) -> None:
+        """Show the time of the slider in words."""
+        words = f"{self._look.value:.1f} s of {self._look.max:.1f} s"
+        self._seek_time.content = f"<div class='k450'><p class='hint' role=status>{words}</p></div>"
+        self._seek_time.visible = not self._look.disabled
+
+    def _order(self, actor: Actor) -> None:
         button = self._orders.value
         progress = self._steering.progress
         status = "" if progress is None else progress.status
@@ -191,36 +195,8 @@ class ProgramsPanel:
             self._drawn = None
             self._draw(None)
 
-    def _on_teach(self, _actor: Actor, client: viser.ClientHandle | None = None) -> None:
-        match self._teach.value:
-            case "Add pose":
-                if len(self._taught) >= MAX_TAUGHT_POSTURES:
-                    raise InputError(
-                        f"A script has at most {MAX_TAUGHT_POSTURES} poses. Save these first."
-                    )
-                self._taught.append(self._state().goal)
-            case "Forget":
-                self._taught.clear()
-            case "Save":
-                if not self._taught:
-                    raise InputError("There is no pose yet. Move the arm and add a pose.")
-                self._save(client)
-
-    def _save(self, client: viser.ClientHandle | None) -> None:
-        """Save the poses as a script in the folder or, without one, as a download of ``client``."""
-        name = self._name.value.strip()
-        text = script_from_postures(name, self._taught)
-        if client is not None and not self._scripts.keeps:
-            # The poses are kept, because a browser may refuse the file.
-            client.send_file_download(file_name(name), text.encode(), save_immediately=True)
-            return
-        self._scripts.save(name, text)
-        self._taught.clear()
-        self._choice.options = tuple(self._scripts.paths)
-        self._choice.value = name  # type: ignore[misc]  # viser declares it read-only
-
     def _guarded(
-        self, act: Callable[[Actor, viser.ClientHandle | None], None]
+        self, act: Callable[[Actor], None]
     ) -> Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]:
         """Return a handler that runs ``act`` in a thread and shows errors in the sender's page."""
 
@@ -229,7 +205,7 @@ class ProgramsPanel:
                 return
             try:
                 actor = self._gestures.actor(event.client_id)
-                await asyncio.to_thread(act, actor, event.client)
+                await asyncio.to_thread(act, actor)
             except KatanaError as error:
                 refuse(event, error)
 
@@ -249,8 +225,8 @@ def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
         return False
 
 
-def _page(progress: Progress | None, poses: int) -> str:
-    """Return the progress, and the number of taught poses, as HTML; empty without both."""
+def _page(progress: Progress | None) -> str:
+    """Return the progress as HTML; empty without one."""
     lines = []
     if progress is not None:
         head = f"<b>{escape(progress.name)}</b> " if progress.name else ""
@@ -272,7 +248,5 @@ def _page(progress: Progress | None, poses: int) -> str:
             seconds = shown_seconds(progress.seconds)
             lines.append(f"{progress.steps} steps, {seconds:.1f} s of motion at full speed")
         lines += [escape(line) for line in progress.why.splitlines()]
-    if poses:
-        lines.append(f"Taught: {poses} pose{'s' if poses > 1 else ''}")
     body = "".join(f"<div>{line}</div>" for line in lines)
     return f"<div class='k450 program'>{body}</div>" if body else ""

@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import threading
+from bisect import bisect_right
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
 
 import numpy as np
 import viser
 
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.errors import KatanaError
 from katana450.extensions.programs.actions import FollowPlan, UseTool
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.timeline import Timeline
+from katana450.extensions.programs.server.ghost_scene import GhostScene
+from katana450.extensions.programs.timeline import Moment, Timeline, moments
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.scene import Colour, GhostNodes, surface
 from katana450.server.viser_bridge.posing import arrange
+
+TIME_STEP = 0.1
+"""[s] Step of the slider that chooses a time of the preview, and resolution of shown durations."""
 
 COLOUR: Colour = (64, 156, 255)
 """Colour of the path and of the ghosts."""
@@ -40,13 +52,17 @@ class Preview:
     """The path line, kept until another program is shown, and the ghosts, kept until it runs.
 
     The ghosts are sent when they are first shown: their shapes take up to a sixth of the page's
-    data.
+    data. Objects and water are simulated in a thread, which takes a second for a minute of motion.
+    Until then a time shows the arm alone.
     """
 
-    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
-        """Add the hidden path line to the scene."""
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, session: Callable[[], Session]
+    ) -> None:
+        """Add the hidden path line to the scene. ``session`` returns the rules of the arm."""
         self._server = server
         self._robot = robot
+        self._session = session
         self._path_line = server.scene.add_line_segments(
             "/path/preview",
             np.zeros((1, 2, 3), dtype=np.float32),
@@ -56,53 +72,130 @@ class Preview:
         )
         self._sweep: GhostSweep | None = None
         self._ghost: GhostNodes | None = None
-        self._timeline: Timeline | None = None
+        self._ghost_scene: GhostScene | None = None
+        self._shown: _Shown | None = None
         # The slider's callback runs in a thread of viser.
         self._lock = threading.Lock()
 
-    def show(self, program: Program | None, tool: str, *, ghosts: bool) -> float:
-        """Draw ``program``, which begins with ``tool``; return its duration [s], 0 for nothing."""
+    def show(self, program: Program | None, state: State, *, ghosts: bool) -> float:
+        """Draw ``program``, which begins in ``state``; return its duration [s], 0 for nothing."""
         with self._lock:
             self._hide_ghosts()
-            paths = [] if program is None else _tool_paths(self._robot.require_arm(), program, tool)
+            self._shown = None
+            arm = self._robot.require_arm()
+            paths = [] if program is None else _tool_paths(arm, program, state.tool)
             if paths:
                 self._path_line.points = np.concatenate(paths).astype(np.float32)
             self._path_line.visible = bool(paths)
-            self._timeline = Timeline.of(program) if program is not None and paths else None
-            if self._timeline is None:
+            if program is None or not paths:
                 return 0.0
+            self._shown = _Shown(program, Timeline.of(program), state)
             if ghosts:
                 if self._sweep is None:
                     self._sweep = GhostSweep(self._server, self._robot)
-                self._sweep.show(self._timeline)
-            return self._timeline.span
+                self._sweep.show(self._shown.timeline)
+                self._simulate(self._shown)
+            return self._shown.timeline.span
 
     def look(self, t: float) -> None:
-        """Show the arm at the time ``t`` [s] of the preview; hide it at 0."""
+        """Show arm, objects and water at the time ``t`` [s] of the preview; hide them at 0."""
         with self._lock:
-            timeline = self._timeline
-            if timeline is None or t <= 0.0:
-                if self._ghost is not None:
-                    self._ghost.show(False, LOOK)
+            shown = self._shown
+            if shown is None or t <= 0.0:
+                self._hide_ghost()
                 return
+            shown.look = t
+            if not shown.simulated:
+                self._simulate(shown)
             if self._ghost is None:
                 self._ghost = GhostNodes(
                     self._server, self._robot, "/path/ghost", LOOK, LOOK_OPACITY
                 )
-            self._ghost.move(self._robot.joint_values(*timeline.at(t)))
+            state = shown.at(t)
+            posture = shown.timeline.at(t) if state is None else (state.q, state.gripper)
+            self._ghost.move(self._robot.joint_values(*posture))
             self._ghost.show(True, LOOK)
+            if state is not None:
+                self._objects().show(self._session(), shown.start, state)
+            elif self._ghost_scene is not None:
+                self._ghost_scene.hide()
 
     def begin(self) -> None:
         """Hide the ghosts, because the program runs and the arm itself shows it."""
         with self._lock:
             self._hide_ghosts()
-            self._timeline = None
+            self._shown = None
+
+    def _simulate(self, shown: _Shown) -> None:
+        shown.simulated = True
+
+        def simulate() -> None:
+            with suppress(KatanaError):
+                steps = moments(shown.program, shown.timeline, self._session(), shown.start)
+                for moment in steps:
+                    if self._shown is not shown:
+                        return
+                    shown.moments.append(moment)
+            with self._lock:
+                if self._shown is shown:
+                    self._objects().prepare(shown.held)
+            if shown.look > 0.0:
+                self.look(shown.look)
+
+        # A preview without objects needs no simulation.
+        if shown.start.objects:
+            threading.Thread(target=simulate, name="preview", daemon=True).start()
+
+    def _objects(self) -> GhostScene:
+        if self._ghost_scene is None:
+            self._ghost_scene = GhostScene(self._server, LOOK, LOOK_OPACITY)
+        return self._ghost_scene
 
     def _hide_ghosts(self) -> None:
         if self._sweep is not None:
             self._sweep.hide()
+        self._hide_ghost()
+
+    def _hide_ghost(self) -> None:
         if self._ghost is not None:
             self._ghost.show(False, LOOK)
+        if self._ghost_scene is not None:
+            self._ghost_scene.hide()
+
+
+@dataclass
+class _Shown:
+    """The program that is shown, and what is known of it.
+
+    Attributes:
+        program: the program.
+        timeline: its motions.
+        start: the state in which it begins.
+        moments: the simulated states so far, in the order of their times.
+        simulated: whether the simulation has begun.
+        look: the time that was looked at last [s].
+    """
+
+    program: Program
+    timeline: Timeline
+    start: State
+    moments: list[Moment] = field(default_factory=list)
+    simulated: bool = False
+    look: float = 0.0
+
+    @property
+    def held(self) -> list[SceneObject]:
+        """The objects that are held at some time, each once."""
+        states = (moment.state for moment in self.moments)
+        found = {each.name: each for state in states for each in state.objects if each.held}
+        return list(found.values())
+
+    def at(self, t: float) -> State | None:
+        """Return the simulated state at ``t`` [s]; None if it is not known."""
+        number = bisect_right(self.moments, t, key=lambda moment: moment.t)
+        if not 0 < number <= len(self.moments) or t > self.moments[-1].t + TIME_STEP:
+            return None
+        return self.moments[number - 1].state
 
 
 class GhostSweep:

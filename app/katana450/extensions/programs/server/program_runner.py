@@ -42,7 +42,7 @@ class ProgramRunner(Runner):
     """The runner of at most one program at a time."""
 
     request_types = (requests.Program, requests.Steer, requests.AllowUnattended)
-    controls = ("Script", "Program", "Look at", "Teach", "Name")
+    controls = ("Script", "Program", "Look at")
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
         """Prepare to run programs of ``hub``.

@@ -1,29 +1,123 @@
-"""Scripts of the library over HTTP, for pages that run them."""
+"""Scripts over HTTP, for the page: the list, one text, reading a text, and saving it."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
+from typing import Any
 
+import msgspec
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
+from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
+from katana450.extensions.programs.source import MAX_BYTES, ScriptError
+from katana450.extensions.programs.teach import taught
 from katana450.server.api.fields import ROOT
+from katana450.server.service.participants import actor_of
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, body_of
 from katana450.server.web.http_api import RouteContext
 
+MAX_WAITING = 8
+"""Maximum number of texts that wait to be read; reading a long one takes most of a second."""
 
-def routes(context: RouteContext) -> list[BaseRoute]:
-    """Return the route of the scripts of the library, by name."""
-    scripts = Scripts()
 
-    async def read(request: Request) -> Response:
-        context.identity(request)
+class ScriptRoutes:
+    """The HTTP routes of scripts."""
+
+    def __init__(self, context: RouteContext, scripts: Scripts) -> None:
+        """Serve ``scripts`` to the clients of ``context``."""
+        self._context = context
+        self._scripts = scripts
+        self._reading = asyncio.Lock()
+        self._waiting = 0
+
+    def routes(self) -> list[BaseRoute]:
+        """Return all routes."""
+        return [
+            Route(f"{ROOT}/scripts", self._list),
+            Route(f"{ROOT}/scripts", self._read, methods=["POST"]),
+            Route(f"{ROOT}/scripts/{{name}}", self._text),
+            Route(f"{ROOT}/scripts/{{name}}", self._save, methods=["POST"]),
+        ]
+
+    async def _list(self, request: Request) -> Response:
+        """Return the names of all scripts, and whether there is a folder to save in."""
+        self._context.identity(request)
+        names = await asyncio.to_thread(lambda: list(self._scripts.paths))
+        return _json({"names": names, "saves": self._scripts.keeps})
+
+    async def _text(self, request: Request) -> Response:
+        self._context.identity(request)
         try:
-            text = await asyncio.to_thread(scripts.text, request.path_params["name"])
+            text = await asyncio.to_thread(self._scripts.text, request.path_params["name"])
         except InputError as error:
             return PlainTextResponse(str(error), status_code=404)
         return PlainTextResponse(text)
 
-    return [Route(f"{ROOT}/scripts/{{name}}", read)]
+    async def _read(self, request: Request) -> Response:
+        """Return the problems of a text by line, and the taught poses if it has only these."""
+
+        def read(text: str) -> Response:
+            try:
+                found = taught(parse(text))
+            except ScriptError as error:
+                return _json({"problems": error.problems, "taught": None})
+            return _json({"problems": (), "taught": found})
+
+        return await self._with_text(request, read)
+
+    async def _save(self, request: Request) -> Response:
+        """Save a text that is a valid script under a new name in the folder."""
+        name = request.path_params["name"]
+        sender = self._context.identity(request)
+
+        def save(text: str) -> Response:
+            try:
+                parse(text)
+            except InputError as error:
+                return PlainTextResponse(str(error), status_code=NOT_UNDERSTOOD)
+            try:
+                self._scripts.save(name, text)
+            except InputError as error:
+                return PlainTextResponse(str(error), status_code=NOT_NOW)
+            return Response(status_code=204)
+
+        answer = await self._with_text(request, save)
+        if answer.status_code == 204:
+            actor = actor_of(sender, CommandChannel.HTTP)
+            self._context.hub.recorder.note("script", actor, {"saved": name})
+        return answer
+
+    async def _with_text(self, request: Request, act: Callable[[str], Response]) -> Response:
+        """Return the answer of ``act`` to the text in the body of ``request``, run in a thread."""
+        if not self._context.identity(request).role.may_drive:
+            raise HTTPException(403, "You may watch, not drive.")
+        data = await body_of(request, MAX_BYTES)
+        if self._waiting >= MAX_WAITING:
+            raise HTTPException(TOO_MANY, "Too many scripts at once. Wait a moment.")
+        try:
+            text = data.decode()
+        except UnicodeDecodeError as error:
+            raise HTTPException(NOT_UNDERSTOOD, "The script is not UTF-8 text.") from error
+        self._waiting += 1
+        try:
+            async with self._reading:
+                return await asyncio.to_thread(act, text)
+        finally:
+            self._waiting -= 1
+
+
+def routes(context: RouteContext) -> list[BaseRoute]:
+    """Return the routes of the scripts of the library and of the folder of ``--programs``."""
+    folder = getattr(context.hub.runner.options, "programs", None)
+    return ScriptRoutes(context, Scripts(folder)).routes()
+
+
+def _json(found: Any) -> Response:
+    return Response(msgspec.json.encode(found), media_type="application/json")

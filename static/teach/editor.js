@@ -1,0 +1,90 @@
+// The text of a script, with the numbers of its lines and what the server says about them.
+import { html } from "../instruments/shape.js";
+
+const AFTER = 400; // ms without typing after which the text is checked
+const PLACE = /^line (\d+), column \d+: (.*)$/;
+
+export class Editor {
+  element = html("div", { id: "teach-editor" });
+  #area = html("textarea", {
+    id: "teach-text", "aria-label": "Text of the script", "aria-describedby": "teach-problems", spellcheck: "false",
+    autocapitalize: "off", autocomplete: "off", wrap: "off", rows: "12", maxlength: "65536", "data-typed": "",
+  });
+  #numbers = html("pre", { "aria-hidden": "true" });
+  #problems = html("ol", { id: "teach-problems", role: "status" });
+  #timer = null;
+  #checked = 0;
+
+  // `typed` is called with the text after each change.
+  constructor(typed) {
+    this.element.append(html("div", {}, this.#numbers, this.#area), this.#problems);
+    this.#area.addEventListener("input", () => {
+      this.#count();
+      typed(this.text);
+      clearTimeout(this.#timer);
+      this.#timer = setTimeout(() => this.check(), AFTER);
+    });
+    this.#area.addEventListener("scroll", () => (this.#numbers.scrollTop = this.#area.scrollTop));
+  }
+
+  get text() {
+    return this.#area.value;
+  }
+
+  set text(text) {
+    this.#area.value = text;
+    this.#count();
+    this.explain([]);
+  }
+
+  focus() {
+    this.#area.focus();
+  }
+
+  // Return what the server reads in the text, and show its problems. Without an answer return null.
+  async check() {
+    clearTimeout(this.#timer);
+    const number = (this.#checked += 1);
+    const answer = await fetch("api/v1/scripts", { method: "POST", body: this.text }).catch(() => null);
+    const found = answer?.ok ? await answer.json() : null;
+    if (number === this.#checked && found) this.explain(found.problems);
+    return found;
+  }
+
+  // Show `problems`: {line, text} each.
+  explain(problems) {
+    const lines = new Set(problems.map(({ line }) => line));
+    [...this.#numbers.children].forEach((each, i) => each.classList.toggle("bad", lines.has(i + 1)));
+    this.#problems.replaceChildren(
+      ...problems.map(({ line, text }) => {
+        const button = html("button", { type: "button" }, html("b", {}, `Line ${line}`), ` ${text}`);
+        button.addEventListener("click", () => this.#select(line));
+        return html("li", {}, button);
+      }),
+    );
+  }
+
+  #select(line) {
+    const lines = this.text.split("\n");
+    const start = lines.slice(0, line - 1).reduce((sum, each) => sum + each.length + 1, 0);
+    this.#area.focus();
+    this.#area.setSelectionRange(start, start + (lines[line - 1] ?? "").length);
+  }
+
+  #count() {
+    const count = this.text.split("\n").length;
+    if (this.#numbers.childElementCount === count) return;
+    this.#numbers.replaceChildren(...Array.from({ length: count }, (_, i) => html("span", {}, `${i + 1}\n`)));
+  }
+}
+
+// Return the problems that an error of a program names by their lines, and its other lines.
+export function problemsOf(why) {
+  const found = { problems: [], rest: [] };
+  for (const each of why.split("\n")) {
+    const place = PLACE.exec(each);
+    if (place) found.problems.push({ line: Number(place[1]), text: place[2] });
+    else if (each) found.rest.push(each);
+  }
+  return found;
+}

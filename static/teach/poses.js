@@ -1,0 +1,108 @@
+// Taught poses as data, and the text of the script that moves through them.
+// A pose is {id, joints, gripper, grips, wait, speed, blend, picture}: five angles [deg], where the
+// fingers were [deg, or mm if they slide; null without fingers] and whether they move there, the time
+// to wait there [s], the speed to it [%], whether it is passed without a rest, and a data URL.
+export const MAX_POSES = 100;
+export const MAX_TIMES = 100;
+export const MAX_WAIT = 3600; // s
+const MAX_VIAS = 50; // places of one step `via`
+const MAX_NAME = 40;
+const MAX_PICTURE = 12_000; // characters
+const MAX_TEXT = 65_536;
+const MAX_KEPT = 1_500_000; // characters of all poses: a browser keeps 5 million
+export const FORMAT = 1;
+
+// Return the pose for the joints and the fingers of a state; arm: the answer `arm`.
+export function poseOf(state, arm, picture) {
+  const degrees = 180 / Math.PI;
+  const joints = state.goal.map((q, i) => within(q * degrees, arm.lower[i] * degrees, arm.upper[i] * degrees));
+  return made({ joints, gripper: fingersOf(state, arm), grips: Boolean(arm.gripper), picture });
+}
+
+// Return where the fingers of a state are [deg or mm]; null without fingers.
+export function fingersOf(state, arm) {
+  if (!arm.gripper) return null;
+  const unit = arm.gripper_slides ? 1000 : 180 / Math.PI;
+  const [closed, open] = arm.gripper.slice(0, 2).sort((a, b) => a - b);
+  return within(state.gripper_goal * unit, closed * unit, open * unit);
+}
+
+export const made = (fields) => ({
+  id: Math.random().toString(36).slice(2), gripper: null, grips: false, wait: 0, speed: 100, blend: false, picture: "", ...fields,
+});
+
+// Return the pose that the server has read from a script.
+export const read = ({ joints, gripper, wait, speed, blend }) =>
+  made({ joints, gripper, grips: gripper !== null, wait, speed: Math.round(speed * 100), blend });
+
+// Round to a thousandth, but not beyond a limit.
+function within(value, low, high) {
+  const rounded = Math.round(value * 1000) / 1000;
+  if (rounded > high) return Math.floor(high * 1000) / 1000;
+  return (rounded < low ? Math.ceil(low * 1000) / 1000 : rounded) + 0;
+}
+
+// Return why the arm has to rest at the pose `i`; empty if it can pass it with a rounded corner.
+export function restsBecause(poses, i) {
+  const next = poses[i + 1];
+  if (!next) return "The arm rests at the last pose.";
+  if (poses[i].wait) return "The arm waits there.";
+  if (poses[i].grips) return "The gripper moves there.";
+  return next.speed === poses[i].speed ? "" : "The next motion has another speed.";
+}
+
+// Return {text, poseAt}: the script, and a function that returns the index of the pose of a line
+// that counts from 1; null for a line of no pose.
+export function scriptOf({ name, times, poses }) {
+  const lines = [`name: ${JSON.stringify(name)}`, "steps:"];
+  const owners = [null, null];
+  const put = (line, owner = null) => {
+    lines.push((times > 1 && owner !== null ? "        - " : "  - ") + line);
+    owners.push(owner);
+  };
+  if (times > 1) {
+    lines.push("  - repeat:", `      times: ${times}`, "      steps:");
+    owners.push(null, null, null);
+  }
+  const alike = poses.every(({ speed }) => speed === 100);
+  for (let i = 0; i < poses.length; i++) {
+    // Each repetition begins with the speed of the last pose.
+    const before = i ? poses[i - 1].speed : alike ? 100 : null;
+    if (poses[i].speed !== before) put(`speed: ${poses[i].speed / 100}`, i);
+    const first = i;
+    while (poses[i].blend && !restsBecause(poses, i) && i - first < MAX_VIAS - 1) i++;
+    const angles = poses.slice(first, i + 1).map(({ joints }) => `[${joints.join(", ")}]`);
+    put(first === i ? `joints: ${angles}` : `via: {through: [${angles.map((each) => `{joints: ${each}}`).join(", ")}]}`, first);
+    if (poses[i].grips) put(`gripper: ${poses[i].gripper}`, i);
+    if (poses[i].wait) put(`wait: ${poses[i].wait}`, i);
+  }
+  return { text: `${lines.join("\n")}\n`, poseAt: (line) => owners[line - 1] ?? null };
+}
+
+const isNumber = (value, low, high) => Number.isFinite(value) && value >= low && value <= high;
+
+// Return the content that is kept as `json`. Throws an error if it is anything else.
+export function restored(json) {
+  const { format, name, times, poses, text } = JSON.parse(json);
+  const good = (pose) =>
+    pose.joints.length === 5 && pose.joints.every((angle) => isNumber(angle, -720, 720)) &&
+    (pose.gripper === null ? pose.grips === false : isNumber(pose.gripper, -180, 180) && typeof pose.grips === "boolean") &&
+    isNumber(pose.wait, 0, MAX_WAIT) && isNumber(pose.speed, 1, 100) && typeof pose.blend === "boolean" &&
+    typeof pose.picture === "string" && (!pose.picture || isPicture(pose.picture));
+  if (
+    format !== FORMAT || typeof name !== "string" || name.length > MAX_NAME || !Number.isInteger(times) ||
+    !isNumber(times, 1, MAX_TIMES) || poses.length > MAX_POSES || !poses.every(good) ||
+    !(text === null || (typeof text === "string" && text.length <= MAX_TEXT))
+  )
+    throw new Error("This is not what the page keeps.");
+  return { name, times, poses: poses.map((pose) => made({ ...pose })), text };
+}
+
+// Return `content` as a text to keep, without pictures if they take too much room.
+export function kept({ name, times, poses, text }) {
+  const json = (some) => JSON.stringify({ format: FORMAT, name, times, poses: some, text });
+  const whole = json(poses);
+  return whole.length <= MAX_KEPT ? whole : json(poses.map((pose) => ({ ...pose, picture: "" })));
+}
+
+export const isPicture = (url) => url.startsWith("data:image/") && url.length <= MAX_PICTURE;

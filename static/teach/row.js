@@ -1,0 +1,99 @@
+// One pose in the list: its picture, which is also its handle, its numbers and its buttons.
+import { html, set, svg, write } from "../instruments/shape.js";
+import { MAX_WAIT, restsBecause } from "./poses.js";
+
+const SHAPES = {
+  go: "M3 10h12M10 4.5 15.5 10 10 15.5",
+  up: "M10 16V4M4.5 9.5 10 4l5.5 5.5",
+  down: "M10 4v12M4.5 10.5 10 16l5.5-5.5",
+  remove: "M5 5l10 10M15 5 5 15",
+  grip: "M7 17v-4L3.5 9.5V3M13 17v-4l3.5-3.5V3M7 13h6",
+  blend: "M3 16c9 0 3-12 14-12",
+};
+
+function button(name, label, act, text = "") {
+  const icon = svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: SHAPES[name] }));
+  const made = html("button", { type: "button", class: name, title: label, "aria-label": label }, icon);
+  if (text) made.append(html("span", {}, text));
+  made.addEventListener("click", act);
+  return made;
+}
+
+function number(label, unit, low, high, step, put) {
+  const input = html("input", { type: "number", min: low, max: high, step, inputmode: "decimal", "aria-label": label });
+  input.addEventListener("change", () => {
+    const value = input.valueAsNumber;
+    put(Number.isFinite(value) ? Math.round(Math.min(Math.max(value, low), high) * 100) / 100 : null);
+  });
+  return [input, html("label", {}, html("span", {}, label), input, html("span", {}, unit))];
+}
+
+export class Row {
+  element = html("li");
+  handle = html("div", { class: "handle", title: "Drag to another place" });
+  #number = html("b");
+  #picture = html("img", { alt: "", draggable: "false", width: "96", height: "72" });
+  #buttons;
+  #wait;
+  #speed;
+  #pose = null;
+
+  // acts: {put(id, fields), go(id), move(id, by), remove(id), toggleGrip(id)}; fingers: whether there are any.
+  constructor(id, acts, fingers) {
+    this.element.dataset.id = id;
+    const put = (name) => (value) => acts.put(id, { [name]: value ?? this.#pose[name] });
+    const [speed, speedLabel] = number("Speed", "%", 1, 100, 5, put("speed"));
+    const [wait, waitLabel] = number("Wait", "s", 0, MAX_WAIT, 0.5, put("wait"));
+    [this.#speed, this.#wait] = [speed, wait];
+    this.#buttons = {
+      grip: button("grip", "", () => acts.toggleGrip(id)),
+      blend: button("blend", "", () => !this.#isOff("blend") && acts.put(id, { blend: !this.#pose.blend })),
+      go: button("go", "", () => acts.go(id), "Go"),
+      up: button("up", "", () => !this.#isOff("up") && acts.move(id, -1)),
+      down: button("down", "", () => !this.#isOff("down") && acts.move(id, 1)),
+      remove: button("remove", "", () => acts.remove(id)),
+    };
+    if (!fingers) this.#buttons.grip.hidden = true;
+    this.handle.append(this.#picture, this.#number);
+    const row = html("div", { class: "acts" }, ...Object.values(this.#buttons));
+    this.element.append(this.handle, html("div", { class: "numbers" }, speedLabel, waitLabel), row);
+  }
+
+  #isOff(name) {
+    return this.#buttons[name].getAttribute("aria-disabled") === "true";
+  }
+
+  // Show the pose `i` of all; `current`: whether the arm moves to it, `next`: whether Step does.
+  show(poses, i, current, next) {
+    const pose = (this.#pose = poses[i]);
+    const name = `pose ${i + 1}`;
+    write(this.#number, String(i + 1));
+    set(this.element, "aria-label", `${name[0].toUpperCase()}${name.slice(1)}${next ? ", next for Step" : ""}`);
+    this.element.classList.toggle("next", next);
+    if (current) set(this.element, "aria-current", "step");
+    else this.element.removeAttribute("aria-current");
+    if (this.#picture.getAttribute("src") !== pose.picture) {
+      if (pose.picture) this.#picture.src = pose.picture;
+      this.#picture.style.visibility = pose.picture ? "" : "hidden";
+    }
+    for (const [input, value, words] of [[this.#speed, pose.speed, "Speed to"], [this.#wait, pose.wait, "Wait after"]]) {
+      if (input !== document.activeElement || input.value === "" || input.valueAsNumber !== value) input.value = value;
+      set(input, "aria-label", `${words} ${name}`);
+    }
+    const rests = restsBecause(poses, i);
+    this.#label("grip", pose.grips ? `The gripper moves at ${name}` : `The gripper stays at ${name}`, false, pose.grips);
+    this.#label("blend", rests ? `Rest at ${name}. ${rests}` : `Pass ${name} without a rest`, Boolean(rests), pose.blend && !rests);
+    this.#label("go", `Go to ${name}: the arm moves there, the gripper stays`);
+    this.#label("up", `Move ${name} up`, i === 0);
+    this.#label("down", `Move ${name} down`, i === poses.length - 1);
+    this.#label("remove", `Remove ${name}`);
+  }
+
+  #label(name, label, off = false, pressed = null) {
+    const button = this.#buttons[name];
+    set(button, "aria-label", label);
+    set(button, "title", label);
+    set(button, "aria-disabled", off);
+    if (pressed !== null) set(button, "aria-pressed", pressed);
+  }
+}

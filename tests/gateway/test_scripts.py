@@ -1,0 +1,118 @@
+"""Scripts over HTTP: the list, reading a text by line, and saving it in the folder."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from katana450.arm.control.lease import Role
+from katana450.extensions.programs.source import MAX_BYTES
+from katana450.server.web.access_links import AccessFile
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import HOUR, ask, enter
+
+POSES = "name: Mine\nsteps:\n  - joints: [0, -68, 85, 8, 0]\n  - wait: 1\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("scripts")
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[AppServer]:
+    with AppServer((*APP, "--programs", str(folder))) as server:
+        yield server
+
+
+@pytest.fixture
+def cookie(server: AppServer) -> str:
+    return enter(server.url)
+
+
+def post(server: AppServer, cookie: str, text: str | bytes, name: str = "") -> tuple[int, bytes]:
+    data = text.encode() if isinstance(text, str) else text
+    url = f"{server.url}/api/v1/scripts{name}"
+    status, _, body = ask(url, data=data, Cookie=cookie, Origin=server.url)
+    return status, body
+
+
+def read(server: AppServer, cookie: str, text: str) -> dict[str, Any]:
+    status, body = post(server, cookie, text)
+    assert status == 200, body
+    found: dict[str, Any] = json.loads(body)
+    return found
+
+
+def test_text_is_read_as_poses_or_with_its_problems(server: AppServer, cookie: str) -> None:
+    found = read(server, cookie, POSES)
+    assert found["problems"] == []
+    pose = {"joints": [0.0, -68.0, 85.0, 8.0, 0.0], "speed": 1.0, "blend": False}
+    poses = [{**pose, "gripper": None, "wait": 1.0}]
+    assert found["taught"] == {"name": "Mine", "times": 1, "poses": poses}
+    assert read(server, cookie, "steps: [home]") == {"problems": [], "taught": None}
+    problems = read(server, cookie, "steps:\n  - hme\n  - wait: -1\n")["problems"]
+    assert [each["line"] for each in problems] == [2, 3]
+    assert "did you mean 'home'" in problems[0]["text"]
+    assert read(server, cookie, "")["problems"][0]["line"] == 1
+
+
+def test_script_is_saved_once_and_can_be_read(server: AppServer, cookie: str, folder: Path) -> None:
+    assert post(server, cookie, POSES, "/Mine") == (204, b"")
+    assert (folder / "Mine.yaml").read_text(encoding="utf-8") == POSES
+    status, body = post(server, cookie, POSES, "/Mine")
+    assert (status, b"exists already" in body) == (409, True)
+    status, _, body = ask(f"{server.url}/api/v1/scripts", Cookie=cookie)
+    listed = json.loads(body)
+    assert (listed["saves"], listed["names"][0]) == (True, "Mine")
+    assert "Pour" in listed["names"]
+    assert ask(f"{server.url}/api/v1/scripts/Mine", Cookie=cookie)[2].decode() == POSES
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "status"),
+    [
+        ("/..%2Fout", POSES, 404),
+        ("/.hidden", POSES, 409),
+        ("/Bad", "steps: [fly]", 422),
+        ("/Bad", b"\xff", 422),
+        ("/Bad", "#" * (MAX_BYTES + 1), 413),
+        ("", "#" * (MAX_BYTES + 1), 413),
+    ],
+)
+def test_anything_else_is_refused_and_not_saved(
+    server: AppServer, cookie: str, folder: Path, name: str, text: str | bytes, status: int
+) -> None:
+    before = sorted(folder.parent.rglob("*"))
+    assert post(server, cookie, text, name)[0] == status
+    assert sorted(folder.parent.rglob("*")) == before
+
+
+def test_viewers_neither_read_nor_save(tmp_path: Path) -> None:
+    links = AccessFile.create(tmp_path / "access.json")
+    scripts = tmp_path / "scripts"
+    scripts.mkdir()
+    options = ("--access", str(links.path), "--programs", str(scripts))
+    with AppServer((*APP, *options)) as server:
+        for role, wanted in ((Role.VIEWER, 403), (Role.OPERATOR, 200)):
+            token = f"Bearer {links.give('Anna', role, time.time() + HOUR)}"
+            url = f"{server.url}/api/v1/scripts"
+            assert ask(url, data=POSES.encode(), Authorization=token)[0] == wanted
+            saved = ask(f"{url}/Mine", data=POSES.encode(), Authorization=token)[0]
+            assert saved == (204 if wanted == 200 else 403)
+            assert ask(url, Authorization=token)[0] == 200
+        assert ask(f"{server.url}/api/v1/scripts")[0] == 401
+        assert ask(f"{server.url}/api/v1/scripts", data=POSES.encode())[0] == 401
+
+
+def test_server_without_a_folder_saves_nothing() -> None:
+    with AppServer(APP) as server:
+        cookie = enter(server.url)
+        assert not json.loads(ask(f"{server.url}/api/v1/scripts", Cookie=cookie)[2])["saves"]
+        status, body = post(server, cookie, POSES, "/Mine")
+        assert (status, b"--programs" in body) == (409, True)
