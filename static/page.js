@@ -379,14 +379,14 @@
     if (shown) scene.contentWindow.katanaScene?.fold?.();
     if (id === "teach") teach.show(shown);
   }
-  // The sheets lie in the same corner. On a wide screen Jog has room beside Teach.
-  const wide = matchMedia("(min-width: 1200px) and (min-height: 501px)");
+  // The sheets lie in the same corner. On a high screen Teach has room above Jog.
+  const high = matchMedia("(min-width: 561px) and (min-height: 700px)");
   for (const id of ["jog", "objects", "teach"])
     byId(`${id}-button`).addEventListener("click", async () => {
       if (id === "teach") await loadTeach();
       const shown = byId(id).hidden;
       for (const other of ["jog", "objects", "teach"])
-        if (other !== id && byId(other) && !(wide.matches && id !== "objects" && other !== "objects")) show(other, false);
+        if (other !== id && byId(other) && !(high.matches && id !== "objects" && other !== "objects")) show(other, false);
       show(id, shown);
     });
   // The sheet of taught poses, loaded on first use.

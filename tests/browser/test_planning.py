@@ -95,6 +95,14 @@ def test_previewed_plan_shows_one_duration_and_runs_immediately(
     assert float(duration[1]) == pytest.approx(end)
     assert state.program.seconds <= end < state.program.seconds + 0.1
     page.keep(artefacts / "planning-previewed.png")
+    # The cup is in the hand of the ghost, with its water; the time is given in words.
+    shown = page.drag_slider("Look at", 7.5)
+    page.wait_until(lambda: f"{shown:.1f} s of {end:.1f} s" in page.panel_text(), "the time")
+    visible = """() => ["/path/ghost", "/path/objects/0", "/path/water/cup"].every(
+        (name) => __viserMutable.nodeRefFromName[name]?.visible)"""
+    page.wait_until(lambda: page.frame.evaluate(visible), "the ghosts", seconds=PLANNED)
+    page.wait_until(lambda: "over basin" in page.text_of(".steps [aria-current]"), "the step")
+    page.keep(artefacts / "planning-sought.png")
     begun = time.monotonic()
     page.click_button("Run")
     wait(arm, lambda state: state.program is not None and state.program.status == "running")

@@ -166,8 +166,8 @@ class ProgramsPanel:
         self._show_time()
 
     def _seek(self) -> None:
-        self._preview.look(self._look.value)
         self._show_time()
+        self._preview.look(self._look.value)
 
     def _show_time(self) -> None:
         """Show the time of the slider in words."""
