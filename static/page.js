@@ -391,9 +391,11 @@
     });
   // The sheet of taught poses, loaded on first use.
   let teach = null;
+  let loading = null; // one sheet, also after two clicks
   async function loadTeach() {
-    const { Teach } = await import("./teach/teach.js");
-    teach ??= await Teach.in(byId("stage"), { say, kept, scene, status: () => status });
+    const options = { say, kept, scene, status: () => status };
+    loading ??= import("./teach/teach.js").then(({ Teach }) => Teach.in(byId("stage"), options));
+    teach = await loading;
   }
   const kept = storage();
   Pace.begin({ say, toast });

@@ -182,6 +182,15 @@ def test_poses_are_taught_reordered_played_and_kept(
     sheet.wait_until(lambda: turns(sheet) == [45, 20, -25], "the poses of the file")
 
 
+def test_two_clicks_open_and_close_one_sheet(new_page: ViserPage) -> None:
+    for _ in range(2):
+        new_page.page.evaluate("document.getElementById('teach-button').click()")
+    new_page.page.wait_for_selector("#teach", state="attached")
+    new_page.page.wait_for_timeout(500)
+    assert new_page.page.locator("#teach").count() == 1
+    assert not new_page.page.locator("#teach").is_visible()
+
+
 def test_poses_are_edited_by_keys_and_changes_are_undone(sheet: ViserPage, truth: Truth) -> None:
     teach(sheet, truth, (20.0, -25.0))
     q = truth.status()["q"]
