@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import gzip
 import itertools
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from katana450.arm.control.lease import Role
 from katana450.client import connect
 from katana450.resources import STATIC
 from katana450.server.api import requests
+from katana450.server.web import static_files
 from katana450.server.web.access_links import AccessFile
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
@@ -202,14 +202,20 @@ def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None
     assert page.page.get_attribute("#banner", "role") == "alert"
 
 
-def test_the_page_is_small() -> None:
-    def sent(files: Iterable[Path]) -> int:
-        """Return the size of the files as they are sent, compressed."""
-        return sum(len(gzip.compress(path.read_bytes())) for path in files if path.is_file())
+def test_scripts_are_sent_without_comments_at_the_same_lines() -> None:
+    written = (STATIC / "viser.js").read_text(encoding="utf-8")
+    sent = static_files.load()["viser.js"].content.decode()
+    assert written.count("\n") == sent.count("\n")
+    code = [line for line in written.splitlines() if line and not line.lstrip().startswith("//")]
+    assert [line for line in sent.splitlines() if line] == code
+    assert len(code) < len(written.splitlines())
 
-    assert sent(STATIC.iterdir()) < 40_000
+
+def test_the_page_is_small() -> None:
+    sent = {name: len(file.packed) for name, file in static_files.load().items()}
     # The files in folders are loaded on first use.
-    assert sent(STATIC.rglob("*")) < 100_000
+    assert sum(size for name, size in sent.items() if "/" not in name) < 40_000
+    assert sum(sent.values()) < 100_000
     assert sum(path.stat().st_size for path in (STATIC / "instruments").iterdir()) < 70_000
 
 

@@ -257,7 +257,7 @@ def test_repeated_stop_press_counts_once(table: Table) -> None:
 
 def test_listeners_are_called_when_a_stop_begins_and_ends(table: Table) -> None:
     driver, shown = table.join(PAGES[0]), []
-    table.hub.stop_listeners.add(lambda: shown.append(table.hub.stopped is not None))
+    table.hub.stop_news.listeners.add(lambda: shown.append(table.hub.stopped is not None))
     # A flood of STOP causes no flood of messages.
     for press in range(5):
         table.stop("Window 1", f"press {press}")

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from katana450.extensions.programs.blocks import LocatedStep
 from katana450.extensions.programs.moves import Joints, Via
-from katana450.extensions.programs.script import LocatedStep, Script
+from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.settings_steps import Gripper, Speed, TimedPause
 from katana450.maths.geometry.arrays import FloatArray
 

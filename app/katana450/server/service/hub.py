@@ -40,6 +40,7 @@ from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
+from katana450.server.service.stop_news import StopNews
 from katana450.server.service.stop_path import StopPath
 from katana450.server.service.stop_state import ClearBy, StopRecord
 from katana450.settings import Settings
@@ -69,7 +70,7 @@ class Hub:
         self._hold_after = hold_after
         self.gate = CommandGate(clock, clear_by)
         self.gate.presser_of = self._presser_of
-        self.stop_path = StopPath()
+        self.stop_path, self.stop_news = StopPath(), StopNews()
         self.event_log = EventLog()
         self.people = People(clock)
         self.runner = Runner(self, Namespace()) if runner is None else runner(self)
@@ -78,9 +79,6 @@ class Hub:
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._participants: dict[str, Participant] = {}
-        self.stop_listeners: set[Callable[[], None]] = set()
-        """Called when a stop begins, is confirmed by the arm for the first time, or is cleared."""
-        self._stop_shown = (False, False)
         self._pictures: dict[MeasuresAge, str] = {}
         self._known = KnownPages()
         self._takeover: Takeover | None = None
@@ -353,15 +351,9 @@ class Hub:
             self.runner.tick()
 
     def follow_stop(self) -> None:
-        """Make gate and arm agree; call ``stop_listeners`` if that begins or ends a stop."""
+        """Make gate and arm agree on the stop, and spread the news of it."""
         self.gate.reconcile()
-        stopped, before = self.stopped, self._stop_shown
-        # A repeated press is no change, so that a flood of STOP causes no flood of states.
-        confirmed = stopped is not None and (stopped.confirmed or before == (True, True))
-        self._stop_shown = (stopped is not None, confirmed)
-        if self._stop_shown != before:
-            for listener in tuple(self.stop_listeners):
-                listener()
+        self.stop_news.note(self.stopped)
 
     def _update_lease(self) -> None:
         """Renew the lease by the newest heartbeat of the driver, at the time of its receipt."""

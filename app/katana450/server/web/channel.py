@@ -147,11 +147,11 @@ class Channel(ABC):
     async def run(self, participant: Participant) -> None:
         """Receive and send until one side closes the connection."""
         tasks = [asyncio.create_task(each) for each in (self._send(), self._receive(participant))]
-        self.hub.stop_listeners.add(self._hurry)
+        self.hub.stop_news.listeners.add(self._hurry)
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self.hub.stop_listeners.discard(self._hurry)
+            self.hub.stop_news.listeners.discard(self._hurry)
             for task in (*tasks, *self._concluding):
                 task.cancel()
             for ended in await asyncio.gather(*tasks, *self._concluding, return_exceptions=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,9 @@ TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
 }
+
+COMMENT = re.compile(rb"^[ \t]*//.*$", re.MULTILINE)
+"""Pattern of a comment that has a line of its own, in a script."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +53,16 @@ class File:
 
 
 def load(folder: Path = STATIC) -> dict[str, File]:
-    """Return every file of the page by its path in ``folder``."""
+    """Return every file of the page by its path in ``folder``.
+
+    Comments of scripts, an eighth of what would be sent, become blank lines: lines keep their
+    numbers.
+    """
     return {
-        path.relative_to(folder).as_posix(): File.of(path.read_bytes(), TYPES[path.suffix])
+        path.relative_to(folder).as_posix(): File.of(
+            COMMENT.sub(b"", path.read_bytes()) if path.suffix == ".js" else path.read_bytes(),
+            TYPES[path.suffix],
+        )
         for path in sorted(folder.rglob("*"))
         if path.suffix in TYPES
     }

@@ -1,0 +1,184 @@
+"""The text of taught poses: edited, checked, run, kept in the browser and saved as a script."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.teach import TaughtPose, taught
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import APP, AppServer
+from tests.browser.session import Truth, bar, clear_stop, mood
+from tests.browser.teach_sheet import PLAYED, open_sheet, press, reload, rows, says, teach, turns
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("scripts")
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[AppServer]:
+    with AppServer((*APP, "--programs", str(folder))) as server:
+        yield server
+
+
+@pytest.fixture
+def sheet(new_page: ViserPage) -> ViserPage:
+    """Return a new window of the driver with the Teach sheet open."""
+    open_sheet(new_page)
+    return new_page
+
+
+def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefacts: Path) -> None:
+    teach(sheet, truth, (20.0, -25.0))
+    page = sheet.page
+    press(sheet, "Edit as text")
+    area = page.locator("#teach-text")
+    assert taught(parse(area.input_value())) is not None
+    # Blanks are typed while the arm rests.
+    area.press("Control+End")
+    area.type("  - wiat: 1\n")
+    assert area.input_value().endswith("\n  - wiat: 1\n")
+    assert truth.status()["stopped"] is None
+    problem = page.locator("#teach-problems button")
+    problem.wait_for()
+    line = area.input_value().count("\n")
+    assert re.match(rf"Line {line} .*did you mean 'wait'", problem.inner_text())
+    sheet.keep(artefacts / "teach-text-problem.png")
+    press(sheet, "Play")
+    sheet.wait_until(lambda: "not run" in says(sheet), "the refusal")
+    problem.click()
+    selected = "(each) => each.value.slice(each.selectionStart, each.selectionEnd)"
+    assert area.evaluate(selected) == "  - wiat: 1"
+    page.keyboard.type("  - joints: [5, -68, 85, 8, 0]")
+    page.wait_for_selector("#teach-problems button", state="detached")
+    sheet = reload(sheet)
+    assert area.input_value().endswith("[5, -68, 85, 8, 0]\n")
+    press(sheet, "Play")
+    sheet.wait_until(lambda: says(sheet) == "Done.", "the end", seconds=PLAYED)
+    assert np.degrees(truth.status()["q"][0]) == pytest.approx(5.0, abs=0.01)
+    press(sheet, "Edit as poses")
+    sheet.wait_until(lambda: turns(sheet) == [20, -25, 5], "the poses")
+    # A place that cannot be reached is found in planning, and named by its line.
+    press(sheet, "Edit as text")
+    area.fill("name: Far\nsteps:\n  - home\n  - move: {x: 1900, y: 0, z: 0}\n")
+    press(sheet, "Play")
+    sheet.wait_until(lambda: page.locator("#teach-problems li").count() == 1, "it", seconds=PLAYED)
+    assert page.inner_text("#teach-problems").startswith("Line 4 ")
+    press(sheet, "Edit as poses")
+    sheet.wait_until(lambda: "no poses" in says(sheet), "the refusal")
+    assert area.is_visible()
+
+
+def test_space_in_the_text_stops_a_moving_arm(sheet: ViserPage, truth: Truth) -> None:
+    press(sheet, "Edit as text")
+    area = sheet.page.locator("#teach-text")
+    text = "name: Slow\nspeed: 0.05\nsteps:\n  - joints: [60, -68, 85, 8, 0]\n"
+    area.fill(text)
+    press(sheet, "Play")
+    area.focus()
+    truth.wait(PLAYED, moving=True)
+    sheet.wait_until(lambda: mood(sheet.page) == "program", "the bar")
+    sheet.page.keyboard.press("Space")
+    truth.wait(mood="stopped")
+    assert area.input_value() == text
+    sheet.wait_until(lambda: bar(sheet, "headline") == "Stopped", "the bar")
+    sheet.page.wait_for_timeout(1200)
+    clear_stop(sheet, truth)
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["{", "null", '{"format": 1}', '{"format": 1, "name": "x", "times": 1, "poses": [{}]}'],
+)
+def test_broken_content_of_the_browser_is_refused(
+    server: AppServer, open_page: OpenPage, content: str
+) -> None:
+    page = open_page(
+        server.url,
+        nodes=("/arm",),
+        script=f"localStorage.setItem('katana450.teach', {json.dumps(content)});",
+    )
+    open_sheet(page)
+    assert "cannot be read" in says(page)
+    assert rows(page).count() == 0
+    press(page, "Add pose")
+    page.wait_until(lambda: rows(page).count() == 1, "a pose")
+    assert page.errors == []
+
+
+def test_script_is_saved_in_the_folder_and_listed(
+    sheet: ViserPage, truth: Truth, folder: Path
+) -> None:
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "no pose yet" in says(sheet), "the refusal")
+    teach(sheet, truth, (20.0,))
+    name = sheet.page.get_by_label("Name", exact=True)
+    name.fill("")
+    # With a blank, which STOP leaves to this box while the arm rests.
+    name.type("Two words")
+    name.press("Enter")
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "Saved as Two words" in says(sheet), "the answer")
+    assert taught(parse((folder / "Two words.yaml").read_text(encoding="utf-8"))) is not None
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "exists already" in says(sheet), "the refusal")
+    # The browser notes the refusal on its console.
+    sheet.errors.clear()
+    sheet.open_tab("Programs")
+    assert "Teach" not in sheet.panel_text()
+    sheet.choose("Script", "Two words")
+    # A script of the library has other steps, so it is shown as text.
+    sheet.page.locator("#teach").get_by_label("Open a script").select_option("Square")
+    sheet.wait_until(lambda: "shown as text" in says(sheet), "the text")
+    assert "repeat:" in sheet.page.locator("#teach-text").input_value()
+
+
+def test_text_of_poses_is_read_back_as_the_same_poses(sheet: ViserPage) -> None:
+    """The page writes scripts and the server reads them: nothing is lost on the way."""
+    q = [10.0, -68.25, 85.0, 8.125, -0.5]
+
+    def pose(**fields: Any) -> dict[str, Any]:
+        plain = {"gripper": None, "grips": False, "wait": 0, "speed": 100, "blend": False}
+        return {"joints": q, **plain, **fields}
+
+    cases = {
+        "plain": (1, [pose(), pose(joints=[0.0] * 5)]),
+        "loop": (7, [pose(speed=30, wait=0.5), pose(gripper=-12.5, grips=True, wait=1)]),
+        "speeds": (3, [pose(speed=55), pose(speed=55, grips=True, gripper=3), pose()]),
+        "blend": (2, [pose(blend=True), pose(blend=True), pose(), pose(blend=True)]),
+        'a "name": # \\': (1, [pose(blend=True, speed=50), pose(speed=20)]),
+    }
+    for name, (times, poses) in cases.items():
+        text = sheet.page.evaluate(
+            """async (content) => {
+                const { scriptOf } = await import("/static/teach/poses.js");
+                return scriptOf(content).text;
+            }""",
+            {"name": name, "times": times, "poses": poses},
+        )
+        found = taught(parse(text))
+        assert found is not None, text
+        assert (found.name, found.times) == (name, times)
+        wanted = []
+        for number, each in enumerate(poses):
+            after = poses[number + 1] if number + 1 < len(poses) else None
+            # A pose is passed only on the way to another one at the same speed.
+            blend = each["blend"] and after is not None and after["speed"] == each["speed"]
+            speed = each["speed"] / 100
+            wanted.append(TaughtPose(tuple(q), speed, blend, each["gripper"], each["wait"]))
+        shown = [
+            TaughtPose(tuple(q), each.speed, each.blend, each.gripper, each.wait)
+            for each in found.poses
+        ]
+        assert shown == wanted, text
+        assert [list(each.joints) for each in found.poses] == [each["joints"] for each in poses]
