@@ -100,7 +100,10 @@
     ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < 1e-3));
 
   function looks(view) {
-    if (outer?.katana) outer.katana.view = view;
+    if (outer?.katana) {
+      outer.katana.view = view;
+      outer.katana.turned?.();
+    }
     if (!kept) camera = view;
     else there = same(kept, view) ? (there ?? performance.now()) : null;
   }

@@ -29,10 +29,15 @@ export class Stage {
     this.#load();
     this.#views = new Views(stage, scene);
     this.#listen();
+    window.katana.turned = () => this.#views.turned();
     scene.addEventListener("load", () => this.#listen());
     // What is held at a stop, or when another person drives, moves nothing afterwards.
+    let stopped = false;
     window.addEventListener("status", ({ detail }) => {
-      if (detail.stopped || (!detail.mine && detail.holder !== null)) this.drop();
+      // While the arm is stopped, a new drag is refused with the reason.
+      const stops = detail.stopped && !stopped;
+      stopped = Boolean(detail.stopped);
+      if (stops || (!detail.mine && detail.holder !== null)) this.drop();
     });
     document.addEventListener("visibilitychange", () => document.hidden && this.#joints.lose());
     window.addEventListener("blur", () => this.#blur());

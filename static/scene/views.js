@@ -3,6 +3,7 @@
 import { html } from "../instruments/shape.js";
 
 const NEAR = 0.6; // m, maximum distance to a point that is looked at
+const MOVING = 500; // ms for which the camera counts as moving after its last message
 const EDGE = 12; // px from the cube to the edges of the scene
 /** @typedef {[number, number, number]} Direction */
 // Name, view of the server, outward direction, and the direction that is up on the face; in the base frame.
@@ -41,6 +42,9 @@ export class Views {
   #riding = false; // the camera follows the tool
   #shown = ""; // transform of the cube
   #placed = "";
+  #canvas = null;
+  #until = 0; // ms, when the camera counts as still again
+  #sized = new ResizeObserver(() => this.turned());
 
   constructor(stage, scene) {
     this.#scene = scene;
@@ -70,11 +74,19 @@ export class Views {
     const row = html("div", {}, ...more, list, fit);
     this.#group = html("div", { id: "views", role: "group", "aria-label": "Camera" }, this.#cube, row);
     stage.append(this.#group);
+    this.turned();
+  }
+
+  // The camera has moved: follow it for a moment. A page at rest draws nothing.
+  turned() {
+    const runs = performance.now() < this.#until;
+    this.#until = performance.now() + MOVING;
+    if (runs) return;
     const turn = () => {
       this.#follow();
-      requestAnimationFrame(turn);
+      if (performance.now() < this.#until) requestAnimationFrame(turn);
     };
-    turn();
+    requestAnimationFrame(turn);
   }
 
   // Look at a point of three.js's world from nearer, in the same direction.
@@ -105,6 +117,10 @@ export class Views {
     const world = viewer?.cameraControl && this.#inner.node("");
     if (!world) return;
     const { camera, canvas } = viewer;
+    if (canvas !== this.#canvas) {
+      this.#sized.disconnect();
+      this.#sized.observe((this.#canvas = canvas));
+    }
     const { elements: m } = camera.matrixWorldInverse.clone().multiply(world.matrixWorld);
     // From the box of the cube to the base frame, to the camera, and to the screen, whose y points down.
     const [x, y, z] = [0, 1, 2].map((column) => {

@@ -88,6 +88,7 @@ def test_row_under_the_mouse_shows_its_branch_here_alone(
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_time_is_that_at_the_present_speed(page: ViserPage, truth: Truth) -> None:
     row(page, "front-down").hover()
     page.wait_until(lambda: names(page), "the name")
@@ -105,6 +106,7 @@ def test_time_is_that_at_the_present_speed(page: ViserPage, truth: Truth) -> Non
     truth.wait(speed=1.0)
 
 
+@pytest.mark.long
 def test_ghost_of_the_list_has_a_name_too(page: ViserPage, truth: Truth, artefacts: Path) -> None:
     page.choose("Ghosts", "front-down")
     page.page.mouse.move(400, 700)
@@ -116,6 +118,7 @@ def test_ghost_of_the_list_has_a_name_too(page: ViserPage, truth: Truth, artefac
     assert np.allclose(truth.status()["q"], READY, atol=1e-6)
 
 
+@pytest.mark.long
 def test_finger_shows_a_branch_by_a_tap(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
@@ -128,7 +131,7 @@ def test_finger_shows_a_branch_by_a_tap(
         is_mobile=True,
     )
     page.page.wait_for_selector("#cube", state="attached")
-    page.frame.get_by_text("Katana450", exact=True).first.tap()
+    page.frame.locator("#k450-sheet").tap()
     page.frame.get_by_text("Branches", exact=True).tap()
     row(page, "front-down").scroll_into_view_if_needed()
     row(page, "front-down").tap()

@@ -124,6 +124,7 @@ def test_grabbed_point_follows_the_mouse_and_one_undo_brings_it_back(
     page.wait_until(lambda: np.allclose(q(truth), READY, atol=1e-6), "the way back")
 
 
+@pytest.mark.long
 def test_joint_seen_edge_on_turns_by_the_movement_across(
     page: ViserPage, links: list[str], truth: Truth
 ) -> None:
@@ -136,6 +137,7 @@ def test_joint_seen_edge_on_turns_by_the_movement_across(
     assert np.allclose(q(truth)[1:], READY[1:], atol=1e-6)
 
 
+@pytest.mark.long
 def test_drag_stops_at_the_limit_of_the_joint(
     page: ViserPage, server: AppServer, links: list[str], truth: Truth
 ) -> None:
@@ -148,6 +150,7 @@ def test_drag_stops_at_the_limit_of_the_joint(
     assert truth.status()["goal"][1] <= upper + 1e-9
 
 
+@pytest.mark.long
 def test_first_drag_takes_the_free_arm(
     server: AppServer, open_page: OpenPage, links: list[str], truth: Truth
 ) -> None:
@@ -245,7 +248,7 @@ def test_stop_ends_a_drag_and_a_stopped_arm_refuses_another(
     clear_stop(page, truth)
 
 
-@pytest.mark.parametrize("loss", ["pointercancel", "blur"])
+@pytest.mark.parametrize("loss", ["pointercancel", pytest.param("blur", marks=pytest.mark.long)])
 def test_lost_pointer_ends_the_drag_and_the_arm_holds(
     page: ViserPage, links: list[str], truth: Truth, loss: str
 ) -> None:
@@ -269,6 +272,7 @@ def test_lost_pointer_ends_the_drag_and_the_arm_holds(
     page.page.mouse.up()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("page")
 def test_who_does_not_drive_turns_the_camera_and_gets_reasons(
     server: AppServer, open_page: OpenPage, links: list[str], truth: Truth

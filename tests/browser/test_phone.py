@@ -27,7 +27,12 @@ def server() -> Iterator[AppServer]:
 
 @pytest.mark.skipif(own_address() is None, reason="this machine is in no network")
 @pytest.mark.parametrize(
-    ("size", "scheme"), [("desk", "dark"), ("portrait", "light"), ("landscape", "dark")]
+    ("size", "scheme"),
+    [
+        ("portrait", "light"),
+        pytest.param("desk", "dark", marks=pytest.mark.long),
+        pytest.param("landscape", "dark", marks=pytest.mark.long),
+    ],
 )
 def test_code_on_the_screen_holds_the_address(
     server: AppServer, open_page: OpenPage, artefacts: Path, size: str, scheme: str

@@ -157,6 +157,7 @@ def test_keys_and_screen_readers_change_the_height(phone: ViserPage, server: App
     clear_stop(phone, truth)
 
 
+@pytest.mark.long
 def test_one_sheet_is_open_at_a_time(phone: ViserPage, server: AppServer, artefacts: Path) -> None:
     truth = Truth(server)
     jog = phone.page.locator("#jog")
@@ -206,6 +207,7 @@ def test_second_finger_presses_stop_while_the_first_is_in_the_scene(
     clear_stop(phone, truth)
 
 
+@pytest.mark.long
 def test_jog_fits_beside_the_scene_in_landscape(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:

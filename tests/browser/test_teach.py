@@ -89,6 +89,7 @@ def test_poses_are_taught_reordered_played_and_kept(
     sheet.wait_until(lambda: turns(sheet) == [45, 20, -25], "the poses of the file")
 
 
+@pytest.mark.long
 def test_two_clicks_open_and_close_one_sheet(new_page: ViserPage) -> None:
     for _ in range(2):
         new_page.page.evaluate("document.getElementById('teach-button').click()")
@@ -98,6 +99,7 @@ def test_two_clicks_open_and_close_one_sheet(new_page: ViserPage) -> None:
     assert not new_page.page.locator("#teach").is_visible()
 
 
+@pytest.mark.long
 def test_poses_are_edited_by_keys_and_changes_are_undone(sheet: ViserPage, truth: Truth) -> None:
     teach(sheet, truth, (20.0, -25.0))
     q = truth.status()["q"]
@@ -133,6 +135,7 @@ def test_poses_are_edited_by_keys_and_changes_are_undone(sheet: ViserPage, truth
     assert truth.status()["stopped"] is None
 
 
+@pytest.mark.long
 def test_step_and_go_move_to_one_pose_and_never_past_a_stop(sheet: ViserPage, truth: Truth) -> None:
     teach(sheet, truth, (20.0, -25.0))
 
@@ -179,6 +182,7 @@ def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> N
     assert truth.status()["q"] == q
 
 
+@pytest.mark.long
 def test_sheet_works_with_fingers_on_a_phone(
     server: AppServer, open_page: OpenPage, truth: Truth, artefacts: Path
 ) -> None:

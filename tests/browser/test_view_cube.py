@@ -15,7 +15,10 @@ from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, camera, turn
 
-SIZES = [(1440, 900), (390, 844), pytest.param((844, 390), marks=pytest.mark.long)]
+SIZES = [
+    (1440, 900),
+    *(pytest.param(each, marks=pytest.mark.long) for each in ((390, 844), (844, 390))),
+]
 FACES = {"front": Preset.FRONT, "back": Preset.BACK, "left": Preset.LEFT, "right": Preset.SIDE}
 OUT = {"front": (1, 0, 0), "back": (-1, 0, 0), "left": (0, 1, 0), "right": (0, -1, 0)}
 UP = (0, 0, 1)
@@ -55,6 +58,7 @@ def wait_from(page: ViserPage, preset: Preset) -> None:
     page.wait_until(there, f"the view {preset.value}")
 
 
+@pytest.mark.long
 def test_cube_shows_how_the_scene_is_seen(page: ViserPage) -> None:
     for position in ((0.9, -0.8, 0.7), (-0.9, 0.6, 0.4), (0.5, 1.0, 0.9)):
         page.look_from(Camera(position, CENTRE))
@@ -109,6 +113,7 @@ def test_fit_fills_the_picture_with_the_arm(page: ViserPage) -> None:
         assert 0.7 < np.linalg.norm(away) < 2.5, distance
 
 
+@pytest.mark.long
 def test_double_click_looks_at_a_point(page: ViserPage) -> None:
     turn(page, "3D")
     wait_from(page, Preset.FREE)

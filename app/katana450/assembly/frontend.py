@@ -59,6 +59,7 @@ def build_frontend(
         lambda number: connect(address, Greeting(FRONT, number)),
     )
     nodes = _nodes(config.options, robot, session.environment)
+    front_end.on_stop_change = partial(gateway.soon, gateway.hub.follow_stop)
     if robot.arm is None:
         for layer in layers:
             if layer.what:

@@ -163,21 +163,18 @@ class Gateway:
     def attach(self, arm: ArmHandle) -> None:
         """Let clients drive ``arm`` from now on."""
         arm.listen(self.hub.recorder.outcomes)
-        arm.on_stop_change(self._follow_stop)
         self.hub.gate.arm = arm
-
-    def _follow_stop(self) -> None:
-        """Let clients see a change of the stop at once. Can be called in any thread."""
-        # RuntimeError: the server has ended.
-        if self._loop is not None:
-            with suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self.hub.follow_stop)
 
     def announce(self, why: str) -> None:
         """Notify all clients why a request is not executed. Can be called in any thread."""
-        loop = self._loop
-        if loop is not None:
-            loop.call_soon_threadsafe(self.hub.announce, why)
+        self.soon(self.hub.announce, why)
+
+    def soon(self, act: Callable[..., None], *arguments: Any) -> None:
+        """Run ``act`` in the server's thread, and return at once. Can be called in any thread."""
+        # RuntimeError: the server has ended.
+        if self._loop is not None:
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(act, *arguments)
 
     def call(self, act: Callable[[], None]) -> None:
         """Run ``act`` in the server's thread, and return afterwards. For any other thread.

@@ -142,10 +142,6 @@ class ArmHandle:
         """Call ``listener`` with all outcomes from now on, in the thread of the pipe."""
         self._state_publisher.outcomes.listener = listener
 
-    def on_stop_change(self, listener: Callable[[], None]) -> None:
-        """Call ``listener`` at each change of whether the arm stops, in the thread of the pipe."""
-        self._front_end.on_stop_change = listener
-
     @property
     def state(self) -> State:
         """The newest state."""

@@ -16,13 +16,12 @@ class StopNews:
     def __init__(self) -> None:
         self.listeners: set[Callable[[], None]] = set()
         """Called without arguments, in the thread of ``note``."""
-        self._stopped = self._confirmed = False
+        self._shown = (False, False)
 
     def note(self, stopped: StopRecord | None) -> None:
         """Call the listeners if ``stopped``, the present stop, is news."""
-        before = self._stopped, self._confirmed
-        self._stopped = stopped is not None
-        self._confirmed = stopped is not None and (stopped.confirmed or self._confirmed)
-        if (self._stopped, self._confirmed) != before:
+        confirmed = stopped is not None and (stopped.confirmed or self._shown[1])
+        before, self._shown = self._shown, (stopped is not None, confirmed)
+        if self._shown != before:
             for listener in tuple(self.listeners):
                 listener()

@@ -59,8 +59,7 @@ class ControlSocket(Channel):
     def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
         """Return the changes of the status, or None, and the time until the next call [s]."""
         t = self.hub.clock()
-        early = t - self._checked_at < PUSH_EVERY / 2 and not urgent
-        if self.participant is None or early:
+        if self.participant is None or (not urgent and t - self._checked_at < PUSH_EVERY / 2):
             return None, PUSH_EVERY
         self._checked_at = t
         now = status.common(self.hub) | status.of(self.hub, self.participant)

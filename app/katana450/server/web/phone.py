@@ -29,8 +29,6 @@ NOT_SECURE = "Without https, others in the network can read what the phone sends
 ELSEWHERE = ("192.0.2.1", 9)
 """An address outside every network (RFC 5737), to which nothing is sent."""
 
-KEPT_CODES = 8
-
 
 class PhoneAddress(msgspec.Struct, frozen=True):
     """The answer to a page that shows the address of this server for a phone.
@@ -72,7 +70,7 @@ def phone_address(address: Address, host: str, port: int, *, requires_link: bool
     return PhoneAddress(url, qr_code(url), " ".join(notes))
 
 
-@functools.lru_cache(KEPT_CODES)
+@functools.lru_cache(8)
 def qr_code(text: str) -> str:
     """Return the QR code of ``text`` as a data URL of an SVG file, dark on white.
 
@@ -81,8 +79,7 @@ def qr_code(text: str) -> str:
     # Loaded with the first code.
     import segno
 
-    code: str = segno.make_qr(text, error="m").svg_data_uri(scale=4, dark="#000", light="#fff")
-    return code
+    return str(segno.make_qr(text, error="m").svg_data_uri(scale=4, dark="#000", light="#fff"))
 
 
 def own_address() -> str | None:
