@@ -15,6 +15,7 @@ import io
 import math
 import time
 from collections.abc import Callable
+from threading import Event
 
 import numpy as np
 import viser
@@ -52,7 +53,7 @@ class Hand(Clock):
         """Return the time that was set [s]."""
         return self.t
 
-    def sleep_until(self, t: float) -> None:
+    def sleep_until(self, t: float, _wake: Event | None = None) -> None:
         """Set the time to ``t`` [s]."""
         self.t = t
 

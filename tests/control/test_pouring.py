@@ -125,3 +125,25 @@ def test_fill_without_a_cup_is_refused(session: Session, full: State) -> None:
     gone = tick(session, full, cmd.Remove("cup"), times=2)
     assert gone.poured is None
     assert tick(session, gone, cmd.Fill(100.0 * ML)).poured is None
+
+
+def swing(session: Session, state: State, steps: tuple[float, ...]) -> tuple[float, float]:
+    """Return the peak acceleration [m/s^2] and the peak jerk [m/s^3] of the cup in a swing."""
+    commands: tuple[cmd.Command, ...] = (cmd.SetJoint(0, 0.8),)
+    peak, end, number = 0.0, state.t + 1.0, 0
+    while state.t < end:
+        state = session.step(state, commands, state.t + steps[number % len(steps)])
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        assert state.poured is not None
+        peak = max(peak, float(np.linalg.norm(state.poured.course.acceleration or 0.0)))
+        commands, number = (), number + 1
+    assert state.poured is not None
+    return peak, state.poured.course.peak_jerk
+
+
+def test_unequal_ticks_do_not_shake_the_water(session: Session, full: State) -> None:
+    """A tick for a STOP divides a period in two unequal parts."""
+    held = held_level(session, full)
+    acceleration, jerk = swing(session, held, (0.01,))
+    unequal = swing(session, held, (0.0005, 0.0095, 0.01))
+    assert unequal == pytest.approx((acceleration, jerk), rel=0.02)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ class SteppedClock:
     def now(self) -> float:
         return self.t
 
-    def sleep_until(self, t: float) -> None:
+    def sleep_until(self, t: float, _wake: threading.Event | None = None) -> None:
         self.t = max(self.t, t)
 
 
@@ -180,6 +181,61 @@ def test_wake_ends_a_wait_for_change(parts: LoopParts) -> None:
     publisher.wake()
     thread.join(30.0)
     assert found == [seen]
+
+
+class ClockOfPresses(SteppedClock):
+    """A clock on which somebody presses STOP during each sleep that STOP can end."""
+
+    def __init__(self, loops: int) -> None:
+        super().__init__()
+        self.press: Callable[[], object] = bool
+        self.end: Callable[[], object] = bool
+        self.left = loops
+
+    def sleep_until(self, t: float, wake: threading.Event | None = None) -> None:
+        if wake is None:
+            self.t = t
+            return
+        self.left -= 1
+        if self.left == 0:
+            self.end()
+        self.t = t - 0.9 / RATE
+        self.press()
+        if not wake.is_set():
+            self.t = t
+
+
+def test_stop_does_not_wait_for_the_next_tick(arm: ArmModel, session: Session) -> None:
+    clock, mailbox = ClockOfPresses(3), Mailbox(session.check)
+    at: list[float] = []
+    loop = ControlLoop(session, SimulatedDriver(arm, session.ready, 0.0), mailbox, clock, RATE)
+
+    def press() -> None:
+        if not at:
+            at.append(clock.t)
+            mailbox.put(cmd.Stop(pressed("Anna", "a", "one", 1.0)))
+
+    clock.press, clock.end = press, loop._stopping.set
+    loop._run()
+    state = loop.state_publisher.snapshot.state
+    assert state.stopped is not None
+    assert state.t == at[0]
+
+
+def test_flood_of_stops_adds_one_tick_per_period(arm: ArmModel, session: Session) -> None:
+    clock, mailbox = ClockOfPresses(10), Mailbox(session.check)
+    loop = ControlLoop(session, SimulatedDriver(arm, session.ready, 0.0), mailbox, clock, RATE)
+    numbers = iter(range(1000))
+
+    def press() -> None:
+        for _ in range(5):
+            mailbox.put(cmd.Stop(pressed("Anna", "a", f"{next(numbers)}", 1.0)))
+
+    clock.press, clock.end = press, loop._stopping.set
+    begun = clock.t
+    loop._run()
+    assert loop.ticks == 20
+    assert clock.t == pytest.approx(begun + 10 / RATE)
 
 
 def test_loop_runs_and_stops_on_the_machine_clock(arm: ArmModel, session: Session) -> None:

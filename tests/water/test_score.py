@@ -46,3 +46,13 @@ def test_course_measures_duration_and_peak_jerk(flow: WaterFlow) -> None:
     assert course.after((9.0, 9.0, 9.0), 0.0) == course
     result = score(flow.begin(1e-4, over_basin(flow.water_environment, 0.0)), course)
     assert (result.duration, result.peak_jerk) == (course.duration, course.peak_jerk)
+
+
+def test_unequal_steps_do_not_change_the_peak_jerk() -> None:
+    course, t, before = Course(), 0.0, 0.01
+    for k in range(400):
+        dt = (0.01, 0.0005, 0.0105)[k % 3]
+        # Where a difference of mean velocities is exact under a constant jerk.
+        course = course.after((math.sin(3.0 * (t + (dt - before) / 3.0)), 0.0, 0.0), dt)
+        t, before = t + dt, dt
+    assert course.peak_jerk == pytest.approx(3.0, rel=1e-3)

@@ -86,7 +86,10 @@ class Pouring:
             moved = flow.step(poured.water, T, NO_VELOCITY, 0.0)
             return replace(poured, water=moved, middle=middle, velocity=NO_VELOCITY)
         velocity = scale(1.0 / dt, sub(middle, poured.middle))
-        acceleration = scale(1.0 / dt, sub(velocity, poured.velocity))
+        # The velocities are those in the middle of this step and of the one before, which is
+        # shorter or longer where a STOP or a late tick came between.
+        between = 0.5 * (dt + (poured.course.step or dt))
+        acceleration = scale(1.0 / between, sub(velocity, poured.velocity))
         return MotionWithWater(
             flow.step(poured.water, T, acceleration, dt),
             poured.course.after(acceleration, dt),

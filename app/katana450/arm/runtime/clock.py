@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import time
+from threading import Event
 from typing import Protocol
 
 
@@ -13,8 +15,8 @@ class Clock(Protocol):
         """Return the time since a fixed moment [s]."""
         ...
 
-    def sleep_until(self, t: float) -> None:
-        """Return at ``t`` [s], or at once if that has passed."""
+    def sleep_until(self, t: float, wake: Event | None = None) -> None:
+        """Return at ``t`` [s], or at once if that has passed, or as soon as ``wake`` is set."""
         ...
 
 
@@ -25,8 +27,15 @@ class MonotonicClock:
         """Return the time since a fixed moment [s]."""
         return time.perf_counter()
 
-    def sleep_until(self, t: float) -> None:
-        """Return at ``t`` [s], or at once if that has passed."""
+    def sleep_until(self, t: float, wake: Event | None = None) -> None:
+        """Return at ``t`` [s], or at once if that has passed, or as soon as ``wake`` is set.
+
+        Windows ignores ``wake``: there only a plain sleep is exact to a millisecond.
+        """
         left = t - time.perf_counter()
-        if left > 0.0:
+        if left <= 0.0:
+            return
+        if wake is None or sys.platform == "win32":
             time.sleep(left)
+        else:
+            wake.wait(left)

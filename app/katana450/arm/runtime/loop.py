@@ -1,4 +1,4 @@
-"""The control loop: a fixed number of ticks per second, independent of the view."""
+"""The control loop: a fixed number of ticks per second, and one more for a STOP."""
 
 from __future__ import annotations
 
@@ -184,7 +184,12 @@ class ControlLoop:
                 due += late
             self.tick()
             due += self._period
-            self._clock.sleep_until(due)
+            self._clock.sleep_until(due, self._mailbox.stop_waits)
+            if self._mailbox.stop_waits.is_set():
+                # A STOP does not wait for the next tick. One extra tick per period, so that a
+                # flood of STOP does not hurry the loop.
+                self.tick()
+                self._clock.sleep_until(due)
 
 
 def _outcomes(drained: Drained, state: State) -> Iterator[TicketOutcome]:

@@ -86,6 +86,8 @@ class Mailbox:
         self._repeated: list[int] = []
         self._presses = Presses()
         self._tickets = 0
+        self.stop_waits = threading.Event()
+        """Set while a STOP waits for its tick."""
 
     def put(self, command: Command, actor: Actor | None = None) -> int:
         """Leave ``command`` for the next tick, and return its ticket. Never blocks for long.
@@ -110,6 +112,7 @@ class Mailbox:
                     else:
                         self._dropped.extend(tickets)
                 self._waiting, self._of_waiting = [], []
+                self.stop_waits.set()
             elif self._waiting and command.replaces(self._waiting[-1].command):
                 self._waiting.pop()
                 replaced = self._of_waiting.pop()
@@ -131,6 +134,7 @@ class Mailbox:
                 tuple(self._repeated),
             )
             self._waiting, self._of_waiting, self._dropped, self._repeated = [], [], [], []
+            self.stop_waits.clear()
             return drained
 
     @property

@@ -18,20 +18,29 @@ class Course:
         duration: duration [s].
         peak_jerk: maximum jerk [m/s^3].
         acceleration: the last acceleration [m/s^2]; None before the first.
+        at: time of that acceleration since the beginning [s].
+        step: duration of the last step [s]; 0 before the first.
     """
 
     duration: float = 0.0
     peak_jerk: float = 0.0
     acceleration: Vector | None = None
+    at: float = 0.0
+    step: float = 0.0
 
     def after(self, acceleration: Vector, dt: float) -> Course:
-        """Return the course ``dt`` [s] later, with the cup's ``acceleration`` [m/s^2] then."""
+        """Return the course ``dt`` [s] later, with the cup's ``acceleration`` [m/s^2].
+
+        The acceleration is the difference of the mean velocities of this step and of the one
+        before, over the time between their middles. With a constant jerk it is exact where
+        ``at`` places it: a third of the difference of both steps after the border between them.
+        """
         if dt <= 0.0:
             return self
-        jerk = 0.0
+        jerk, at = 0.0, self.duration + (dt - (self.step or dt)) / 3.0
         if self.acceleration is not None:
-            jerk = norm(scale(1.0 / dt, sub(acceleration, self.acceleration)))
-        return Course(self.duration + dt, max(self.peak_jerk, jerk), acceleration)
+            jerk = norm(scale(1.0 / (at - self.at), sub(acceleration, self.acceleration)))
+        return Course(self.duration + dt, max(self.peak_jerk, jerk), acceleration, at, dt)
 
 
 @dataclass(frozen=True)
