@@ -42,7 +42,16 @@ if TYPE_CHECKING:
 PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
 
-BUILT_IN = ("event_log", "programs", "importers", "reachability", "export", "experiments", "media")
+BUILT_IN = (
+    "event_log",
+    "programs",
+    "importers",
+    "reachability",
+    "export",
+    "experiments",
+    "media",
+    "phone",
+)
 """Built-in extensions, in the order of their commands in the help text."""
 
 log = logging.getLogger(__name__)

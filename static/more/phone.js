@@ -27,7 +27,7 @@ export async function toggle(toast) {
     box.hidden = true;
   } else {
     try {
-      const answer = await fetch("phone");
+      const answer = await fetch("api/v1/phone");
       if (!answer.ok) throw new Error(await answer.text());
       box.replaceChildren(...shown(await answer.json(), toast));
       box.hidden = false;

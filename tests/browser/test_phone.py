@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import zxingcpp
 
-from katana450.server.web.phone import LOOPBACK_ONLY, own_address
+from katana450.extensions.phone.address import LOOPBACK_ONLY, own_address
 from tests.browser.conftest import OpenPage
 from tests.browser.server import APP, AppServer
 from tests.browser.sight import contrast

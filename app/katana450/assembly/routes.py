@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
 from collections.abc import Sequence
@@ -34,7 +33,6 @@ from katana450.server.web.admission import Admission, address_of
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.bodies import TOO_MANY, body_of
 from katana450.server.web.http_api import Api, RouteProvider
-from katana450.server.web.phone import phone_address
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -44,9 +42,6 @@ MAX_BODY_BYTES = 1024
 
 BAD_LINKS_PER_SECOND, BAD_LINKS_BURST = 2.0, 20.0
 """Invalid links that are answered per second, and in a burst, for all clients together."""
-
-CODES_PER_SECOND, CODES_BURST = 2.0, 10.0
-"""QR codes that are drawn per second, and in a burst, for all pages together."""
 
 STOP_PORT = "X-Stop-Port"
 """Header that names the port to which the page also sends STOP."""
@@ -133,7 +128,6 @@ def application(
         Route("/stop", stop, methods=["POST"]),
         _leave_route(hub, authenticator),
         _health_route(hub),
-        _phone_route(hub, authenticator, address),
         WebSocketRoute("/viser", proxy.serve),
         _control_route(hub, authenticator, budgets),
         *Api(hub, authenticator, budgets, provided).routes(),
@@ -165,26 +159,6 @@ def _health_route(hub: Hub) -> Route:
         )
 
     return Route("/health", health)
-
-
-def _phone_route(hub: Hub, authenticator: Authenticator, address: Address) -> Route:
-    codes = TokenBucket(CODES_PER_SECOND, CODES_BURST, hub.clock())
-
-    async def phone(request: Request) -> Response:
-        """Return the address of this server for a phone, with its QR code."""
-        _signed_in(authenticator, request)
-        if not codes.take(hub.clock()):
-            raise HTTPException(429, "Too many requests. Wait a moment.")
-        found = await asyncio.to_thread(
-            phone_address,
-            address,
-            request.headers["host"],
-            hub.stop_path.main_port,
-            requires_link=authenticator.requires_link,
-        )
-        return Response(msgspec.json.encode(found), media_type="application/json")
-
-    return Route("/phone", phone)
 
 
 def _leave_route(hub: Hub, authenticator: Authenticator) -> Route:

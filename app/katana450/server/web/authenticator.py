@@ -114,7 +114,8 @@ class Authenticator:
         """
         self._access = access
         self._people = People(time.monotonic) if people is None else people
-        self._secure = address.cookies_are_secure
+        self.address = address
+        """Names and addresses of the server."""
         # Browsers send cookies to all ports of a host.
         self._cookie = f"katana450-{port}"
 
@@ -228,7 +229,12 @@ class Authenticator:
             max_age = int(known[1].expires - time.time())
             value = self._access.session(known[0])
         response.set_cookie(
-            self._cookie, value, max_age, secure=self._secure, httponly=True, samesite="strict"
+            self._cookie,
+            value,
+            max_age,
+            secure=self.address.cookies_are_secure,
+            httponly=True,
+            samesite="strict",
         )
         return found
 

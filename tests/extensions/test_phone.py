@@ -8,11 +8,11 @@ from urllib.parse import unquote_to_bytes
 
 import pytest
 
-from katana450.server.web import phone
+from katana450.extensions.phone import address as phone
+from katana450.extensions.phone.address import LINK_REQUIRED, LOOPBACK_ONLY, phone_address
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
-from katana450.server.web.phone import LINK_REQUIRED, LOOPBACK_ONLY, phone_address
 from tests.browser.server import APP, AppServer
-from tests.gateway.client import ask, enter
+from tests.gateway.client import ask
 
 LOOPBACK = Address(LOOPBACK_NAMES, any_address=False, secure=False)
 OPEN = Address(LOOPBACK_NAMES | {"robot"}, any_address=True, secure=False)
@@ -68,14 +68,12 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
-def test_address_is_told_to_people_who_are_signed_in(server: AppServer) -> None:
-    url = f"{server.url}/phone"
-    assert ask(url)[0] == 401
-    cookie = enter(server.url)
-    code, _, body = ask(url, Cookie=cookie, Host=f"10.0.0.7:{server.port}")
+def test_server_tells_its_address(server: AppServer) -> None:
+    url = f"{server.url}/api/v1/phone"
+    code, _, body = ask(url, Host=f"10.0.0.7:{server.port}")
     assert code == 200
     found = json.loads(body)
     assert found["url"] == f"http://10.0.0.7:{server.port}"
     assert "Everybody who opens" in found["note"]
-    codes = {ask(url, Cookie=cookie)[0] for _ in range(20)}
+    codes = {ask(url)[0] for _ in range(20)}
     assert codes == {200, 429}

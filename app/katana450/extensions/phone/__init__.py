@@ -1,0 +1,1 @@
+"""The address of the server for a phone, as a QR code."""
