@@ -48,6 +48,7 @@ def pair(windows: Windows) -> Iterator[tuple[ViserPage, ViserPage]]:
         yield page, other
 
 
+@pytest.mark.long
 def test_each_window_looks_from_where_its_person_asks(
     pair: tuple[ViserPage, ViserPage], arm: MountedArm, artefacts: Path
 ) -> None:

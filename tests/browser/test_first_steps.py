@@ -197,6 +197,7 @@ def test_window_without_storage_shows_the_card(server: AppServer, open_page: Ope
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_poster_covers_the_scene_until_it_is_drawn(server: AppServer, open_page: OpenPage) -> None:
     with SlowLink(server.port, 2e6, delay=0.1) as line:
         page = open_page(
@@ -213,6 +214,7 @@ def test_poster_covers_the_scene_until_it_is_drawn(server: AppServer, open_page:
         assert [each.startswith("gone") for each in states] == [False] * (len(states) - 1) + [True]
 
 
+@pytest.mark.long
 def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm", MOVE), script=SETTINGS)

@@ -51,6 +51,7 @@ def crowd(server: AppServer, size: int) -> Iterator[None]:
         thread.join()
 
 
+@pytest.mark.long
 def test_stop_works_under_any_load(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:
@@ -162,6 +163,7 @@ def test_reloaded_page_still_drives(new_page: ViserPage) -> None:
     assert bar(new_page, "name") == name
 
 
+@pytest.mark.long
 def test_slow_connection_shows_few_but_no_old_frames(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:

@@ -39,6 +39,7 @@ def run(page: ViserPage) -> None:
     page.wait_until(lambda: bar(page, "headline").startswith("Wave: "), "the program", seconds=60.0)
 
 
+@pytest.mark.long
 def test_choice_of_the_next_driver_by_keys_is_sent_by_enter(
     server: AppServer, open_page: OpenPage
 ) -> None:

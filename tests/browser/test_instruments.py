@@ -298,6 +298,7 @@ def test_damaged_layout_is_repaired(page: ViserPage) -> None:
     assert places(page) == first
 
 
+@pytest.mark.long
 def test_slow_connection_shows_few_but_no_old_states(
     server: AppServer, truth: Truth, page: ViserPage, browser: Browser
 ) -> None:

@@ -154,6 +154,7 @@ def test_stopped_arm_takes_no_step(sheet: ViserPage, truth: Truth) -> None:
     assert np.allclose(tool(truth), start, atol=EXACT)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", PHONES)
 def test_steps_fit_a_finger_on_a_phone(
     server: AppServer, open_page: OpenPage, size: tuple[int, int], artefacts: Path

@@ -164,6 +164,7 @@ def test_first_drag_takes_the_free_arm(
     assert abs(rest(truth)[2] - READY[2]) > 0.1
 
 
+@pytest.mark.long
 def test_drag_beside_the_arm_turns_the_camera_and_the_handle_stays_a_handle(
     page: ViserPage, truth: Truth
 ) -> None:
@@ -183,6 +184,7 @@ def test_drag_beside_the_arm_turns_the_camera_and_the_handle_stays_a_handle(
     assert label(page) == ""
 
 
+@pytest.mark.long
 def test_clicked_link_gets_a_bar_with_steps(
     page: ViserPage, links: list[str], truth: Truth, artefacts: Path
 ) -> None:
@@ -301,7 +303,8 @@ def test_who_does_not_drive_turns_the_camera_and_gets_reasons(
     assert other.errors == []
 
 
-@pytest.mark.parametrize("size", [(390, 844), pytest.param((844, 390), marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("size", [(390, 844), (844, 390)])
 def test_finger_takes_hold_of_the_selected_link_only(
     server: AppServer,
     open_page: OpenPage,

@@ -80,6 +80,7 @@ LATE_RESET = """() => {
 """Script that repeats viser's reset of the camera after the camera was restored."""
 
 
+@pytest.mark.long
 def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm", MOVE))
@@ -208,6 +209,7 @@ def test_closed_window_frees_the_arm_and_a_reloaded_one_keeps_it(open_page: Open
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="finds the processes as Linux lists them")
+@pytest.mark.long
 @pytest.mark.parametrize("process", ["arm", "front"])
 def test_page_outlasts_each_process_and_shows_the_truth(open_page: OpenPage, process: str) -> None:
     with AppServer(APP) as server:

@@ -63,6 +63,7 @@ def test_person_chooses_a_name_and_saves_picture_and_link(
     assert other.errors == []
 
 
+@pytest.mark.long
 def test_chosen_name_returns_with_a_restarted_server(open_page: OpenPage) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm",))

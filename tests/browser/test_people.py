@@ -43,6 +43,7 @@ def waits(page: Page, name: str, words: str) -> None:
     page.locator("#people-list li", has_text=name).get_by_text(words).wait_for(timeout=10_000)
 
 
+@pytest.mark.long
 def test_admin_lists_mutes_and_disconnects(site: Site, browser: Browser, artefacts: Path) -> None:
     url, token = site.server.url, site.link("Vera", Role.VIEWER)
     boss = site.link("Ada", Role.ADMIN)

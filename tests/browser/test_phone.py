@@ -69,6 +69,7 @@ def test_code_on_the_screen_holds_the_address(
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_page_of_a_server_on_loopback_says_how_to_let_a_phone_in(
     open_page: OpenPage, artefacts: Path
 ) -> None:

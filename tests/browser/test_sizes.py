@@ -87,6 +87,7 @@ def eye(page: ViserPage) -> FloatArray:
     return np.array(page.frame.evaluate("() => __viserMutable.camera.position.toArray()"))
 
 
+@pytest.mark.long
 def test_arm_and_gizmo_are_in_the_picture_at_every_size(desk: ViserPage, artefacts: Path) -> None:
     wait_whole(desk, "at first")
     first = eye(desk)
@@ -159,6 +160,7 @@ def test_every_mood_has_a_visible_lamp(desk: ViserPage) -> None:
         assert lamp("blocked") == lamp("limited") == ("rgb(196, 117, 0)", ground)
 
 
+@pytest.mark.long
 def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:

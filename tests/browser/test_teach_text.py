@@ -38,6 +38,7 @@ def sheet(new_page: ViserPage) -> ViserPage:
     return new_page
 
 
+@pytest.mark.long
 def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefacts: Path) -> None:
     teach(sheet, truth, (20.0, -25.0))
     page = sheet.page

@@ -13,7 +13,7 @@ import pytest
 from katana450.resources import STATIC
 from tests.browser.camera import Camera
 from tests.browser.conftest import OpenPage, Windows
-from tests.browser.page import ViserPage
+from tests.browser.page import COARSE, ViserPage
 from tests.browser.server import AppServer
 from tests.browser.viser_parts_app import EYE
 from tests.viser_bridge.parts import part
@@ -94,10 +94,12 @@ def height(page: ViserPage) -> float:
 
 def test_page_takes_camera_and_resolution_from_its_address(page: ViserPage) -> None:
     with part("PARAMETER"):
-        names = [each.partition("=")[0] for each in CAMERA.query(0.5).split("&")]
+        names = [each.partition("=")[0] for each in CAMERA.query(COARSE).split("&")]
         assert all(ask(page, f"Viser.PARAMETER.test('{name}')") for name in names)
         assert eye(page) == pytest.approx(CAMERA.position, abs=1e-3)
-        assert ask(page, "Viser.viewer().canvas.width / Viser.viewer().canvas.clientWidth") == 0.5
+        assert (
+            ask(page, "Viser.viewer().canvas.width / Viser.viewer().canvas.clientWidth") == COARSE
+        )
 
 
 def test_page_offers_its_scene(page: ViserPage) -> None:
