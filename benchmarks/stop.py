@@ -206,7 +206,7 @@ async def press_main(arm: AsyncClient, states: AsyncGenerator[answers.State, Non
     """Return the time from STOP on the driver's websocket until a stopped state arrives [s]."""
     await anext(states)
     began = time.perf_counter()
-    await arm.ask(requests.Stop(press=secrets.token_hex(8)))
+    await arm.send(requests.Stop(press=secrets.token_hex(8)))
     async for state in states:
         if state.stop == "confirmed":
             break

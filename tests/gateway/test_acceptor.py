@@ -62,6 +62,28 @@ def test_oldest_connection_of_the_most_frequent_address_is_closed() -> None:
     asyncio.run(act())
 
 
+def test_small_messages_do_not_wait_for_acknowledgements() -> None:
+    opened: list[asyncio.Transport] = []
+
+    class Opened(asyncio.Protocol):
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            assert isinstance(transport, asyncio.Transport)
+            opened.append(transport)
+
+    async def act() -> None:
+        with listen("127.0.0.1", 0) as listening:
+            acceptor = Acceptor(listening, WAITING).start(Opened)
+            client = await _connected(listening.getsockname())
+            (transport,) = opened
+            sock = transport.get_extra_info("socket")
+            assert sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
+            client.close()
+            acceptor.close()
+            await acceptor.wait_closed()
+
+    asyncio.run(act())
+
+
 def test_closed_connections_make_room_for_others() -> None:
     async def act() -> None:
         async with _accepting() as (_, server):
