@@ -108,7 +108,7 @@ def test_steps_have_the_places_of_the_definition() -> None:
         ("steps:\n  - move: {x: 1 s, y: 0, z: 0}", 2, "not a time"),
         ("steps:\n  - repeat: {times: 2.5, index: i, steps: [home]}", 2, "whole number"),
         ("steps:\n  - repeat: {times: 2, index: 3, steps: [home]}", 2, "letters, digits"),
-        ("steps:\n  - repeat: {times: 2, index: i, steps: [{wait: 0 * i}]}", 2, "not between"),
+        ("steps:\n  - repeat: {times: 2, index: i, steps: [{wait: -1 - i}]}", 2, "not between"),
         ("steps:\n  - for_each: {name: p, in: 3, steps: [home]}", 2, "Expected a list"),
         ("steps:\n  - for_each: {name: p, in: [], steps: [home]}", 2, "list of 1 to"),
         ("steps:\n  - for_each: {in: [1], steps: [home]}", 2, "needs 'name'"),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -18,24 +19,43 @@ from katana450.extensions.programs.step import Step, nothing
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.joint_path import JointPath
 
+MIN_BLEND = 0.01
+"""[1] Minimum rounding of a corner that is rounded."""
+
 MAX_VIAS = 50
 """Maximum number of places of one step."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """Move to a place on a free path round obstacles."""
+    """Move to a place on a free path round obstacles.
+
+    Attributes:
+        place: the place; with ``by`` its pitch, roll and branch.
+        by: (3,) motion of the tool point from its present place [m]; None to move to ``place``.
+    """
 
     place: StepTarget
+    by: FloatArray | None = None
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read a place. Raises ScriptError."""
-        return cls(places.place(value, setting))
+        """Read a place, or {by, pitch, roll, branch}. Raises ScriptError."""
+        if value.kind != "mapping" or all(name.held != "by" for name, _ in value.fields):
+            return cls(places.place(value, setting))
+        fields = Fields(value, "a relative move")
+        by = fields.need("by", read.vector(read.millimetres(), partly=True), np.zeros(3))
+        angles, branch = places.angles(fields), places.branch(fields)
+        fields.done()
+        return cls(StepTarget(None, None, *angles, branch, setting.in_base), by)
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the motion. Raises InputError if the place cannot be reached."""
-        builder.move_to(builder.joints_at(self.place), "move")
+        place = self.place
+        if self.by is not None:
+            by = builder.direction(self.by, in_base=place.in_base)
+            place = replace(place, position=builder.at.position + by, in_base=False)
+        builder.move_to(builder.joints_at(place), "move")
 
 
 @dataclass(frozen=True)
@@ -93,7 +113,7 @@ class Home:
 
 @dataclass(frozen=True)
 class Via:
-    """Move through places without a rest, with rounded corners."""
+    """Move through places, without a rest if the corners are rounded."""
 
     through: tuple[StepTarget, ...]
     blend: float
@@ -114,15 +134,29 @@ class Via:
             vias.append(builder.joints_at(each))
             builder.state = builder.standing(vias[-1])
         builder.state = at
-        blend = np.full(len(vias) - 2, self.blend)
-        builder.follow([JointPath(builder.chain, np.array(vias), blend)], "via")
+        if self.blend:
+            blend = np.full(len(vias) - 2, self.blend)
+            builder.follow([JointPath(builder.chain, np.array(vias), blend)], "via")
+        else:
+            legs = [np.array(leg) for leg in pairwise(vias)]
+            builder.follow([JointPath(builder.chain, leg, np.zeros(0)) for leg in legs], "via")
 
 
 def through(fields: Fields, setting: ScriptContext) -> tuple[tuple[StepTarget, ...], float]:
-    """Return the places, and the fraction of half a leg that a rounded corner cuts off."""
+    """Return the places, and the fraction of half a leg that a rounded corner cuts off.
+
+    With 0 the tool rests in each corner.
+    """
     each = read.listed(lambda item: places.place(item, setting), 2, MAX_VIAS)
     found: tuple[StepTarget, ...] = fields.need("through", each, ())
-    return found, fields.take("blend", read.number(0.01, 1.0), 0.5)
+    return found, fields.take("blend", _blend, 0.5)
+
+
+def _blend(value: YamlValue) -> float:
+    found = read.number(0.0, 1.0)(value)
+    if 0.0 < found < MIN_BLEND:
+        raise value.wrong(f"A blend is 0, or {MIN_BLEND:g} to 1: {found:g} is too small to drive.")
+    return found
 
 
 STEPS: dict[str, type[Step]] = {

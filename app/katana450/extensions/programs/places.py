@@ -39,6 +39,38 @@ def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
     return at
 
 
+def point(value: YamlValue, setting: ScriptContext) -> FloatArray:
+    """Read a point (3,) [m]: {x, y, z}, [x, y, z], or the name of a pose that has one.
+
+    Raises ScriptError.
+    """
+    if value.kind != "text":
+        found: FloatArray = read.vector(read.millimetres())(value)
+        return found
+    return _position(place(value, setting), value)
+
+
+def _position(pose: StepTarget, value: YamlValue) -> FloatArray:
+    if pose.position is None:
+        raise value.wrong(
+            f"The pose {value} is given by joint angles, so it is no point. Use it in `move`, or "
+            "give it by x, y and z."
+        )
+    return pose.position
+
+
+def pose(value: YamlValue, setting: ScriptContext) -> StepTarget:
+    """Read a point as ``point`` does; a named pose also gives its pitch and roll.
+
+    Raises ScriptError.
+    """
+    if value.kind != "text":
+        return StepTarget(None, point(value, setting), in_base=setting.in_base)
+    named = place(value, setting)
+    _position(named, value)
+    return named
+
+
 def joints(value: YamlValue) -> FloatArray:
     """Read five angles (5,) in degrees; returns [rad]. Raises ScriptError."""
     return np.array(read.listed(read.degrees(-720.0, 720.0), 5, 5)(value))

@@ -56,11 +56,12 @@ class TimedPause:
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read a time [s]. Raises ScriptError."""
-        return cls(read.number(0.01, MAX_PAUSE, "s")(value))
+        return cls(read.number(0.0, MAX_PAUSE, "s")(value))
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the wait."""
-        builder.note("wait", Wait(self.seconds), builder.state)
+        if self.seconds:
+            builder.note("wait", Wait(self.seconds), builder.state)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -41,11 +42,15 @@ class Line:
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
         """Read {to, by, pitch, roll}. Raises ScriptError."""
         fields = Fields(value, "a line")
-        to = fields.take("to", read.vector(read.millimetres()), None)
+        to = fields.take("to", lambda each: places.pose(each, setting), None)
         by = fields.take("by", read.vector(read.millimetres(), partly=True), None)
         if to is not None and by is not None:
             fields.problems += value.wrong("A line takes `to` or `by`, not both.").problems
-        found = cls(to, by, *places.angles(fields), setting.in_base)
+        pitch, roll = places.angles(fields)
+        if to is not None:
+            pitch = to.pitch if pitch is None else pitch
+            roll = to.roll if roll is None else roll
+        found = cls(None if to is None else to.position, by, pitch, roll, setting.in_base)
         fields.done()
         return found
 
@@ -84,8 +89,11 @@ class Lines:
         vias = [builder.at]
         for each in self.through:
             vias.append(builder.target_at(each, vias[-1]))
-        blend = np.full(len(vias) - 2, self.blend)
-        builder.lead([ToolLines(tuple(vias), blend)], "lines")
+        if self.blend:
+            blend = np.full(len(vias) - 2, self.blend)
+            builder.lead([ToolLines(tuple(vias), blend)], "lines")
+        else:
+            builder.lead([ToolLine(a, b) for a, b in pairwise(vias)], "lines")
 
 
 @dataclass(frozen=True)
@@ -110,7 +118,7 @@ class ArcGeometry:
     def read(cls, fields: Fields, axis: str, setting: ScriptContext) -> Self:
         """Read centre, axis, pitch and roll. ``axis`` is the name of the axis field."""
         return cls(
-            fields.need("centre", read.vector(read.millimetres()), np.zeros(3)),
+            fields.need("centre", lambda each: places.point(each, setting), np.zeros(3)),
             fields.need(axis, read.direction, np.eye(3)[0]),
             fields.take("pitch", places.pitch, None),
             fields.take("roll", read.degrees(), None),
@@ -225,7 +233,7 @@ class Screw:
         """Read {point, axis, angle, climb}. Raises ScriptError."""
         fields = Fields(value, "a screw")
         found = cls(
-            fields.need("point", read.vector(read.millimetres()), np.zeros(3)),
+            fields.need("point", lambda each: places.point(each, setting), np.zeros(3)),
             fields.need("axis", read.direction, np.eye(3)[0]),
             fields.take("angle", read.degrees(), 0.0),
             fields.take("climb", read.millimetres(), 0.0),

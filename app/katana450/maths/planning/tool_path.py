@@ -212,7 +212,7 @@ class ToolPath:
 def _at(sigma: float, target: ToolTarget) -> str:
     """Return the place in words, for an error message."""
     x, y, z = (1e3 * target.position).tolist()
-    return f"{100.0 * sigma:.1f} % along it, at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+    return f"{100.0 * sigma:.1f} % along it, at ({x:.1f}, {y:.1f}, {z:.1f}) mm in {{S}}"
 
 
 def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:

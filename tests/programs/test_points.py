@@ -1,0 +1,111 @@
+"""Test named poses as points, relative moves, and corners and waits of size 0."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.state import State
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.tool import ToolTarget
+from tests.programs.conftest import Stage
+
+HEAD = """\
+tool: tcp
+frame: base
+poses:
+  corner: {x: 320, y: -40, z: 150, pitch: 50, roll: 0}
+  above: {x: 320, y: -40, z: 200, pitch: 60}
+  folded: {joints: [0, -68, 85, 8, 0]}
+steps:
+  - move: corner
+"""
+
+
+def planned(stage: Stage, steps: str) -> Program:
+    return compiled(parse(HEAD + steps), stage.plan_context, stage.begin())
+
+
+def end(stage: Stage, program: Program) -> ToolTarget:
+    """Return the tool pose at the end of ``program``, in {S}."""
+    plans = [task.action.plan for task in program.tasks if isinstance(task.action, FollowPlan)]
+    return ToolTarget.at(stage.plan_context.arm.chain_to("tcp"), plans[-1].end)
+
+
+def in_base(stage: Stage, p: FloatArray) -> FloatArray:
+    """Return the point ``p`` (3,) [m] of {S} in the base frame [mm]."""
+    T = stage.plan_context.T_base_shoulder
+    return np.asarray(1e3 * (T[:3, :3] @ p + T[:3, 3]))
+
+
+def rests(stage: Stage, states: list[State]) -> list[FloatArray]:
+    """Return the points [mm] in the base frame from which the arm begins to move."""
+    chain = stage.plan_context.arm.chain_to("tcp")
+    return [
+        in_base(stage, ToolTarget.at(chain, a.q).position)
+        for a, b in pairwise(states)
+        if a.motion.at_rest and not b.motion.at_rest
+    ]
+
+
+def test_line_goes_to_a_named_pose_with_its_pitch(stage: Stage) -> None:
+    found = end(stage, planned(stage, "  - line: {to: above}\n"))
+    assert in_base(stage, found.position) == pytest.approx([320, -40, 200], abs=1e-6)
+    assert np.degrees(found.pitch) == pytest.approx(60.0)
+    assert np.degrees(found.roll) == pytest.approx(0.0, abs=1e-9)
+    found = end(stage, planned(stage, "  - line: {to: above, pitch: 45}\n"))
+    assert np.degrees(found.pitch) == pytest.approx(45.0)
+
+
+def test_named_pose_is_the_centre_of_an_arc(stage: Stage) -> None:
+    found = end(stage, planned(stage, "  - arc: {centre: above, axis: y, angle: 20}\n"))
+    a = np.radians(20.0)
+    wanted = [320 - 50 * np.sin(a), -40, 200 - 50 * np.cos(a)]
+    assert in_base(stage, found.position) == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "step", ["line: {to: folded}", "arc: {centre: folded, axis: y, angle: 20}"]
+)
+def test_pose_by_joints_is_no_point(step: str) -> None:
+    with pytest.raises(ScriptError, match=r"it is no point\. Use it in `move`") as refused:
+        parse(f"{HEAD}  - {step}\n")
+    assert refused.value.problems[0].line == 9
+
+
+def test_move_by_is_relative_to_the_present_place(stage: Stage) -> None:
+    found = end(stage, planned(stage, "  - move: {by: {y: 3 cm, z: 20}, pitch: 55}\n"))
+    assert in_base(stage, found.position) == pytest.approx([320, -10, 170], abs=1e-6)
+    assert np.degrees(found.pitch) == pytest.approx(55.0)
+    with pytest.raises(ScriptError, match="A relative move has no 'x'"):
+        parse(f"{HEAD}  - move: {{by: {{y: 3}}, x: 2}}\n")
+
+
+@pytest.mark.parametrize("step", ["lines", "via"])
+def test_blend_of_0_rests_in_each_corner(stage: Stage, step: str) -> None:
+    program = planned(
+        stage,
+        f"  - {step}:\n      through: [{{x: 320, y: 0, z: 150}}, {{x: 350, y: 0, z: 150}}]\n"
+        "      blend: 0\n",
+    )
+    _, states = stage.play(program, stage.begin())
+    assert rests(stage, states)[1:] == [
+        pytest.approx(np.array([320, -40, 150]), abs=1e-6),
+        pytest.approx(np.array([320, 0, 150]), abs=1e-6),
+    ]
+    assert in_base(stage, end(stage, program).position) == pytest.approx([350, 0, 150], abs=1e-6)
+
+
+def test_blend_too_small_to_drive_is_refused() -> None:
+    with pytest.raises(ScriptError, match=r"0\.001 is too small to drive"):
+        parse(f"{HEAD}  - lines: {{through: [above, corner], blend: 0.001}}\n")
+
+
+def test_wait_of_0_does_nothing(stage: Stage) -> None:
+    assert len(planned(stage, "  - wait: 0\n").tasks) == len(planned(stage, "").tasks)
