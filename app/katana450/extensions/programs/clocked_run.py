@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
@@ -21,33 +23,55 @@ from katana450.settings import Settings
 
 
 class Planned(NamedTuple):
-    """A compiled script, and the arm that it is for."""
+    """A compiled script, the arm that it is for, and the state in which it begins."""
 
     script: Script
     program: Program
     robot: Robot
     session: Session
+    start: State
 
 
-def plan_script(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Planned:
-    """Return ``script`` planned for the arm of ``urdf``, from its ready posture.
+def ready(session: Session) -> State:
+    """Return the state of an arm in its ready posture, with the fingers closed."""
+    return session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
 
-    ``seed`` is the seed of the planner's random search for paths round obstacles. ``speed`` is the
-    fraction of the script's own speed, up to 1. Raises ScriptError.
+
+def plan_script(
+    script: Script,
+    urdf: Path,
+    seed: int = 0,
+    speed: float = 1.0,
+    begin: Callable[[Session], State] = ready,
+) -> Planned:
+    """Return ``script`` planned for the arm of ``urdf``.
+
+    Args:
+        script: the script.
+        urdf: description of the arm.
+        seed: seed of the planner's random search for paths round obstacles.
+        speed: fraction of the script's own speed, up to 1.
+        begin: returns the state in which the script begins.
+
+    Raises ScriptError.
     """
     settings = replace(Settings(), bare=script.bare)
     robot, session, _ = describe_robot(settings, urdf, None)
     plan_context = PlanContext(session, robot.require_arm().T_base_shoulder, seed)
-    start = session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
+    start = begin(session)
     program = compiled(script, plan_context, start, speed)
-    return Planned(script, program, robot, session)
+    return Planned(script, program, robot, session, start)
 
 
 def run_by_clock(plan: Planned) -> Simulation:
-    """Run ``plan`` to its end with a progress bar. Raises KatanaError if it ends early."""
-    session = plan.session
-    driver = SimulatedDriver(plan.robot.require_arm(), session.ready, gripper=0.0)
-    simulation = Simulation(plan.program, session, driver, Settings().rate)
+    """Run ``plan`` to its end with a progress bar. Conditions count as true.
+
+    Raises KatanaError if it ends early.
+    """
+    driver = SimulatedDriver(plan.robot.require_arm(), plan.start.q, plan.start.gripper)
+    simulation = Simulation(
+        plan.program.rehearsed, plan.session, driver, Settings().rate, plan.start
+    )
     done, total = 0, 1000
     ticks = progress(range(total), total, plan.script.name)
     for fraction in simulation.ticks():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from katana450.arm.control.state import State
 from katana450.errors import InputError
@@ -10,6 +10,7 @@ from katana450.extensions.programs.actions import FollowPlan, SetSpeed, Task
 from katana450.extensions.programs.compiler import Compiler, Report
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
 from katana450.extensions.programs.script import Script
+from katana450.extensions.programs.wait_for import WaitUntil
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -37,6 +38,22 @@ class Program:
         return sum(
             task.action.plan.duration for task in self.tasks if isinstance(task.action, FollowPlan)
         )
+
+    @property
+    def conditions(self) -> tuple[Task, ...]:
+        """The tasks that wait for a condition."""
+        return tuple(task for task in self.tasks if isinstance(task.action, WaitUntil))
+
+    @property
+    def rehearsed(self) -> Program:
+        """The program for a simulation in which nobody acts: all conditions count as true."""
+        tasks = [
+            replace(task, action=replace(task.action, assumed=True))
+            if isinstance(task.action, WaitUntil)
+            else task
+            for task in self.tasks
+        ]
+        return replace(self, tasks=tuple(tasks))
 
 
 def compiled(

@@ -85,19 +85,22 @@ def follow_exactly(state: State) -> State:
 class Simulation:
     """A run of a program, tick by tick."""
 
-    def __init__(self, program: Program, session: Session, driver: Driver, rate: float) -> None:
-        """Prepare a run at ``rate`` [Hz]; the arm of ``driver`` stands at the program's start."""
+    def __init__(
+        self, program: Program, session: Session, driver: Driver, rate: float, start: State
+    ) -> None:
+        """Prepare a run at ``rate`` [Hz] from ``start``, where the arm of ``driver`` stands."""
         self._program = program
         self._session = session
         self._driver = driver
         self._period = 1.0 / rate
         self._records: list[tuple[State, int]] = []
+        self._start = start
         self.run = Run(0.0)
 
     def ticks(self) -> Iterator[float]:
         """Run the program; yield the completed fraction after each tick, from 0 to 1."""
-        sent = self._driver.start(0.0)
-        start = self._session.begin(sent.q, sent.gripper, 0.0)
+        start = self._start
+        self._driver.start(start.t)
         self._records = [(start, 0)]
         count = len(self._program.tasks)
         ticks = simulated(self._program, self._session, start, self._period, self._driven)

@@ -14,6 +14,7 @@ from katana450.extensions.programs import (
     settings_steps,
     table,
     tool_moves,
+    wait_for,
 )
 from katana450.extensions.programs.step import Step
 
@@ -25,5 +26,6 @@ STEPS: dict[str, type[Step]] = {
     **grasp.STEPS,
     **pouring.STEPS,
     **set_down.STEPS,
+    **wait_for.STEPS,
 }
 """The class of each step by its name in a script."""

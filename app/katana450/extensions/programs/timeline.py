@@ -113,8 +113,8 @@ def moments(
 ) -> Iterator[Moment]:
     """Simulate ``program`` from ``state``; yield moments at increasing times of ``timeline``.
 
-    Of the time between two motions only the end is yielded. A program that fails ends early, and
-    one that takes longer than a day raises InputError.
+    Of the time between two motions only the end is yielded. Conditions count as true. A
+    program that fails ends early, and one that takes longer than a day raises InputError.
     """
     at_rest = JointMotion.rest(state.setpoint)
     start = replace(
@@ -124,7 +124,7 @@ def moments(
     apart = max(TICK, timeline.span / MAX_MOMENTS)
     last = Moment(0.0, start)
     yielded = -apart
-    for now, run in simulated(program, session, start, TICK, follow_exactly):
+    for now, run in simulated(program.rehearsed, session, start, TICK, follow_exactly):
         t = max(timeline.time_of(now, run.number), last.t)
         if t > last.t and last.t - yielded >= apart:
             yield last

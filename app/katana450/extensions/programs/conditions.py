@@ -1,0 +1,229 @@
+"""Conditions on the arm, the objects and the water, as a script waits for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+
+from katana450.arm.control.pouring import BASIN, CUP
+from katana450.arm.control.scene_objects import named
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs import fields as read
+from katana450.extensions.programs import places
+from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.source import YamlValue
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.water.units import MILLILITRE
+
+
+class ValueBounds(NamedTuple):
+    """Bounds of a measured value, both included."""
+
+    at_least: float = -math.inf
+    at_most: float = math.inf
+
+    @classmethod
+    def read(cls, fields: Fields, number: Callable[[YamlValue], float]) -> ValueBounds:
+        """Read ``at_least`` and ``at_most``, of which at least one is needed."""
+        found = cls(
+            fields.take("at_least", number, -math.inf), fields.take("at_most", number, math.inf)
+        )
+        if found == cls() and not fields.problems:
+            problem = f"{fields.what.capitalize()} needs `at_least`, `at_most` or both."
+            fields.problems += fields.value.wrong(problem).problems
+        return found
+
+    def hold(self, value: float) -> bool:
+        """Return whether ``value`` is within the bounds."""
+        return self.at_least <= value <= self.at_most
+
+
+class Condition(Protocol):
+    """A condition on the measured state of an arm and its surroundings."""
+
+    def checked(self, builder: PlanBuilder) -> Condition:
+        """Return the condition for the arm of ``builder``.
+
+        Raises InputError if it can never hold for that arm.
+        """
+        ...
+
+    def holds(self, state: State) -> bool:
+        """Return whether it holds in ``state``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Held:
+    """The fingers hold the object ``name``."""
+
+    name: str
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the name of an object. Raises ScriptError."""
+        return cls(read.text(value))
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return itself. Raises InputError without such an object."""
+        builder.scene_object(self.name)
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the fingers hold the object."""
+        found = named(state.objects, self.name)
+        return found is not None and found.held
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """The object ``name`` stands within ``within`` [m] of the point ``at`` (3,) [m]."""
+
+    name: str
+    at: FloatArray
+    within: float
+    in_base: bool
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {object, at, within}. Raises ScriptError."""
+        fields = Fields(value, "placed")
+        found = cls(
+            fields.need("object", read.text, ""),
+            fields.need("at", lambda each: places.point(each, setting), frozen(np.zeros(3))),
+            fields.take("within", read.millimetres(0.1, 1000.0), 0.01),
+            setting.in_base,
+        )
+        fields.done()
+        return found
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return the condition in the base frame. Raises InputError without such an object."""
+        builder.scene_object(self.name)
+        if self.in_base:
+            return self
+        T = builder.plan_context.T_base_shoulder
+        return replace(self, at=frozen(T[:3, :3] @ self.at + T[:3, 3]), in_base=True)
+
+    def holds(self, state: State) -> bool:
+        """Return whether the object stands there; an object in the hand stands nowhere."""
+        found = named(state.objects, self.name)
+        if found is None or found.carried:
+            return False
+        return bool(np.linalg.norm(found.T[:3, 3] - self.at) <= self.within)
+
+
+@dataclass(frozen=True)
+class Volume:
+    """The water in the cup or in the basin is within ``bounds`` [ml]."""
+
+    of: str
+    bounds: ValueBounds
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {of, at_least, at_most}. Raises ScriptError."""
+        fields = Fields(value, "a volume")
+        of = fields.need("of", read.choice(CUP, BASIN), CUP)
+        found = cls(of, ValueBounds.read(fields, read.number(0.0, 10_000.0, "ml")))
+        fields.done()
+        return found
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return itself. Raises InputError without a cup."""
+        if builder.state.poured is None:
+            raise InputError(
+                "There is no water: there is no cup in the scene, or nothing is filled."
+            )
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the volume is within the bounds."""
+        if state.poured is None:
+            return False
+        water = state.poured.water
+        return self.bounds.hold((water.cup if self.of == CUP else water.basin) / MILLILITRE)
+
+
+@dataclass(frozen=True)
+class JointAngle:
+    """The angle of the joint ``axis``, from 0, is within ``bounds`` [rad]."""
+
+    axis: int
+    bounds: ValueBounds
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {axis, at_least, at_most}. Raises ScriptError."""
+        fields = Fields(value, "a joint")
+        axis = fields.need("axis", read.whole(1, 5), 1)
+        found = cls(axis - 1, ValueBounds.read(fields, read.degrees(-720.0, 720.0)))
+        fields.done()
+        return found
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return itself. Raises InputError if the limits of the joint exclude it."""
+        chain = builder.plan_context.arm.chain
+        lower, upper = float(chain.lower[self.axis]), float(chain.upper[self.axis])
+        if self.bounds.at_least > upper or self.bounds.at_most < lower:
+            raise InputError(
+                f"Axis {self.axis + 1} never gets there: its range is {math.degrees(lower):.1f} to "
+                f"{math.degrees(upper):.1f} deg."
+            )
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the angle is within the bounds."""
+        return self.bounds.hold(float(state.q[self.axis]))
+
+
+@dataclass(frozen=True)
+class FingerPlace:
+    """The place of the fingers is within ``bounds`` [deg or mm in a script, else rad or m]."""
+
+    bounds: ValueBounds
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {at_least, at_most}. Raises ScriptError."""
+        fields = Fields(value, "a gripper")
+        found = cls(ValueBounds.read(fields, read.number(-180.0, 180.0, "deg or mm")))
+        fields.done()
+        return found
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return the condition in rad or m. Raises InputError for an arm without fingers."""
+        fingers = builder.plan_context.arm.gripper
+        if not fingers.moves:
+            raise InputError("This arm has no fingers.")
+        scale = 1e-3 if fingers.slides else math.radians(1.0)
+        return replace(self, bounds=ValueBounds(*(scale * each for each in self.bounds)))
+
+    def holds(self, state: State) -> bool:
+        """Return whether the fingers are within the bounds."""
+        return self.bounds.hold(state.gripper)
+
+
+class ConditionReader(Protocol):
+    """Reader of a condition."""
+
+    def __call__(self, value: YamlValue, setting: ScriptContext) -> Condition:
+        """Return the condition ``value``. Raises ScriptError."""
+        ...
+
+
+CONDITIONS: dict[str, ConditionReader] = {
+    "held": Held.read,
+    "placed": Placed.read,
+    "volume": Volume.read,
+    "joint": JointAngle.read,
+    "gripper": FingerPlace.read,
+}
+"""Readers of all conditions, by their names in a script."""

@@ -1,0 +1,88 @@
+"""The step ``wait_for``: wait at rest until a condition holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Self
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.conditions import CONDITIONS, Condition
+from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.settings_steps import MAX_PAUSE
+from katana450.extensions.programs.source import YamlValue
+from katana450.extensions.programs.step import Step
+
+TIMEOUT = 60.0
+"""[s] Timeout unless the script gives one."""
+
+
+@dataclass(frozen=True, eq=False)
+class WaitUntil:
+    """Wait at rest until ``condition`` holds, for at most ``timeout`` [s].
+
+    ``assumed``: whether it counts as true, for a simulation in which nobody makes it true.
+    """
+
+    condition: Condition
+    timeout: float
+    assumed: bool = False
+
+    def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        """Return no command."""
+        return ()
+
+    def done(self, state: State, waited: float) -> bool:
+        """Return whether the condition holds. Raises InputError after the timeout."""
+        if self.assumed or self.condition.holds(state):
+            return True
+        if waited > self.timeout:
+            raise InputError(f"The condition did not hold within {self.timeout:g} s.")
+        return False
+
+    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the fraction of the timeout that has passed."""
+        return min(waited / self.timeout, 1.0)
+
+
+@dataclass(frozen=True)
+class WaitFor:
+    """Wait until ``condition`` holds; the program fails after ``timeout`` [s].
+
+    The steps after it are planned for the scene as it is when the script is planned.
+    """
+
+    name: str
+    condition: Condition | None
+    timeout: float
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read one condition and a timeout. Raises ScriptError."""
+        fields = Fields(value, "a wait_for")
+        timeout = fields.take("timeout", read.number(0.01, MAX_PAUSE, "s"), TIMEOUT)
+        given = [name for name in CONDITIONS if fields.has(name)]
+        found = [
+            fields.take(name, partial(CONDITIONS[name], setting=setting), None) for name in given
+        ]
+        if len(given) != 1 and not fields.problems:
+            what = ", ".join(CONDITIONS)
+            problem = f"A wait_for needs exactly one of {what}."
+            fields.problems += value.wrong(problem).problems
+        fields.done()
+        return cls(given[0], found[0], timeout)
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the wait. Raises InputError if the condition can never hold."""
+        assert self.condition is not None
+        action = WaitUntil(self.condition.checked(builder), self.timeout)
+        builder.note(f"wait for {self.name}", action, builder.state)
+
+
+STEPS: dict[str, type[Step]] = {"wait_for": WaitFor}
+"""Steps of this module, by their names in a script."""
