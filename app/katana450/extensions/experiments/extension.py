@@ -104,6 +104,13 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--urdf", type=Path, default=URDF_PATH, metavar="FILE", help="another arm, for --headless"
     )
+    parser.add_argument(
+        "--scene",
+        type=Path,
+        metavar="FILE",
+        help="the scene in which it begins: a scene.yaml with its meshes beside it, or a .zip of "
+        "both; for --headless, --dry-run, and a server that is started",
+    )
 
 
 def _spot(text: str) -> tuple[float, float]:

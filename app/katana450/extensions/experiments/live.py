@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
-from katana450.errors import ConfigurationError, KatanaError
+from katana450.errors import ConfigurationError, InputError, KatanaError
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
@@ -112,6 +112,11 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
         if not _may_start_at(options.url):
             raise
     else:
+        if options.scene is not None:
+            raise InputError(
+                f"--scene: the server at {options.url} has a scene already. Load the file in its "
+                "page, or leave --scene out."
+            )
         yield options.url
         return
     port = str(urlsplit(options.url).port)
@@ -120,6 +125,8 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
     command = [*python, "serve", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
         command.append("--bare")
+    if options.scene is not None:
+        command += ["--scene", str(options.scene)]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **without_interrupts())
     try:
         _wait_for(server)

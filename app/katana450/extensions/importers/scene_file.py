@@ -111,8 +111,6 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
 
     Raises InputError.
     """
-    if path.suffix.lower() == ".zip":
-        return read_scene_zip(_content(path, MAX_ZIP_BYTES), T_palm_tool)
     folder = path.resolve().parent
 
     def opened(name: str, maximum: int) -> bytes:
@@ -122,6 +120,8 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
         return _content(found, maximum)
 
     try:
+        if path.suffix.lower() == ".zip":
+            return read_scene_zip(_content(path, MAX_ZIP_BYTES), T_palm_tool)
         return _read(_text(_content(path, MAX_BYTES), path.name), opened, T_palm_tool)
     except ScriptError as error:
         raise InputError(f"{path}:\n{error}") from error
