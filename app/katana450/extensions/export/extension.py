@@ -62,7 +62,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="vrml, glb and html: motion that the file plays; .csv with the columns "
-        "t,theta1,...,theta5,gripper or .json with lists of these names",
+        "t,theta1,...,theta5,gripper or .json with lists of these names, or trace.csv of a report",
     )
     motion.add_argument(
         "--run",

@@ -6,7 +6,9 @@ The first line of a CSV file has the names of the columns, `t` first. Every line
     t,theta1,theta2,theta3,theta4,theta5,gripper
 
 `theta1` is the first driven joint and so on; `gripper` is the driven joint after the fifth. Joints
-can also have their own names. JSON is an object of lists with the same names, all of one length.
+can also have their own names. The table of a report, `trace.csv`, is such a file too: its columns
+of times and joints are taken, in its units, and the others left out. JSON is an object of lists
+with the same names, all of one length.
 Joints that are not named stay at zero.
 """
 
@@ -14,6 +16,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,6 +33,12 @@ THETA = re.compile(r"theta([1-9][0-9]?)")
 
 GRIPPER = 6
 """Number of the driven joint that `gripper` names."""
+
+REPORT_COLUMN = re.compile(r"(t|theta[1-9][0-9]?|fingers)_(s|deg|mm)")
+"""Pattern of the columns that are taken from the table of a report, with their units."""
+
+REPORT_UNITS = {"s": 1.0, "deg": math.radians(1.0), "mm": 1e-3}
+"""[s, rad, m] Units of these columns."""
 
 MAX_ROWS = 100_000
 """Maximum number of rows of a file."""
@@ -92,6 +101,8 @@ def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
     if not rows:
         raise InputError(f"{path} is empty. Its first line must name the columns, t first.")
+    if rows[0][0] == "t_s":
+        rows = _of_report(rows)
     names = rows[0]
     if len(set(names)) != len(names):
         raise InputError(f"{path} names a column twice: {', '.join(names)}.")
@@ -104,6 +115,25 @@ def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
         except ValueError as error:
             raise InputError(f"Row {count} of {path}: {error}.") from error
     return {name: [row[place] for row in numbers] for place, name in enumerate(names)}
+
+
+def _of_report(rows: list[list[str]]) -> list[list[str]]:
+    """Return the times and joints of the table of a report, in the units of a motion."""
+    taken: list[tuple[int, str, float]] = []
+    for place, name in enumerate(rows[0]):
+        if match := REPORT_COLUMN.fullmatch(name):
+            known = "gripper" if match[1] == "fingers" else match[1]
+            taken.append((place, known, REPORT_UNITS[match[2]]))
+
+    def cell(row: list[str], place: int, unit: float) -> str:
+        try:
+            return repr(unit * float(row[place]))
+        except (ValueError, IndexError):
+            # Reported with its row by the reader of all tables.
+            return row[place] if place < len(row) else ""
+
+    head = [known for _, known, _ in taken]
+    return [head, *([cell(row, place, unit) for place, _, unit in taken] for row in rows[1:])]
 
 
 def _json_columns(path: Path, text: str) -> dict[str, list[object]]:

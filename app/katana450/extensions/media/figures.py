@@ -13,6 +13,7 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.media.measures import PathTrace
+from katana450.extensions.media.pour_record import PourRecord
 from katana450.extensions.programs.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import tool_speed
@@ -156,6 +157,53 @@ def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
         lower.set_xlim(0.0, trace.t[-1])
         lower.set_ylim(bottom=0.0)
         return _png(plt, figure)
+
+
+def water_figure(pour: PourRecord) -> bytes:
+    """Return a PNG of the volumes, the flow, the tilt of the cup and its lip above the water."""
+    plt = _plt()
+    with plt.rc_context(STYLE):
+        figure, (upper, lower) = plt.subplots(
+            2, 1, figsize=(7.2, 5.0), sharex=True, layout="constrained"
+        )
+        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
+        volumes = (
+            ("in the cup", pour.cup),
+            ("in the basin", pour.basin),
+            ("spilled", pour.spilled),
+        )
+        lines = [
+            upper.plot(pour.t, values, color=colour, linewidth=1.4, label=name)[0]
+            for (name, values), colour in zip(volumes, (AXES[0], AXES[2], ERROR), strict=True)
+        ]
+        upper.set_title("Water")
+        upper.set_ylabel("volume (ml)")
+        upper.set_ylim(bottom=0.0)
+        flow = _second(upper, "flow (ml/s)")
+        lines += flow.plot(pour.t, pour.flow, color=AXES[4], linewidth=0.9, label="flow")
+        flow.set_ylim(bottom=0.0)
+        upper.legend(handles=lines, **above, ncols=len(lines), fontsize=8.0)
+        lines = lower.plot(
+            pour.t, np.degrees(pour.tilt), color=AXES[3], linewidth=1.4, label="tilt of the cup"
+        )
+        lower.set_title("Cup")
+        lower.set_ylabel("tilt (deg)")
+        lower.set_xlabel(TIME)
+        lower.set_xlim(0.0, pour.t[-1])
+        lip = _second(lower, "height (mm)")
+        name = "lip above the water"
+        lines += lip.plot(pour.t, 1e3 * pour.lip, color=AXES[0], linewidth=1.2, label=name)
+        lower.legend(handles=lines, **above, ncols=len(lines), fontsize=8.0)
+        return _png(plt, figure)
+
+
+def _second(panel: Any, label: str) -> Any:
+    """Return a second axis of values on the right of ``panel``."""
+    second = panel.twinx()
+    second.spines["right"].set_visible(True)
+    second.set_ylabel(label)
+    second.grid(visible=False)
+    return second
 
 
 def equal_axes(space: Any, points: FloatArray) -> None:

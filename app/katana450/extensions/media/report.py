@@ -20,6 +20,7 @@ from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.media import figures
 from katana450.extensions.media.measures import Bound, alongs, bounds, measurements
+from katana450.extensions.media.pour_record import COLUMNS, PourRecord
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
@@ -114,7 +115,10 @@ class Report:
         return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
 
     def csv(self) -> str:
-        """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path."""
+        """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path.
+
+        With water also COLUMNS. Each number has all its digits, so that reading gives the same.
+        """
         n = self.arm.chain.n
         file = io.StringIO()
         rows = csv.writer(file, lineterminator="\n")
@@ -123,8 +127,10 @@ class Report:
         heads += [f"theta{axis}_deg_s" for axis in range(1, n + 1)]
         slides = self.arm.gripper.slides
         heads.append("fingers_mm" if slides else "fingers_deg")
-        rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_fraction"])
         trace = self.trace
+        pour = PourRecord.of(trace)
+        more = () if pour is None else COLUMNS
+        rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_fraction", *more])
         for tick in range(len(trace.t)):
             task = self.program.tasks[int(trace.task[tick])]
             numbers = [*np.degrees(trace.q[tick]), *np.degrees(trace.qd[tick])]
@@ -134,14 +140,15 @@ class Report:
             point = 1e3 * forward(chain, trace.q[tick])[:3, 3]
             rows.writerow(
                 [
-                    f"{trace.t[tick]:.3f}",
+                    repr(float(trace.t[tick])),
                     task.number + 1,
                     task.line,
                     task.name,
-                    *(f"{value:.9g}" for value in numbers),
+                    *(repr(float(value)) for value in numbers),
                     trace.tools[tick],
-                    *(f"{value:.9g}" for value in point),
-                    f"{trace.sigma[tick]:.9g}",
+                    *(repr(float(value)) for value in point),
+                    repr(float(trace.sigma[tick])),
+                    *(() if pour is None else pour.cells(tick)),
                 ]
             )
         return file.getvalue()
@@ -165,6 +172,9 @@ class Report:
             images["path.png"] = figures.path_figure(paths)
         images["joints.png"] = figures.joints_figure(self.arm, self.trace)
         images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
+        pour = PourRecord.of(self.trace)
+        if pour is not None:
+            images["water.png"] = figures.water_figure(pour)
         contents = {
             "report.html": self._page(images, written).encode(),
             "report.json": self.json(written).encode(),
@@ -236,6 +246,13 @@ CAPTIONS = {
     "speeds.png": (
         "Joint speeds against their limits, and speed of the tool",
         "Above: joint speeds as fractions of their limits; dashed: the limits. Below: the tool.",
+    ),
+    "water.png": (
+        "Water in cup and basin, flow, tilt of the cup and height of its lip over time",
+        (
+            "Above: volumes in the cup, in the basin and spilled, and the flow out of the cup. "
+            "Below: the tilt of the cup, and the height of its lip above the water; at 0 it pours."
+        ),
     ),
 }
 """Alternative text and caption of each figure."""
