@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from katana450.library.loading import load
     from katana450.library.motion_plan import MotionPlan
     from katana450.library.nearest import NearestPose
+    from katana450.library.script_writer import ScriptWriter, program
     from katana450.library.solutions import IKSolutions
     from katana450.library.trajectory import Trajectory
     from katana450.library.viewer import Viewer
@@ -51,11 +52,13 @@ __all__ = [
     "NearestPose",
     "ReachabilityMap",
     "RobotDescriptionError",
+    "ScriptWriter",
     "Solution",
     "Trajectory",
     "Viewer",
     "connect",
     "load",
+    "program",
 ]
 
 _MODULES = {
@@ -71,11 +74,13 @@ _MODULES = {
     "NearestPose": "library.nearest",
     "ReachabilityMap": "extensions.reachability.map",
     "RobotDescriptionError": "errors",
+    "ScriptWriter": "library.script_writer",
     "Solution": "maths.kinematics.inverse",
     "Trajectory": "library.trajectory",
     "Viewer": "library.viewer",
     "connect": "client",
     "load": "library.loading",
+    "program": "library.script_writer",
 }
 
 

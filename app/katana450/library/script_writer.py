@@ -1,0 +1,327 @@
+"""A script that is written in Python: every step is a method, and it prints as YAML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import yaml
+
+from katana450.errors import InputError
+from katana450.extensions.programs.script import parse
+from katana450.maths.geometry.arrays import FloatArray
+
+Number = float | str
+"""A number in the unit of its place (mm, deg, s, ml), or a text with a unit, such as "4 cm"."""
+
+Point = Sequence[Number] | FloatArray | Mapping[str, Number] | str
+"""A point: three numbers, {x, y, z}, or the name of a pose."""
+
+Place = Mapping[str, Any] | str
+"""A place: the name of a pose, {"joints": [...]}, or {x, y, z, pitch, roll, branch}."""
+
+
+class ScriptWriter:
+    """A script under construction; see `program`."""
+
+    def __init__(self, head: Mapping[str, Any]) -> None:
+        """Begin a script with the fields ``head``; None leaves a field out."""
+        self._head = {name: value for name, value in head.items() if value is not None}
+        self._poses: dict[str, Any] = {}
+        self._expected: dict[str, Any] = {}
+        self._steps: list[Any] = []
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        """Check the script. Raises InputError with all its mistakes."""
+        if kind is None:
+            self.check()
+
+    def __str__(self) -> str:
+        """Return the script as YAML."""
+        fields = {**self._head}
+        if self._poses:
+            fields["poses"] = self._poses
+        fields["steps"] = self._steps
+        if self._expected:
+            fields["expect"] = self._expected
+        text: str = yaml.safe_dump(
+            fields, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
+        )
+        return text
+
+    def check(self) -> None:
+        """Raise InputError with all mistakes of the script, by the lines of its YAML."""
+        parse(str(self))
+
+    def save(self, path: str | Path) -> None:
+        """Write the script to a file, for ``katana450 run``. Raises InputError for a mistake."""
+        self.check()
+        Path(path).write_text(str(self), encoding="utf-8")
+
+    def pose(
+        self,
+        name: str,
+        at: Point | None = None,
+        *,
+        joints: Sequence[Number] | None = None,
+        pitch: Number | None = None,
+        roll: Number | None = None,
+        branch: str | None = None,
+    ) -> str:
+        """Name a place, by a point or by five joint angles, and return its name."""
+        self._poses[name] = _place(at, joints, pitch, roll, branch)
+        return name
+
+    def expect(
+        self, measure: str, *, at_least: float | None = None, at_most: float | None = None
+    ) -> None:
+        """Let a simulation end with an error if a measure is beyond its bounds."""
+        self._expected[measure] = _given(at_least=at_least, at_most=at_most)
+
+    @contextmanager
+    def repeat(self, times: int) -> Iterator[None]:
+        """Repeat the steps of the block, which are planned once. A loop of Python does it too."""
+        outside, self._steps = self._steps, []
+        try:
+            yield
+        finally:
+            inside, self._steps = self._steps, outside
+        self._add("repeat", {"times": times, "steps": inside})
+
+    def home(self) -> None:
+        """Move to the ready posture."""
+        self._steps.append("home")
+
+    def joints(self, *angles: Number) -> None:
+        """Move to five joint angles [deg], round obstacles."""
+        self._add("joints", list(angles))
+
+    def nudge(self, axis: int, by: Number) -> None:
+        """Turn the joint ``axis``, 1 to 5, by an angle [deg]."""
+        self._add("nudge", {"axis": axis, "by": by})
+
+    def move(
+        self,
+        to: Point | None = None,
+        *,
+        by: Point | None = None,
+        pitch: Number | None = None,
+        roll: Number | None = None,
+        branch: str | None = None,
+    ) -> None:
+        """Move to a pose or a point [mm], or by an offset [mm], on any path round obstacles."""
+        if isinstance(to, str) and (by, pitch, roll, branch) == (None,) * 4:
+            self._add("move", to)
+        elif by is not None and to is None:
+            self._add("move", {"by": by, **_given(pitch=pitch, roll=roll, branch=branch)})
+        elif by is None:
+            self._add("move", _place(to, None, pitch, roll, branch))
+        else:
+            raise InputError("A move takes `to` or `by`, not both.")
+
+    def via(self, *places: Place, blend: float | None = None) -> None:
+        """Move the joints through places with rounded corners."""
+        self._add("via", {"through": list(places), **_given(blend=blend)})
+
+    def line(
+        self,
+        to: Point | None = None,
+        *,
+        by: Point | None = None,
+        pitch: Number | None = None,
+        roll: Number | None = None,
+    ) -> None:
+        """Move the tool point on a straight line, to a point or by an offset [mm]."""
+        self._add("line", _given(to=to, by=by, pitch=pitch, roll=roll))
+
+    def lines(self, *places: Place, blend: float | None = None) -> None:
+        """Move the tool point on straight lines through places with rounded corners."""
+        self._add("lines", {"through": list(places), **_given(blend=blend)})
+
+    def arc(
+        self,
+        centre: Point,
+        axis: str | Sequence[float],
+        angle: Number,
+        *,
+        climb: Number | None = None,
+        pitch: Number | None = None,
+        roll: Number | None = None,
+    ) -> None:
+        """Move the tool point round an axis through ``centre`` [mm] by an angle [deg]."""
+        value = {"centre": centre, "axis": axis, "angle": angle}
+        self._add("arc", {**value, **_given(climb=climb, pitch=pitch, roll=roll)})
+
+    def circle(
+        self,
+        centre: Point,
+        normal: str | Sequence[float],
+        radius: Number,
+        *,
+        turns: Number | None = None,
+        pitch: Number | None = None,
+        roll: Number | None = None,
+        branch: str | None = None,
+    ) -> None:
+        """Move to the highest point of a circle [mm], then round it."""
+        value = {"centre": centre, "normal": normal, "radius": radius}
+        more = _given(turns=turns, pitch=pitch, roll=roll, branch=branch)
+        self._add("circle", {**value, **more})
+
+    def screw(
+        self,
+        point: Point,
+        axis: str | Sequence[float],
+        *,
+        angle: Number | None = None,
+        climb: Number | None = None,
+    ) -> None:
+        """Move the tool as a rigid body about an axis [deg] and along it [mm]."""
+        self._add("screw", {"point": point, "axis": axis, **_given(angle=angle, climb=climb)})
+
+    def gripper(self, where: Number) -> None:
+        """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide."""
+        self._add("gripper", where)
+
+    def wait(self, seconds: Number) -> None:
+        """Wait [s]."""
+        self._add("wait", seconds)
+
+    def wait_for(self, *, timeout: Number | None = None, **condition: Any) -> None:
+        """Wait until a condition holds, such as ``held="cup"``; see docs/programs.md."""
+        self._add("wait_for", {**condition, **_given(timeout=timeout)})
+
+    def tool(self, name: str) -> None:
+        """Use another tool frame for all later points."""
+        self._add("tool", name)
+
+    def speed(self, fraction: Number) -> None:
+        """Limit all later motions to a fraction of full speed."""
+        self._add("speed", fraction)
+
+    def put(self, name: str, x: Number, y: Number) -> None:
+        """Set an object to another place on the table [mm], without the arm."""
+        self._add("put", {"object": name, "x": x, "y": y})
+
+    def fill(self, ml: Number) -> None:
+        """Fill the cup with water [ml]."""
+        self._add("fill", ml)
+
+    def grasp(
+        self, name: str, *, pitch: Number | None = None, height: Number | None = None
+    ) -> None:
+        """Grasp an object where it stands; pitch [deg] and height [mm] are found unless given."""
+        more = _given(pitch=pitch, height=height)
+        self._add("grasp", {"object": name, **more} if more else name)
+
+    def pour(self, into: str, *, shake: int | None = None) -> None:
+        """Pour the water of the cup in the hand into an object."""
+        self._add("pour", into if shake is None else {"into": into, "shake": shake})
+
+    def set_down(self) -> None:
+        """Put the held object back to where it was grasped."""
+        self._steps.append("set_down")
+
+    def _add(self, name: str, value: Any) -> None:
+        self._steps.append({name: _plain(value)})
+
+
+def program(
+    name: str = "Script",
+    *,
+    about: str | None = None,
+    frame: str | None = None,
+    tool: str | None = None,
+    speed: Number | None = None,
+    gripper: str | None = None,
+) -> ScriptWriter:
+    """Begin a script, which is checked at the end of the ``with`` block and prints as YAML.
+
+    Its units are those of scripts: mm, deg, s and ml. A text may carry a unit.
+
+    Args:
+        name: name of the script.
+        about: description for people.
+        frame: frame of all points: "shoulder", the paper's {S}, or "base", on the table; None for
+            "shoulder".
+        tool: tool frame of all points; None for the present one.
+        speed: fraction of full speed; None for 1.
+        gripper: "none" for an arm without its gripper.
+
+    >>> with katana450.program("Square", frame="base", tool="tcp") as p:
+    ...     p.move([320, -60, 150], pitch=50, roll=0)
+    ...     for by in ({"y": 120}, {"z": 80}, {"y": -120}, {"z": "-8 cm"}):
+    ...         p.line(by=by)
+    ...     p.home()
+    >>> print(p)
+    name: Square
+    frame: base
+    tool: tcp
+    steps:
+    - move: {x: 320, y: -60, z: 150, pitch: 50, roll: 0}
+    - line:
+        by: {y: 120}
+    - line:
+        by: {z: 80}
+    - line:
+        by: {y: -120}
+    - line:
+        by: {z: -8 cm}
+    - home
+    <BLANKLINE>
+    """
+    head = {"name": name, "about": about, "gripper": gripper, "frame": frame, "tool": tool}
+    return ScriptWriter({**head, "speed": _plain(speed)})
+
+
+def _given(**values: Any) -> dict[str, Any]:
+    """Return the values that are not None."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _place(
+    at: Point | None,
+    joints: Sequence[Number] | None,
+    pitch: Number | None,
+    roll: Number | None,
+    branch: str | None,
+) -> dict[str, Any]:
+    """Return a place as a mapping. Raises InputError for a point that is none."""
+    angles = _given(pitch=pitch, roll=roll, branch=branch)
+    if joints is not None:
+        return {"joints": _plain(list(joints)), **angles}
+    point = _plain(at)
+    if isinstance(point, list) and len(point) == 3:
+        point = dict(zip("xyz", point, strict=True))
+    if not isinstance(point, dict):
+        raise InputError(f"A place needs three numbers x, y and z, not {at!r}.")
+    return {**point, **angles}
+
+
+def _plain(value: Any) -> Any:
+    """Return ``value`` as YAML writes it; numbers of numpy become those of Python."""
+    convert: Callable[[Any], Any] = _plain
+    match value:
+        case np.ndarray() | np.generic():
+            return convert(value.tolist())
+        case Mapping():
+            return {str(name): convert(each) for name, each in value.items()}
+        case list() | tuple():
+            return [convert(each) for each in value]
+        case float() if not math.isfinite(value):
+            raise InputError(f"A number of a script must be finite, not {value}.")
+    return value

@@ -1,0 +1,141 @@
+"""A script that is written in Python says what its YAML says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import katana450
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.steps import STEPS
+
+ALL = """\
+name: All
+about: Every step once.
+gripper: fitted
+frame: base
+tool: tcp
+speed: 0.5
+poses:
+  corner: {x: 320, y: -40, z: 150, pitch: 50, roll: 0}
+  folded: {joints: [0, -68, 85, 8, 0]}
+steps:
+- home
+- joints: [0, -68, 85, 8, 0]
+- nudge: {axis: 5, by: 0.2 rad}
+- move: corner
+- move: {x: 1, y: 2, z: 3, pitch: 40, branch: front-up}
+- move: {by: {z: 2 cm}, roll: 3}
+- via: {through: [corner, folded], blend: 0.4}
+- line: {to: corner, pitch: 45}
+- line: {by: [0, 10, 0]}
+- lines: {through: [corner, {x: 1, y: 2, z: 3}], blend: 0}
+- arc: {centre: corner, axis: z, angle: 20, climb: 5}
+- circle: {centre: [320, 0, 150], normal: x, radius: 20, turns: 2, pitch: roomiest}
+- screw: {point: [300, 0, 150], axis: [0, 0, 1], angle: 10}
+- gripper: open
+- wait: 0.5
+- wait_for: {placed: {object: cup, at: corner}, timeout: 3}
+- tool: grasp
+- speed: 0.4
+- put: {object: cup, x: 300, y: 0}
+- fill: 100
+- grasp: {object: cup, pitch: 30}
+- pour: {into: basin, shake: 2}
+- set_down
+- repeat:
+    times: 2
+    steps:
+    - nudge: {axis: 1, by: 5}
+    - repeat:
+        times: 3
+        steps:
+        - home
+expect:
+  spilled_ml: {at_most: 0}
+"""
+
+
+def everything() -> katana450.ScriptWriter:
+    with katana450.program(
+        "All", about="Every step once.", gripper="fitted", frame="base", tool="tcp", speed=0.5
+    ) as p:
+        p.pose("corner", [320, -40, 150], pitch=50, roll=0)
+        p.pose("folded", joints=(0, -68, 85, 8, 0))
+        p.home()
+        p.joints(0, -68, 85, 8, 0)
+        p.nudge(5, "0.2 rad")
+        p.move("corner")
+        p.move(np.array([1, 2, 3]), pitch=40, branch="front-up")
+        p.move(by={"z": "2 cm"}, roll=3)
+        p.via("corner", "folded", blend=0.4)
+        p.line("corner", pitch=45)
+        p.line(by=(0, 10, 0))
+        p.lines("corner", {"x": 1, "y": 2, "z": 3}, blend=0)
+        p.arc("corner", "z", 20, climb=5)
+        p.circle((320, 0, 150), "x", 20, turns=2, pitch="roomiest")
+        p.screw((300, 0, 150), (0, 0, 1), angle=10)
+        p.gripper("open")
+        p.wait(np.float64(0.5))
+        p.wait_for(placed={"object": "cup", "at": "corner"}, timeout=3)
+        p.tool("grasp")
+        p.speed(0.4)
+        p.put("cup", 300, 0)
+        p.fill(100)
+        p.grasp("cup", pitch=30)
+        p.pour("basin", shake=2)
+        p.set_down()
+        with p.repeat(2):
+            p.nudge(1, 5)
+            with p.repeat(3):
+                p.home()
+        p.expect("spilled_ml", at_most=0)
+    return p
+
+
+def test_every_step_is_written_as_in_yaml() -> None:
+    parse(ALL)
+    assert yaml.safe_load(str(everything())) == yaml.safe_load(ALL)
+
+
+def test_there_is_a_method_for_every_step() -> None:
+    assert [
+        name for name in STEPS if not callable(getattr(katana450.ScriptWriter, name, None))
+    ] == []
+
+
+def test_saved_script_is_read_again(tmp_path: Path) -> None:
+    everything().save(tmp_path / "all.yaml")
+    text = (tmp_path / "all.yaml").read_text(encoding="utf-8")
+    assert len(parse(text).steps) == len(parse(ALL).steps)
+
+
+def test_mistakes_are_reported_at_the_end_of_the_block() -> None:
+    def wrong() -> None:
+        with katana450.program() as p:
+            p.move("nowhere")
+            p.wait(-1)
+
+    with pytest.raises(katana450.InputError, match="There is no pose 'nowhere'") as refused:
+        wrong()
+    assert "-1 is not between" in str(refused.value)
+
+
+def test_error_in_the_block_is_not_replaced() -> None:
+    with pytest.raises(ZeroDivisionError), katana450.program() as p:
+        p.wait(1 / 0)
+
+
+def test_what_cannot_be_written_is_refused_at_once() -> None:
+    p = katana450.program()
+    with pytest.raises(katana450.InputError, match="`to` or `by`, not both"):
+        p.move([1, 2, 3], by=[1, 2, 3])
+    with pytest.raises(katana450.InputError, match="needs three numbers"):
+        p.move([1, 2])
+    with pytest.raises(katana450.InputError, match="must be finite, not nan"):
+        p.wait(float("nan"))
+    with pytest.raises(katana450.InputError, match="list of steps"):
+        p.check()
