@@ -16,6 +16,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
+from katana450.extensions.programs.script_schema import script_schema
 from katana450.extensions.programs.source import MAX_BYTES, ScriptError
 from katana450.extensions.programs.teach import taught
 from katana450.server.api.fields import ROOT
@@ -25,6 +26,10 @@ from katana450.server.web.http_api import RouteContext
 
 MAX_WAITING = 8
 """Maximum number of texts that wait to be read; reading a long one takes most of a second."""
+
+
+SCHEMA = msgspec.json.encode(script_schema())
+"""The JSON Schema of scripts as JSON."""
 
 
 class ScriptRoutes:
@@ -40,6 +45,7 @@ class ScriptRoutes:
     def routes(self) -> list[BaseRoute]:
         """Return all routes."""
         return [
+            Route(f"{ROOT}/script.schema.json", self._schema),
             Route(f"{ROOT}/scripts", self._list),
             Route(f"{ROOT}/scripts", self._read, methods=["POST"]),
             Route(f"{ROOT}/scripts/{{name}}", self._text),
@@ -51,6 +57,10 @@ class ScriptRoutes:
         self._context.identity(request)
         names = await asyncio.to_thread(lambda: list(self._scripts.paths))
         return _json({"names": names, "saves": self._scripts.keeps})
+
+    async def _schema(self, _request: Request) -> Response:
+        """Return the JSON Schema of scripts, which holds nothing of this server."""
+        return Response(SCHEMA, media_type="application/schema+json")
 
     async def _text(self, request: Request) -> Response:
         self._context.identity(request)
