@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class KatanaError(Exception):
     """Base class of all errors of this project; the text can be shown to a person unchanged."""
@@ -20,6 +22,22 @@ class CancelledError(KatanaError):
 
 class BlockedError(InputError):
     """The requested path brings two bodies too close together."""
+
+
+class PathError(InputError):
+    """A path cannot be followed at one of its points.
+
+    Attributes:
+        text: the text, with ``{point}`` where the point stands.
+        point: (3,) the point [m].
+    """
+
+    def __init__(self, text: str, point: Sequence[float], frame: str = "{S}") -> None:
+        """Name ``point`` in ``text``; ``frame``: name of the frame in which it is given."""
+        x, y, z = (1e3 * each for each in point)
+        super().__init__(text.replace("{point}", f"({x:.1f}, {y:.1f}, {z:.1f}) mm in {frame}"))
+        self.text = text
+        self.point = point
 
 
 class RobotDescriptionError(KatanaError):

@@ -9,7 +9,9 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
 from tests.programs.conftest import Stage
 
 PLACE = "frame: {frame}\nsteps:\n  - move: {{x: {x}, y: {y}, z: {z}, pitch: {pitch}, roll: 0}}\n"
@@ -55,3 +57,22 @@ def test_suggested_places_are_reached(builder: PlanBuilder, frame: str) -> None:
 def test_metres_are_suspected(builder: PlanBuilder) -> None:
     why = refusal(builder, "base", (0.3, 0.0, 0.2), 0.0)
     assert "Lengths are in mm here" in why
+
+
+@pytest.mark.parametrize(("frame", "name"), [("shoulder", "{S}"), ("base", "the base frame")])
+def test_path_beyond_a_limit_is_reported_in_the_frame_of_the_script(
+    stage: Stage, frame: str, name: str
+) -> None:
+    T = stage.plan_context.T_base_shoulder
+    z = 180.0 if frame == "base" else 180.0 - 1e3 * float(T[2, 3])
+    text = (
+        f"frame: {frame}\ntool: tcp\nsteps:\n"
+        f"  - move: {{x: 330, y: 120, z: {z}, pitch: 40, roll: 0}}\n  - line: {{by: {{y: -240}}}}\n"
+    )
+    with pytest.raises(ScriptError, match="over its limit") as refused:
+        compiled(parse(text), stage.plan_context, stage.begin())
+    found = re.search(r"at \((\S+), (\S+), (\S+)\) mm in (.*?),", str(refused.value))
+    assert found is not None
+    assert found[4] == name
+    assert [float(found[1]), float(found[3])] == pytest.approx([330.0, z], abs=0.1)
+    assert -120.0 < float(found[2]) < 120.0

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.arm.control.state import State
-from katana450.errors import InputError
+from katana450.errors import InputError, PathError
 from katana450.extensions.programs.actions import Action, FollowPlan
 from katana450.extensions.programs.blocks import LocatedStep
 from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder, UntimedPath
@@ -122,11 +122,19 @@ class Compiler:
         try:
             placed.step.build(builder)
         except InputError as error:
-            raise _at(placed, error) from error
+            raise _at(placed, self._in_frame(error)) from error
         compiled_step = CompiledStep(builder.actions, builder.state, builder.taken)
         if any(isinstance(action, UntimedPath) for _, action in compiled_step.actions):
             self._known[key] = compiled_step
         return compiled_step
+
+    def _in_frame(self, error: InputError) -> InputError:
+        """Return ``error`` with its point in the frame of the script."""
+        if not (isinstance(error, PathError) and self._script.in_base):
+            return error
+        T = self._builder.plan_context.T_base_shoulder
+        point = T[:3, :3] @ error.point + T[:3, 3]
+        return PathError(error.text, point.tolist(), "the base frame")
 
     def _timed(self, compiled_step: CompiledStep) -> Actions:
         found: Actions = []

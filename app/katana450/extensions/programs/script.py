@@ -33,6 +33,7 @@ class Script:
         name: name, for display.
         about: description, for display.
         bare: whether it needs an arm without its gripper.
+        in_base: whether its points are in the base frame, not in {S}.
         speed: fraction of full speed.
         steps: the steps in their order, all repetitions written out.
         expected: minimum and maximum of measures, by name.
@@ -41,6 +42,7 @@ class Script:
     name: str
     about: str
     bare: bool
+    in_base: bool
     speed: float
     steps: tuple[LocatedStep, ...]
     expected: Mapping[str, tuple[float, float]]
@@ -68,7 +70,7 @@ def parse(text: str) -> Script:
     top.done()
     if tool is not None:
         steps = (tool, *steps)
-    return Script(name, about, fitted == "none", speed, steps, expected)
+    return Script(name, about, fitted == "none", in_base, speed, steps, expected)
 
 
 def _let(value: YamlValue) -> Scope:

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from katana450 import tolerances
-from katana450.errors import InputError
+from katana450.errors import PathError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
@@ -156,11 +156,12 @@ class ToolPath:
         canonical = target.canonical(limited.arm, Priority.PITCH)
         best = nearest_posture(limited, canonical, self.branch, limited.arm.angles(self.near))
         short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
-        raise InputError(
+        raise PathError(
             f"The path leaves the reach of the arm on the branch {self.branch} "
-            f"{_at(failing, target)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}. "
+            f"{_at(failing)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}. "
             "Links come in line there, or the tool comes over axis 1. Keep the path nearer to the "
-            "arm, or give it another pitch."
+            "arm, or give it another pitch.",
+            target.position.tolist(),
         )
 
     def _refuse_kinks(self, q: FloatArray, qd: FloatArray) -> None:
@@ -176,10 +177,11 @@ class ToolPath:
         if kinked.any():
             place, axis = (int(each) for each in np.argwhere(kinked)[0])
             sigma = float(self._sigma[place])
-            raise InputError(
-                f"Axis {axis + 1} would have to leap or turn back at once "
-                f"{_at(sigma, self._target(sigma))}. Links come in line there, or the tool passes "
-                "over axis 1. Lead the path around that place."
+            raise PathError(
+                f"Axis {axis + 1} would have to leap or turn back at once {_at(sigma)}. "
+                "Links come in line there, or the tool passes over axis 1. Lead the path around "
+                "that place.",
+                self._target(sigma).position.tolist(),
             )
 
     def _refuse_limits(self, q: FloatArray, qd: FloatArray) -> None:
@@ -202,17 +204,17 @@ class ToolPath:
         if place > 0 and beyond[place, axis] > slack:
             passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
             sigma -= float(passed) * (sigma - float(self._sigma[place - 1]))
-        raise InputError(
+        raise PathError(
             f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
-            f"{_at(sigma, self._target(sigma))}, by up to {np.degrees(worst):.2g} deg later on. "
-            "Shift the path, or give it another pitch or roll."
+            f"{_at(sigma)}, by up to {np.degrees(worst):.2g} deg later on. "
+            "Shift the path, or give it another pitch or roll.",
+            self._target(sigma).position.tolist(),
         )
 
 
-def _at(sigma: float, target: ToolTarget) -> str:
-    """Return the place in words, for an error message."""
-    x, y, z = (1e3 * target.position).tolist()
-    return f"{100.0 * sigma:.1f} % along it, at ({x:.1f}, {y:.1f}, {z:.1f}) mm in {{S}}"
+def _at(sigma: float) -> str:
+    """Return the place in words for a PathError, which names the point."""
+    return f"{100.0 * sigma:.1f} % along it, at {{point}}"
 
 
 def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
