@@ -62,7 +62,7 @@ def test_program_fails_at_its_line_after_the_timeout(stage: Stage) -> None:
     program = planned(stage, "  - home\n  - wait_for: {held: cup, timeout: 500 ms}\n  - home\n")
     run, end = run_with(stage, program, stage.begin(), cmd.EndDrag(), after=9.0, most=30.0)
     assert run.phase is Phase.FAILED
-    assert run.why == "Line 4, wait for held: The condition did not hold within 0.5 s."
+    assert run.why == ("Line 4, wait for cup in the hand: The condition did not hold within 0.5 s.")
     assert end.t == pytest.approx(0.5, abs=0.1)
 
 

@@ -48,6 +48,11 @@ class ValueBounds(NamedTuple):
 class Condition(Protocol):
     """A condition on the measured state of an arm and its surroundings."""
 
+    @property
+    def awaited(self) -> str:
+        """What is awaited, as in "wait for the cup in the hand"."""
+        ...
+
     def checked(self, builder: PlanBuilder) -> Condition:
         """Return the condition for the arm of ``builder``.
 
@@ -70,6 +75,11 @@ class Held:
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read the name of an object. Raises ScriptError."""
         return cls(read.text(value))
+
+    @property
+    def awaited(self) -> str:
+        """What is awaited."""
+        return f"{self.name} in the hand"
 
     def checked(self, builder: PlanBuilder) -> Self:
         """Return itself. Raises InputError without such an object."""
@@ -104,6 +114,11 @@ class Placed:
         fields.done()
         return found
 
+    @property
+    def awaited(self) -> str:
+        """What is awaited."""
+        return f"{self.name} at its place"
+
     def checked(self, builder: PlanBuilder) -> Self:
         """Return the condition in the base frame. Raises InputError without such an object."""
         builder.scene_object(self.name)
@@ -135,6 +150,11 @@ class Volume:
         found = cls(of, ValueBounds.read(fields, read.number(0.0, 10_000.0, "ml")))
         fields.done()
         return found
+
+    @property
+    def awaited(self) -> str:
+        """What is awaited."""
+        return f"the water in the {self.of}"
 
     def checked(self, builder: PlanBuilder) -> Self:
         """Return itself. Raises InputError without a cup."""
@@ -168,6 +188,11 @@ class JointAngle:
         fields.done()
         return found
 
+    @property
+    def awaited(self) -> str:
+        """What is awaited."""
+        return f"axis {self.axis + 1}"
+
     def checked(self, builder: PlanBuilder) -> Self:
         """Return itself. Raises InputError if the limits of the joint exclude it."""
         chain = builder.plan_context.arm.chain
@@ -197,6 +222,11 @@ class FingerPlace:
         found = cls(ValueBounds.read(fields, read.number(-180.0, 180.0, "deg or mm")))
         fields.done()
         return found
+
+    @property
+    def awaited(self) -> str:
+        """What is awaited."""
+        return "the gripper"
 
     def checked(self, builder: PlanBuilder) -> Self:
         """Return the condition in rad or m. Raises InputError for an arm without fingers."""

@@ -57,7 +57,6 @@ class WaitFor:
     The steps after it are planned for the scene as it is when the script is planned.
     """
 
-    name: str
     condition: Condition | None
     timeout: float
 
@@ -75,13 +74,13 @@ class WaitFor:
             problem = f"A wait_for needs exactly one of {what}."
             fields.problems += value.wrong(problem).problems
         fields.done()
-        return cls(given[0], found[0], timeout)
+        return cls(found[0], timeout)
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the wait. Raises InputError if the condition can never hold."""
         assert self.condition is not None
         action = WaitUntil(self.condition.checked(builder), self.timeout)
-        builder.note(f"wait for {self.name}", action, builder.state)
+        builder.note(f"wait for {self.condition.awaited}", action, builder.state)
 
 
 STEPS: dict[str, type[Step]] = {"wait_for": WaitFor}
