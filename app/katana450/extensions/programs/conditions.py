@@ -50,7 +50,7 @@ class Condition(Protocol):
 
     @property
     def awaited(self) -> str:
-        """What is awaited, as in "wait for the cup in the hand"."""
+        """Words for what is awaited, as in "wait for cup in the hand"."""
         ...
 
     def checked(self, builder: PlanBuilder) -> Condition:
@@ -78,7 +78,7 @@ class Held:
 
     @property
     def awaited(self) -> str:
-        """What is awaited."""
+        """Words for what is awaited."""
         return f"{self.name} in the hand"
 
     def checked(self, builder: PlanBuilder) -> Self:
@@ -116,7 +116,7 @@ class Placed:
 
     @property
     def awaited(self) -> str:
-        """What is awaited."""
+        """Words for what is awaited."""
         return f"{self.name} at its place"
 
     def checked(self, builder: PlanBuilder) -> Self:
@@ -153,7 +153,7 @@ class Volume:
 
     @property
     def awaited(self) -> str:
-        """What is awaited."""
+        """Words for what is awaited."""
         return f"the water in the {self.of}"
 
     def checked(self, builder: PlanBuilder) -> Self:
@@ -190,7 +190,7 @@ class JointAngle:
 
     @property
     def awaited(self) -> str:
-        """What is awaited."""
+        """Words for what is awaited."""
         return f"axis {self.axis + 1}"
 
     def checked(self, builder: PlanBuilder) -> Self:
@@ -225,7 +225,7 @@ class FingerPlace:
 
     @property
     def awaited(self) -> str:
-        """What is awaited."""
+        """Words for what is awaited."""
         return "the gripper"
 
     def checked(self, builder: PlanBuilder) -> Self:
