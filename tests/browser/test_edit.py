@@ -152,11 +152,15 @@ def test_undo_names_the_stops_that_its_page_knows(new_page: ViserPage, truth: Tr
     truth.wait(10.0, moving=False)
     moved = np.array(truth.status()["q"])
     # The page shows an old status, and holds the drag for undoable, as while its connection hangs.
+    # The key is pressed at once, before the next status arrives.
     page.page.evaluate(
-        """(old) => window.dispatchEvent(new CustomEvent("status", {detail: old}))""",
+        """(old) => {
+            window.dispatchEvent(new CustomEvent("status", {detail: old}));
+            document.body.dispatchEvent(new KeyboardEvent(
+                "keydown", {code: "KeyZ", key: "z", ctrlKey: true, bubbles: true}));
+        }""",
         {"undo": ["arm (drag)"], "revocations": truth.status()["revocations"] - 1},
     )
-    page.page.keyboard.press("Control+z")
     page.wait_until(lambda: "Do it again" in bar(page, "toast"), "the refusal")
     assert np.allclose(truth.status()["q"], moved, atol=1e-6)
     assert not np.allclose(moved, start, atol=1e-2)
