@@ -57,6 +57,7 @@ def test_choice_of_the_next_driver_by_keys_is_sent_by_enter(
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_program_is_ended_in_the_bar_and_its_owner_chooses_the_next_driver(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:

@@ -204,6 +204,7 @@ SPACEMOUSE = """
 """
 
 
+@pytest.mark.long
 def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage) -> None:
     window = new_page.page
     window.add_init_script(SPACEMOUSE)

@@ -100,7 +100,14 @@ def lag_and_error(
 @pytest.mark.parametrize("rates", [False, True])
 @pytest.mark.parametrize("hz", [50.0, 100.0])
 @pytest.mark.parametrize("jitter", [0.0, 0.003])
-@pytest.mark.parametrize(("size", "period"), [(0.17, 2.0), (0.4, 3.0), (0.7, 5.0)])
+@pytest.mark.parametrize(
+    ("size", "period"),
+    [
+        (0.4, 3.0),
+        pytest.param(0.17, 2.0, marks=pytest.mark.long),
+        pytest.param(0.7, 5.0, marks=pytest.mark.long),
+    ],
+)
 def test_sine_inside_the_limits_keeps_its_amplitude(
     session: Session, size: float, period: float, jitter: float, hz: float, rates: bool
 ) -> None:

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 SYSTEMS = [
     (),
-    ("--platform", "win32", "app"),
+    pytest.param(("--platform", "win32", "app"), marks=pytest.mark.long),
     pytest.param(("--platform", "darwin", "app"), marks=pytest.mark.long),
 ]
 
