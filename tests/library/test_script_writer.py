@@ -130,7 +130,7 @@ def test_error_in_the_block_is_not_replaced() -> None:
 
 
 def test_what_cannot_be_written_is_refused_at_once() -> None:
-    p = katana450.program()
+    p = katana450.ScriptWriter({})
     with pytest.raises(katana450.InputError, match="`to` or `by`, not both"):
         p.move([1, 2, 3], by=[1, 2, 3])
     with pytest.raises(katana450.InputError, match="needs three numbers"):

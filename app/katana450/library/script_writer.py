@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import yaml
@@ -35,20 +34,6 @@ class ScriptWriter:
         self._poses: dict[str, Any] = {}
         self._expected: dict[str, Any] = {}
         self._steps: list[Any] = []
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
-        """Check the script. Raises InputError with all its mistakes."""
-        if kind is None:
-            self.check()
 
     def __str__(self) -> str:
         """Return the script as YAML."""
@@ -240,6 +225,7 @@ class ScriptWriter:
         self._steps.append({name: _plain(value)})
 
 
+@contextmanager
 def program(
     name: str = "Script",
     *,
@@ -248,8 +234,8 @@ def program(
     tool: str | None = None,
     speed: Number | None = None,
     gripper: str | None = None,
-) -> ScriptWriter:
-    """Begin a script, which is checked at the end of the ``with`` block and prints as YAML.
+) -> Iterator[ScriptWriter]:
+    """Write a script, which is checked at the end of the ``with`` block and prints as YAML.
 
     Its units are those of scripts: mm, deg, s and ml. A text may carry a unit.
 
@@ -261,6 +247,8 @@ def program(
         tool: tool frame of all points; None for the present one.
         speed: fraction of full speed; None for 1.
         gripper: "none" for an arm without its gripper.
+
+    Raises InputError at the end of the block, with all mistakes of the script.
 
     >>> with katana450.program("Square", frame="base", tool="tcp") as p:
     ...     p.move([320, -60, 150], pitch=50, roll=0)
@@ -285,7 +273,9 @@ def program(
     <BLANKLINE>
     """
     head = {"name": name, "about": about, "gripper": gripper, "frame": frame, "tool": tool}
-    return ScriptWriter({**head, "speed": _plain(speed)})
+    script = ScriptWriter({**head, "speed": _plain(speed)})
+    yield script
+    script.check()
 
 
 def _given(**values: Any) -> dict[str, Any]:
@@ -314,14 +304,13 @@ def _place(
 
 def _plain(value: Any) -> Any:
     """Return ``value`` as YAML writes it; numbers of numpy become those of Python."""
-    convert: Callable[[Any], Any] = _plain
     match value:
         case np.ndarray() | np.generic():
-            return convert(value.tolist())
+            return _plain(value.tolist())
         case Mapping():
-            return {str(name): convert(each) for name, each in value.items()}
+            return {str(name): _plain(each) for name, each in value.items()}
         case list() | tuple():
-            return [convert(each) for each in value]
+            return [_plain(each) for each in value]
         case float() if not math.isfinite(value):
             raise InputError(f"A number of a script must be finite, not {value}.")
     return value

@@ -31,7 +31,7 @@ def simulate(script: Script, options: Namespace) -> int:
     plan = plan_script(script, options.urdf, options.seed, options.speed, begin)
     program, robot = plan.program, plan.robot
     notes = (BARE,) if script.bare else ()
-    if program.conditions:
+    if program.conditions and not options.dry_run:
         lines = ", ".join(str(task.line) for task in program.conditions)
         notes = (*notes, f"Simulated as if each awaited condition held at once: line {lines}.")
     for note in notes:

@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -114,6 +115,10 @@ class Report:
         }
         return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
 
+    @cached_property
+    def _pour(self) -> PourRecord | None:
+        return PourRecord.of(self.trace)
+
     def csv(self) -> str:
         """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path.
 
@@ -128,7 +133,7 @@ class Report:
         slides = self.arm.gripper.slides
         heads.append("fingers_mm" if slides else "fingers_deg")
         trace = self.trace
-        pour = PourRecord.of(trace)
+        pour = self._pour
         more = () if pour is None else COLUMNS
         rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_fraction", *more])
         for tick in range(len(trace.t)):
@@ -172,9 +177,8 @@ class Report:
             images["path.png"] = figures.path_figure(paths)
         images["joints.png"] = figures.joints_figure(self.arm, self.trace)
         images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
-        pour = PourRecord.of(self.trace)
-        if pour is not None:
-            images["water.png"] = figures.water_figure(pour)
+        if self._pour is not None:
+            images["water.png"] = figures.water_figure(self._pour)
         contents = {
             "report.html": self._page(images, written).encode(),
             "report.json": self.json(written).encode(),

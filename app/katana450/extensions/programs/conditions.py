@@ -157,7 +157,7 @@ class Volume:
         return f"the water in the {self.of}"
 
     def checked(self, builder: PlanBuilder) -> Self:
-        """Return itself. Raises InputError without a cup."""
+        """Return itself. Raises InputError without water."""
         if builder.state.poured is None:
             raise InputError(
                 "There is no water: there is no cup in the scene, or nothing is filled."

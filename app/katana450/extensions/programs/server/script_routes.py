@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -26,10 +27,6 @@ from katana450.server.web.http_api import RouteContext
 
 MAX_WAITING = 8
 """Maximum number of texts that wait to be read; reading a long one takes most of a second."""
-
-
-SCHEMA = msgspec.json.encode(script_schema())
-"""The JSON Schema of scripts as JSON."""
 
 
 class ScriptRoutes:
@@ -60,7 +57,7 @@ class ScriptRoutes:
 
     async def _schema(self, _request: Request) -> Response:
         """Return the JSON Schema of scripts, which holds nothing of this server."""
-        return Response(SCHEMA, media_type="application/schema+json")
+        return Response(_schema_json(), media_type="application/schema+json")
 
     async def _text(self, request: Request) -> Response:
         self._context.identity(request)
@@ -127,6 +124,11 @@ def routes(context: RouteContext) -> list[BaseRoute]:
     """Return the routes of the scripts of the library and of the folder of ``--programs``."""
     folder = getattr(context.hub.runner.options, "programs", None)
     return ScriptRoutes(context, Scripts(folder)).routes()
+
+
+@cache
+def _schema_json() -> bytes:
+    return msgspec.json.encode(script_schema())
 
 
 def _json(found: Any) -> Response:
