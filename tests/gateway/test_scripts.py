@@ -11,7 +11,11 @@ from typing import Any
 import pytest
 
 from katana450.arm.control.lease import Role
+from katana450.client import connect
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
+from katana450.extensions.programs.script_schema import script_schema
 from katana450.extensions.programs.source import MAX_BYTES
+from katana450.server.api import answers
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import HOUR, ask, enter
@@ -116,3 +120,37 @@ def test_server_without_a_folder_saves_nothing() -> None:
         assert not json.loads(ask(f"{server.url}/api/v1/scripts", Cookie=cookie)[2])["saves"]
         status, body = post(server, cookie, POSES, "/Mine")
         assert (status, b"--programs" in body) == (409, True)
+
+
+def test_schema_is_served_to_editors(server: AppServer) -> None:
+    status, headers, body = ask(f"{server.url}/api/v1/script.schema.json")
+    assert (status, headers["content-type"]) == (200, "application/schema+json")
+    assert json.loads(body) == script_schema()
+
+
+@pytest.mark.parametrize(
+    ("condition", "end", "why"),
+    [
+        ("gripper: {at_most: 1}", "done", ""),
+        ("held: cup", "failed", "Line 2, wait for cup in the hand: The condition did not hold"),
+    ],
+)
+def test_server_waits_for_a_condition(
+    server: AppServer, condition: str, end: str, why: str
+) -> None:
+    text = f"steps:\n  - wait_for: {{{condition}, timeout: 0.5}}\n  - nudge: {{axis: 5, by: 5}}\n"
+    with connect(server.url, "Owner") as arm:
+        arm.ask(Program(text=text))
+        deadline, ran = time.monotonic() + 30.0, False
+        while True:
+            program = arm.query(answers.State).program
+            assert program is not None
+            if program.status == "ready" and not ran:
+                ran = True
+                arm.ask(Steer(order=ProgramOrder.RUN))
+            elif program.status in ("done", "failed"):
+                break
+            assert time.monotonic() < deadline, program
+            time.sleep(0.02)
+    assert program.status == end
+    assert program.why.startswith(why)
