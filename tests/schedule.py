@@ -23,6 +23,9 @@ KINDS = {
     "tests/gateway": SERVERS,
     "tests/event_log": SERVERS,
     "tests/extensions": SERVERS,
+    "tests/runtime": SERVERS,  # control loops and supervisors on the clock of the machine
+    "tests/cli/test_lines.py": SERVERS,
+    "tests/cli/test_live.py": SERVERS,
     # Some of these run servers too; they follow the browser to make both rows equally long.
     "tests/cli/test_serve.py": BROWSER,
     "tests/docs": BROWSER,

@@ -84,9 +84,19 @@ def bar(table: Staged, participant: Participant) -> dict[str, Any]:
     return status.common(table.hub) | status.of(table.hub, participant)
 
 
+def first_progress(table: Staged, participant: Participant) -> dict[str, Any]:
+    """Return the bar once the planning thread has reported its first step."""
+    due = time.monotonic() + 10.0
+    while (shown := bar(table, participant))["headline"] == "Planning the script 0 %":
+        assert time.monotonic() < due
+        time.sleep(0.005)
+    return shown
+
+
 def test_pause_during_planning_starts_the_program_paused(table: Staged, slow: Slow) -> None:
     participant = table.join(PAGES[0])
     ask(table, participant)
+    first_progress(table, participant)
     table.programs.steer(participant, ProgramOrder.PAUSE)
     assert isinstance(table.arm.commands[-1], cmd.Pause)
     table.arm.rest = replace(table.arm.rest, paused=True)
@@ -247,11 +257,7 @@ def test_change_causes_new_planning_with_the_reason(table: Staged, slow: Slow, m
 def test_bar_shows_the_progress_of_planning(table: Staged, slow: Slow) -> None:
     participant = table.join(PAGES[0])
     ask(table, participant, None)
-    due = time.monotonic() + 10.0
-    # The planning thread may not have started yet.
-    while (shown := bar(table, participant))["headline"] == "Planning the script 0 %":
-        assert time.monotonic() < due
-        time.sleep(0.005)
+    shown = first_progress(table, participant)
     assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20 %")
     assert shown["why"] == "Step 1 of 2: timing paths. It does not start by itself."
     table.arm.moves = True
