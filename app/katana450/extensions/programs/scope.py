@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from katana450.extensions.programs.expression import (
     FUNCTIONS,
@@ -18,6 +19,8 @@ from katana450.extensions.programs.source import YamlValue
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """Pattern of a name."""
 
+V = TypeVar("V")
+
 RESERVED = frozenset(
     {*UNITS, *FUNCTIONS, "x", "y", "z", "pi", "open", "closed", "keep", "roomiest"}
 )
@@ -29,7 +32,7 @@ class Scope:
     """The values that names stand for at one place of a script.
 
     Attributes:
-        values: all values by their names.
+        values: all values by their names, and the parts of mappings by names such as ``box.name``.
         numbers: those that are numbers, and the numbers in mappings and lists, by names such as
             ``corner.x`` and ``corner.0``.
     """
@@ -48,8 +51,7 @@ class Scope:
         if word in RESERVED:
             raise name.wrong(f"{word!r} has a meaning of its own. Choose another name.")
         bound = self.bound(value)
-        numbers = {key: n for key, n in self.numbers.items() if not key.startswith(f"{word}.")}
-        numbers.pop(word, None)
+        values, numbers = _without(self.values, word), _without(self.numbers, word)
         if bound.number is not None:
             numbers[word] = Quantity(bound.number, bound.unit)
         parts: list[tuple[object, YamlValue]] = []
@@ -58,9 +60,10 @@ class Scope:
         elif bound.kind == "list":
             parts = list(enumerate(bound.items))
         for part, inner in parts:
+            values[f"{word}.{part}"] = inner
             if inner.number is not None:
                 numbers[f"{word}.{part}"] = Quantity(inner.number, inner.unit)
-        return Scope({**self.values, word: bound}, numbers)
+        return Scope({**values, word: bound}, numbers)
 
     def bound(self, value: YamlValue) -> YamlValue:
         """Return ``value`` with names and expressions in it replaced by what they stand for."""
@@ -84,3 +87,12 @@ class Scope:
         except ExpressionError as error:
             return replace(value, why=str(error))
         return replace(value, kind="number", number=found.value, unit=found.kind)
+
+
+def _without(named: Mapping[str, V], word: str) -> dict[str, V]:
+    """Return ``named`` without the value ``word`` and its parts."""
+    return {
+        name: value
+        for name, value in named.items()
+        if name != word and not name.startswith(f"{word}.")
+    }
