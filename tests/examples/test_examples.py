@@ -7,19 +7,24 @@ import signal
 import subprocess
 import sys
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.script import Script, parse
+from katana450.extensions.scene.text import parsed
 from tests.browser.server import ROOT, AppServer
 from tests.programs.conftest import Stage
 
 EXAMPLES = ROOT / "examples"
 SECONDS = 120
-SLOW = ("grid",)
+SLOW = ("boxes", "grid")
 """Scripts whose planning takes half a minute."""
 
 
@@ -153,7 +158,34 @@ def stage(arm: MountedArm) -> Stage:
     ],
 )
 def test_script_can_be_planned(stage: Stage, name: str) -> None:
-    text = (EXAMPLES / "programs" / f"{name}.yaml").read_text(encoding="utf-8")
-    program = compiled(parse(text), stage.plan_context, stage.begin())
+    program = compiled(script(name), stage.plan_context, start_of(stage, name))
     assert program.steps >= 4
     assert program.duration > 1.0
+
+
+def script(name: str) -> Script:
+    return parse((EXAMPLES / "programs" / f"{name}.yaml").read_text(encoding="utf-8"))
+
+
+def start_of(stage: Stage, name: str) -> State:
+    """Return the state in which a script begins, with the scene of its name if there is one."""
+    scene, start = EXAMPLES / "scenes" / f"{name}.yaml", stage.begin()
+    if not scene.exists():
+        return start
+    objects = parsed(scene.read_text(encoding="utf-8")).scene({}, None).objects
+    return replace(start, objects=objects, poured=None)
+
+
+@pytest.mark.long
+def test_ten_boxes_arrive_where_the_script_says(stage: Stage) -> None:
+    start = start_of(stage, "boxes")
+    program = compiled(script("boxes"), stage.plan_context, start)
+    run, states = stage.play(program, start, most=20_000)
+    assert run.phase is Phase.DONE
+    before, after = (
+        {each.name: 1e3 * each.T[:3, 3] for each in state.objects} for state in (start, states[-1])
+    )
+    assert len(before) == 10
+    for name, (x, y, z) in before.items():
+        np.testing.assert_allclose(after[name], (x, -y, z), rtol=0, atol=1e-6)
+    assert all(each.T[2, 2] == pytest.approx(1.0, abs=1e-12) for each in states[-1].objects)

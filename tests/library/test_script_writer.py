@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 import katana450
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.steps import STEPS
+from tests.programs.yaml_core import loaded
 
 ALL = """\
 name: All
@@ -46,6 +46,10 @@ steps:
 - grasp: {object: cup, pitch: 30}
 - pour: {into: basin, shake: 2}
 - set_down
+- pick: cup
+- place: {at: {x: 300, y: 40, yaw: 20}, on: box}
+- stack: {object: cup, on: box}
+- release
 - repeat:
     times: 2
     steps:
@@ -88,6 +92,10 @@ def everything() -> katana450.ScriptWriter:
         p.grasp("cup", pitch=30)
         p.pour("basin", shake=2)
         p.set_down()
+        p.pick("cup")
+        p.place({"x": 300, "y": 40, "yaw": 20}, on="box")
+        p.stack("cup", on="box")
+        p.release()
         with p.repeat(2):
             p.nudge(1, 5)
             with p.repeat(3):
@@ -98,7 +106,7 @@ def everything() -> katana450.ScriptWriter:
 
 def test_every_step_is_written_as_in_yaml() -> None:
     parse(ALL)
-    assert yaml.safe_load(str(everything())) == yaml.safe_load(ALL)
+    assert loaded(str(everything())) == loaded(ALL)
 
 
 def test_there_is_a_method_for_every_step() -> None:

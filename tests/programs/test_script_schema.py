@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from jsonschema import Draft202012Validator
 
 from docs.script_schema import FILE, content
@@ -25,6 +24,7 @@ from katana450.extensions.programs.script_schema import (
 )
 from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.steps import STEPS
+from tests.programs.yaml_core import loaded
 
 ROOT = Path(__file__).resolve().parents[2]
 VALIDATOR = Draft202012Validator(script_schema())
@@ -50,7 +50,7 @@ SCRIPTS = dict(scripts())
 
 
 def is_valid(text: str) -> bool:
-    return bool(VALIDATOR.is_valid(yaml.safe_load(text)))
+    return bool(VALIDATOR.is_valid(loaded(text)))
 
 
 def known_fields(text: str, name: str = "zzz") -> set[str]:
@@ -79,7 +79,7 @@ def test_schema_is_a_schema_and_the_file_for_editors_is_current() -> None:
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_schema_accepts_every_script_of_the_project(name: str) -> None:
     parse(SCRIPTS[name])
-    errors = [error.message for error in VALIDATOR.iter_errors(yaml.safe_load(SCRIPTS[name]))]
+    errors = [error.message for error in VALIDATOR.iter_errors(loaded(SCRIPTS[name]))]
     assert errors == []
 
 

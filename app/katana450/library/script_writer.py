@@ -207,11 +207,46 @@ class ScriptWriter:
         self._add("fill", ml)
 
     def grasp(
-        self, name: str, *, pitch: Number | None = None, height: Number | None = None
+        self,
+        name: str,
+        *,
+        side: str | None = None,
+        pitch: Number | None = None,
+        height: Number | None = None,
     ) -> None:
-        """Grasp an object where it stands; pitch [deg] and height [mm] are found unless given."""
-        more = _given(pitch=pitch, height=height)
+        """Grasp an object where it stands, from the "front" or from "above".
+
+        Side, pitch [deg] and height [mm] are found unless given.
+        """
+        more = _given(side=side, pitch=pitch, height=height)
         self._add("grasp", {"object": name, **more} if more else name)
+
+    def pick(
+        self,
+        name: str,
+        *,
+        side: str | None = None,
+        pitch: Number | None = None,
+        height: Number | None = None,
+    ) -> None:
+        """Grasp an object as ``grasp`` does, and lift it."""
+        more = _given(side=side, pitch=pitch, height=height)
+        self._add("pick", {"object": name, **more} if more else name)
+
+    def place(self, at: Point | None = None, *, on: str | None = None) -> None:
+        """Put the held object down, upright, at a place, or on another object.
+
+        The place is x, y and, if wanted, z [mm] of its underside and its yaw [deg].
+        """
+        self._add("place", _given(at=at, on=on))
+
+    def stack(self, name: str, *, on: str) -> None:
+        """Pick an object and place it on the middle of another."""
+        self._add("stack", {"object": name, "on": on})
+
+    def release(self) -> None:
+        """Open the fingers on the held object where it is."""
+        self._steps.append("release")
 
     def pour(self, into: str, *, shake: int | None = None) -> None:
         """Pour the water of the cup in the hand into an object."""

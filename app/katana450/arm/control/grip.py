@@ -7,6 +7,7 @@ from dataclasses import replace
 from katana450.arm.control.goals import without_finding
 from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
 from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.support import surface_below
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -31,7 +32,9 @@ def gripped(environment: Environment, world: CollisionWorld | None, state: State
         opened = RELEASE_SLIDE if hand.slides else RELEASE_TURN
         if state.gripper_setpoint <= state.grip + opened:
             return state
-        objects = tuple(environment.left(t, x) if t.held else t for t in state.objects)
+        objects = tuple(
+            _released(environment, state, each) if each.held else each for each in state.objects
+        )
         return replace(state, objects=objects, grip=None)
     if state.gripper_goal >= state.gripper_setpoint:
         return (
@@ -53,6 +56,13 @@ def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
         return hand.fingers
     away = [finding.parts for finding in state.findings if finding.reason is Reason.LOPSIDED]
     return tuple(each for parts in away if parts for each in hand.fingers if each not in parts)
+
+
+def _released(environment: Environment, state: State, held: SceneObject) -> SceneObject:
+    """Return the ``held`` object upright on the table or object below it."""
+    x = state.x_setpoint
+    lifted = replace(held, T=environment.pose(held, x), held=False)
+    return environment.left(held, x, surface_below(state.objects, lifted))
 
 
 def _felt(

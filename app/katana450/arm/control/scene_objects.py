@@ -329,14 +329,15 @@ class Environment:
             return self.left(scene_object, x)
         return replace(scene_object, T=self.pose(scene_object, x), fixed=False)
 
-    def left(self, scene_object: SceneObject, x: FloatArray) -> SceneObject:
-        """Return ``scene_object`` released from the hand, upright on the table below.
+    def left(self, scene_object: SceneObject, x: FloatArray, height: float = 0.0) -> SceneObject:
+        """Return ``scene_object`` released from the hand, upright on what carries it.
 
         x: (k,) joints and finger joint [rad].
+        height: of the surface below it [m].
         """
         T = self.pose(scene_object, x)
         yaw = float(np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1]))
-        at = (T[0, 3], T[1, 3], 0.0)
+        at = (T[0, 3], T[1, 3], height)
         T = se3.from_rotation_translation(so3.rotation_z(yaw), at)
         return replace(scene_object, T=T, held=False, fixed=False)
 

@@ -59,6 +59,16 @@ def check_carried(
     )
 
 
+def surface_below(objects: Sequence[SceneObject], scene_object: SceneObject) -> float:
+    """Return the height [m] of the highest level surface below the middle of an object.
+
+    The object is where it would be released; the table is at 0.
+    """
+    lowest = _lowest(scene_object) + SUPPORT_GAP
+    tops = [each.T[2, 3] + each.height for each in objects if _is_over(scene_object, each)]
+    return max((float(top) for top in tops if top <= lowest), default=0.0)
+
+
 def check_mounted(
     environment: Environment,
     objects: Sequence[SceneObject],

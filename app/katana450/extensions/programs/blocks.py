@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.pick import stacked
 from katana450.extensions.programs.scope import Scope
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
@@ -20,7 +21,7 @@ MAX_STEPS = 1000
 MAX_REPETITIONS = 1000
 """Maximum count of a ``repeat``, and of the values of a ``for_each``."""
 
-BLOCKS = ("repeat", "for_each", "call")
+BLOCKS = ("repeat", "for_each", "call", "stack")
 """Names of what stands for several steps."""
 
 
@@ -122,6 +123,9 @@ class StepReader:
                 found = self._for_each(value)
             case "call":
                 found = self._call(value)
+            case "stack":
+                steps = stacked(self.scope.bound(value), self.setting)
+                return tuple(LocatedStep(step, name.line, name.column) for step in steps)
             case _:
                 step = STEPS[str(name.held)].read(self.scope.bound(value), self.setting)
                 return (LocatedStep(step, name.line, name.column),)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.plan_builder import Approach, PlanBuilder
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
@@ -19,11 +19,12 @@ APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
 UP = frozen((0.0, 0.0, 1.0))
 
 
-def before(middle: FloatArray, pitch: float, back: float) -> ToolTarget:
-    """Return the tool ``back`` [m] before ``middle`` (3,) [m] on its own axis; in {S}, roll 0."""
+def before(middle: FloatArray, approach: Approach, back: float) -> ToolTarget:
+    """Return the tool ``back`` [m] before ``middle`` (3,) [m] in {S}, on its own axis."""
+    pitch, roll = approach
     out = np.array((middle[0], middle[1], 0.0)) / math.hypot(middle[0], middle[1])
     along = math.cos(pitch) * out - math.sin(pitch) * UP
-    return ToolTarget(middle - back * along, pitch, 0.0)
+    return ToolTarget(middle - back * along, pitch, roll)
 
 
 def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:

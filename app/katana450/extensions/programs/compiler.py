@@ -169,7 +169,8 @@ class Compiler:
     def _error(self) -> ScriptError:
         assert self._refused is not None
         text = self._refused.text
-        tried = [f"{angle:.0f}" for angle in np.degrees(self._builder.given_up)]
+        pitches_tried = dict.fromkeys(each.pitch for each in self._builder.given_up)
+        tried = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
         if len(tried) > 1:
             pitches = ", ".join(tried[:-1]) + f" and {tried[-1]}"
             text += f" No other pitch of the grasp helps: tried {pitches} deg."

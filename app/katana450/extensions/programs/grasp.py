@@ -2,35 +2,52 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.pouring import CUP
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, UseTool
 from katana450.extensions.programs.carry import APPROACHES, before
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder
+from katana450.extensions.programs.plan_builder import Approach, GraspInfo, PlanBuilder
+from katana450.extensions.programs.reaching import reaching
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.turns import wrapped
 from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import JOIN_TOLERANCE, MARGIN
 
 PITCHES = tuple(np.radians((30.0, 35.0, 25.0, 40.0, 20.0, 45.0)).tolist())
-"""[rad] Pitches of the tool for a grasp, tried in this order. The arm pours better with a smaller
-pitch, but the limit of the shoulder joint keeps a level tool (pitch 0) above 110 mm.
+"""[rad] Pitches of the tool for a grasp from the front, tried in this order. The arm pours better
+with a smaller pitch, but the limit of the shoulder joint keeps a level tool (pitch 0) above 110 mm.
 """
 
-GRASP_HEIGHT_FRACTION = 0.78
-"""[1] Height of the grasp as a fraction of the object's height. Above the middle of the object, the
-palm has room over the table.
+STEEP_PITCHES = tuple(np.radians((55.0, 65.0, 75.0)).tolist())
+"""[rad] Further pitches for objects that are not poured, as near the arm only these are reached."""
+
+DOWN = 0.5 * math.pi
+"""[rad] Pitch of the tool for a grasp from above."""
+
+FRONT, ABOVE = "front", "above"
+"""The sides from which an object is grasped."""
+
+HEIGHT_FRACTIONS = {FRONT: (0.78, 0.95), ABOVE: (0.5, 0.7, 0.9, 1.05, 1.2)}
+"""[1] Heights of the grasp as fractions of the object's height, tried in this order. From the front
+the palm has room over the table only above the middle of the object.
 """
+
+MAX_SKEW = math.radians(15.0)
+"""[rad] Maximum angle between the fingers and the sides of a box: the pads yield by as much."""
 
 MIN_DISTANCE, MAX_DISTANCE, DISTANCE_STEP = 0.0, 0.03, 0.002
 """[m] Minimum, maximum and step of the distance between the tool frame and the object's axis."""
@@ -41,27 +58,29 @@ PALM_CLEARANCE = MARGIN + 5e-4
 
 @dataclass(frozen=True)
 class Grasp:
-    """Grasp an object: open the fingers, approach from the front, close until both fingers touch.
+    """Grasp an object: open the fingers, approach it, close until both fingers touch.
 
     Attributes:
         name: name of the object.
-        pitch: of the tool [rad]; None for the first of PITCHES with which this and all later steps
-            succeed.
-        height: above the underside of the object [m]; None for GRASP_HEIGHT_FRACTION of its height.
+        side: FRONT or ABOVE; "" for the first with which this and all later steps succeed.
+        pitch: of the tool [rad]; None for the first with which this and all later steps succeed.
+        height: above the underside of the object [m]; None for HEIGHT_FRACTIONS of its height.
     """
 
     name: str
-    pitch: float | None
-    height: float | None
+    side: str = ""
+    pitch: float | None = None
+    height: float | None = None
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of an object, or {object, pitch, height}. Raises ScriptError."""
+        """Read the name of an object, or {object, side, pitch, height}. Raises ScriptError."""
         if value.kind == "text":
-            return cls(read.text(value), None, None)
+            return cls(read.text(value))
         fields = Fields(value, "a grasp")
         found = cls(
             fields.need("object", read.text, ""),
+            fields.take("side", read.choice(FRONT, ABOVE), ""),
             fields.take("pitch", read.degrees(0.0, 90.0), None),
             fields.take("height", read.millimetres(1.0, 500.0), None),
         )
@@ -83,47 +102,126 @@ class Grasp:
             builder.note("tool grasp", UseTool("grasp"), replace(builder.state, tool="grasp"))
         opened = builder.plan_context.arm.gripper.upper
         builder.note("open", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
-        remaining = [pitch for pitch in PITCHES if pitch not in builder.given_up]
         try:
             builder.first(
-                remaining if self.pitch is None else [self.pitch],
-                lambda pitch: self._plan(builder, scene_object, pitch),
+                self._approaches(builder, scene_object),
+                lambda approach: self._plan(builder, scene_object, approach),
             )
         except InputError as error:
             raise InputError(f"{self.name} cannot be grasped at its place: {error}") from error
 
-    def _plan(self, builder: PlanBuilder, scene_object: SceneObject, pitch: float) -> None:
-        """Plan approach and closing at ``pitch`` [rad]. Raises InputError if it is not possible."""
-        height = GRASP_HEIGHT_FRACTION * scene_object.height if self.height is None else self.height
-        point = builder.point(scene_object.T[:3, 3] + (0.0, 0.0, height), in_base=True)
-        distance, q = _smallest_distance(builder, point, pitch)
+    def _approaches(self, builder: PlanBuilder, scene_object: SceneObject) -> list[Approach]:
+        """Return the approaches to try, in their order, without those that were given up."""
+        if self.pitch is not None:
+            return [Approach(self.pitch)]
+        found = approaches(builder, scene_object)
+        sides = [self.side] if self.side else list(found)
+        chosen = [each for side in sides for each in found.get(side, ())]
+        if not chosen:
+            raise InputError(_no_approach(scene_object, self.side))
+        remaining = [each for each in chosen if each not in builder.given_up]
+        # Without one in reach, the first gives the reason.
+        in_reach = [each for each in remaining if self._is_in_reach(builder, scene_object, each)]
+        return in_reach or remaining[:1]
+
+    def _is_in_reach(
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach
+    ) -> bool:
+        """Return whether the tool can be at one of the heights of a grasp."""
+        return any(
+            reaching(
+                builder.chain,
+                builder.q,
+                before(_point(builder, scene_object, height), approach, 0.0),
+                None,
+            )
+            is not None
+            for height in self._heights(scene_object, approach)
+        )
+
+    def _heights(self, scene_object: SceneObject, approach: Approach) -> list[float]:
+        """Return the heights [m] of the grasp over the underside of the object, the best first."""
+        if self.height is not None:
+            return [self.height]
+        fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
+        return [fraction * scene_object.height for fraction in fractions]
+
+    def _plan(self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach) -> None:
+        """Plan approach and closing. Raises InputError if it is not possible."""
+        builder.first(
+            self._heights(scene_object, approach),
+            lambda height: self._plan_at(builder, scene_object, approach, height),
+        )
+
+    def _plan_at(
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, height: float
+    ) -> None:
+        """Plan the grasp at ``height`` [m] over the underside of the object."""
+        point = _point(builder, scene_object, height)
+        distance, q = _smallest_distance(builder, point, approach)
         start = builder.first(
-            APPROACHES, lambda away: _joints_before(builder, point, pitch, distance + away)
+            APPROACHES, lambda away: builder.joints_of(before(point, approach, distance + away))
         )
         builder.move_to(start, f"grasp {self.name}: approach")
-        builder.lead([ToolLine(builder.at, before(point, pitch, distance))], f"grasp {self.name}")
+        goal = before(point, approach, distance)
+        builder.lead([ToolLine(builder.at, goal)], f"grasp {self.name}")
         if float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
             raise InputError("the straight path to it ends in another posture than planned.")
         closed = builder.plan_context.arm.gripper.lower
         held = builder.after(cmd.SetGripper(closed))
         if held.grip is None:
-            reasons = ", ".join(finding.reason.value for finding in held.findings)
-            raise InputError(
-                f"the fingers do not hold it ({reasons or 'they close without touching it'})."
-            )
+            raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
         builder.note(f"grasp {self.name}: close", MoveFingers(closed), held)
-        builder.taken = GraspInfo(builder.at, pitch if self.pitch is None else None)
+        builder.taken = GraspInfo(builder.at, approach if self.pitch is None else None)
 
 
-def _joints_before(
-    builder: PlanBuilder, point: FloatArray, pitch: float, distance: float
-) -> FloatArray:
-    """Return the joints (5,) [rad] with the tool ``distance`` [m] before ``point`` (3,) [m]."""
-    return builder.joints_of(before(point, pitch, distance))
+def approaches(builder: PlanBuilder, scene_object: SceneObject) -> dict[str, tuple[Approach, ...]]:
+    """Return the approaches that suit the shape of an object, by side, the preferred side first.
+
+    The fingers close on two opposite sides of a box, or of the box round a mesh. The cup is only
+    grasped from the front: from above the wrist could not pour it. Raises InputError if the object
+    does not stand upright.
+    """
+    if scene_object.name == CUP:
+        return {FRONT: tuple(map(Approach, PITCHES))}
+    front = tuple(map(Approach, (*PITCHES, *STEEP_PITCHES)))
+    if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
+        return {FRONT: front, ABOVE: (Approach(DOWN),)}
+    x, y, _ = builder.point(scene_object.T[:3, 3], in_base=True)
+    side = builder.direction(scene_object.T[:3, 0], in_base=True)
+    skew = math.atan2(y, x) - math.atan2(side[1], side[0])
+    rolls = sorted((wrapped(skew + quarter * DOWN) for quarter in range(4)), key=abs)
+    found = {ABOVE: tuple(Approach(DOWN, roll) for roll in rolls)}
+    return found | ({FRONT: front} if abs(rolls[0]) <= MAX_SKEW else {})
+
+
+def _point(builder: PlanBuilder, scene_object: SceneObject, height: float) -> FloatArray:
+    """Return the point (3,) [m] in {S} at ``height`` [m] over the underside of the object."""
+    return builder.point(scene_object.T[:3, 3] + (0.0, 0.0, height), in_base=True)
+
+
+def _why_not_held(state: State) -> str:
+    """Return why the closed fingers do not hold an object."""
+    for finding in state.findings:
+        if finding.reason is Reason.CONTACT and finding.parts:
+            return f"{' and '.join(finding.parts)} would touch first"
+        if finding.reason is Reason.LOPSIDED:
+            return "only one of them would touch it"
+    return "they close without touching it"
+
+
+def _no_approach(scene_object: SceneObject, side: str) -> str:
+    """Return why no approach from ``side`` suits the object."""
+    if scene_object.name == CUP:
+        return "the cup is grasped from the front, because from above the wrist could not pour it."
+    return (
+        f"seen from the arm its sides are skew, so the fingers cannot hold it from the {side}. "
+        "Grasp it from above, or turn it."
+    )
 
 
 def _smallest_distance(
-    builder: PlanBuilder, point: FloatArray, pitch: float
+    builder: PlanBuilder, point: FloatArray, approach: Approach
 ) -> tuple[float, FloatArray]:
     """Return the smallest distance [m] of the tool before ``point`` at which the palm has room.
 
@@ -131,7 +229,7 @@ def _smallest_distance(
     """
 
     def joints_with_room(distance: float) -> tuple[float, FloatArray]:
-        q = _joints_before(builder, point, pitch, distance)
+        q = builder.joints_of(before(point, approach, distance))
         nearest = None if world is None else world.nearest(np.append(q, fingers))
         if nearest is not None and nearest.distance < PALM_CLEARANCE:
             one, other = nearest.parts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -96,12 +96,19 @@ class StepTarget:
     in_base: bool = False
 
 
+class Approach(NamedTuple):
+    """The pitch and roll [rad] at which the tool grasps an object."""
+
+    pitch: float
+    roll: float = 0.0
+
+
 @dataclass(frozen=True)
 class GraspInfo:
-    """The tool pose of a grasp, and its pitch [rad] if that was chosen by the compiler."""
+    """The tool pose of a grasp, and its approach if that was chosen by the compiler."""
 
     at: ToolTarget
-    chosen: float | None
+    chosen: Approach | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +146,8 @@ class PlanBuilder:
         self.actions: list[tuple[str, Action | UntimedPath]] = []
         self.taken: GraspInfo | None = None
         """The grasp of the held object; None with an empty hand."""
-        self.given_up: tuple[float, ...] = ()
-        """[rad] Pitches of the grasp with which a later step failed."""
+        self.given_up: tuple[Approach, ...] = ()
+        """Approaches of the grasp with which a later step failed."""
         self.ahead: Sequence[object] = ()
         """The steps after the present one."""
 

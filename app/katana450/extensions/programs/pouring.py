@@ -32,6 +32,9 @@ POUR_PACE = 0.3
 ABOVE_RIM = 0.13
 """[m] Height of the tool above the basin's rim: the cup turns over between them."""
 
+MAX_POUR_PITCH = math.radians(60.0)
+"""[rad] Maximum pitch of the tool for a pour."""
+
 SHAKE_ANGLE = math.radians(25.0)
 """[rad] Amplitude of a shake."""
 
@@ -68,6 +71,11 @@ class Pour:
         if not cup.held:
             raise InputError("The cup is not in the hand: `grasp: cup` first.")
         level = builder.at
+        if level.pitch > MAX_POUR_PITCH:
+            raise InputError(
+                "The cup is held from above, where the wrist cannot tilt it: pick it with "
+                "`side: front`."
+            )
         try:
             builder.first(
                 (POUR_TURN, -POUR_TURN), lambda turn: self._pour(builder, basin, level, turn)

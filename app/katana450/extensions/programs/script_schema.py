@@ -8,6 +8,7 @@ from typing import Any
 from katana450.arm.control.commands import MIN_SPEED
 from katana450.extensions.programs.blocks import MAX_REPETITIONS, MAX_STEPS
 from katana450.extensions.programs.fields import MAX_ANGLE, MAX_COORDINATE, XYZ
+from katana450.extensions.programs.grasp import ABOVE, FRONT
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.moves import MAX_VIAS
 from katana450.extensions.programs.script import MAX_NAME_LENGTH
@@ -18,7 +19,7 @@ Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
-WITHOUT_VALUE = ("home", "set_down")
+WITHOUT_VALUE = ("home", "release", "set_down")
 """Steps that take no value."""
 
 
@@ -79,6 +80,18 @@ BOUNDS_OF = {
     "at_least": _number(-1e9, 1e9, "Minimum"),
     "at_most": _number(-1e9, 1e9, "Maximum"),
 }
+
+
+def _grasp(about: str) -> Schema:
+    """Return the name of an object, or how to grasp it."""
+    how = {
+        "side": {"enum": [FRONT, ABOVE], "description": "Side of the tool; found unless given"},
+        "pitch": _number(0.0, 90.0, "Pitch of the tool, deg; found unless given"),
+        "height": _number(1.0, 500.0, "Height above the underside, mm; found unless given"),
+    }
+    fields = _fields("An object, and how to grasp it", "object", {"object": OBJECT, **how})
+    return _any_of(about, OBJECT, fields)
+
 
 DEFINITIONS: dict[str, Schema] = {
     "point": _any_of(
@@ -192,18 +205,37 @@ STEP_VALUES: dict[str, Schema] = {
         {"object": OBJECT, "x": LENGTH, "y": LENGTH},
     ),
     "fill": _number(0.0, 1000.0, "Fill the cup with water, ml"),
-    "grasp": _any_of(
-        "Open, approach an object from the front, and close the fingers on it",
-        OBJECT,
-        _fields(
-            "An object, and how to grasp it",
-            "object",
+    "grasp": _grasp("Open, approach an object, and close the fingers on it"),
+    "pick": _grasp("Grasp an object, and lift it"),
+    "place": {
+        **_fields(
+            "Put the held object down, and draw back",
+            "",
             {
-                "object": OBJECT,
-                "pitch": _number(0.0, 90.0, "Pitch of the tool, deg; found unless given"),
-                "height": _number(1.0, 500.0, "Height above the underside, mm; found unless given"),
+                "at": _any_of(
+                    "Its place: the name of a pose, [x, y, z], or x, y and, if wanted, z, yaw",
+                    TEXT,
+                    _ref("point"),
+                    _fields(
+                        "Its place",
+                        "x y",
+                        {
+                            "x": LENGTH,
+                            "y": LENGTH,
+                            "z": {**LENGTH, "description": "Height of its underside, mm"},
+                            "yaw": {**TURN, "description": "Angle about the vertical, deg"},
+                        },
+                    ),
+                ),
+                "on": {**OBJECT, "description": "Object that carries it; its middle without `at`"},
             },
         ),
+        "minProperties": 1,
+    },
+    "stack": _fields(
+        "Pick an object and place it on the middle of another",
+        "object on",
+        {"object": OBJECT, "on": OBJECT},
     ),
     "pour": _any_of(
         "Carry the cup over an object, turn it over, shake it, and turn it back",
@@ -272,6 +304,10 @@ STEP_VALUES: dict[str, Schema] = {
         "maxProperties": 2,
     },
     "home": {"type": "null", "description": "Move to the ready posture"},
+    "release": {
+        "type": "null",
+        "description": "Open the fingers on the held object where it is, and draw back",
+    },
     "set_down": {
         "type": "null",
         "description": "Put the held object back to where it was grasped, and draw back",

@@ -9,8 +9,9 @@ from __future__ import annotations
 from katana450.extensions.programs import (
     grasp,
     moves,
+    pick,
+    place,
     pouring,
-    set_down,
     settings_steps,
     table,
     tool_moves,
@@ -25,7 +26,8 @@ STEPS: dict[str, type[Step]] = {
     **table.STEPS,
     **grasp.STEPS,
     **pouring.STEPS,
-    **set_down.STEPS,
+    **pick.STEPS,
+    **place.STEPS,
     **wait_for.STEPS,
 }
 """The class of each step by its name in a script."""

@@ -1,0 +1,301 @@
+"""The steps that put the held object somewhere: ``place``, ``set_down``, ``release``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.pouring import CUP
+from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject, Shape
+from katana450.arm.control.support import check_carried, surface_below
+from katana450.errors import InputError
+from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.actions import MoveFingers
+from katana450.extensions.programs.carry import APPROACHES, UP, before, carry
+from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.grasp import DOWN
+from katana450.extensions.programs.places import point
+from katana450.extensions.programs.plan_builder import Approach, PlanBuilder
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.source import YamlValue
+from katana450.extensions.programs.step import Step, nothing
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.turns import wrapped
+from katana450.maths.planning.curve import ToolLine
+from katana450.maths.planning.plan import MARGIN
+
+RELEASE_HEIGHT = MARGIN + 2e-4
+"""[m] Height over its support at which the fingers release an object."""
+
+MAX_FALL = 0.01
+"""[m] Maximum height from which ``release`` lets an object fall."""
+
+CARRY_HEIGHTS = (0.1, 0.07, 0.05, 0.03, 0.015)
+"""[m] Heights over its new place at which an object is brought there, tried from the highest."""
+
+YAW_TOLERANCE = math.radians(0.5)
+"""[rad] Difference up to which an object is turned as requested."""
+
+PLACED = 1e-12
+"""[m] Error up to which the tool is over the place."""
+
+ROUNDS = 50
+"""Maximum number of corrections of the tool's place; each leaves less than a third of the error."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceHeld:
+    """Put the held object down somewhere, upright, and draw back.
+
+    Attributes:
+        at: (3,) its place [m]; the last number, the height of its underside, is NaN for that of
+            whatever is below. None for the middle of ``on``.
+        in_base: whether ``at`` is in the base frame instead of {S}.
+        on: name of the object on which to place it; "" for whatever is below.
+        yaw: its angle about the vertical [rad]; None for any.
+    """
+
+    at: FloatArray | None
+    in_base: bool
+    on: str
+    yaw: float | None
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read {at: {x, y, z, yaw}, on}. Raises ScriptError."""
+        fields = Fields(value, "a place step")
+        at, yaw = fields.take("at", lambda each: _spot(each, setting), (None, None))
+        on = fields.take("on", read.text, "")
+        fields.done()
+        if at is None and not on:
+            raise value.wrong("`place` needs `at` or `on`.")
+        if at is not None and on and not math.isnan(at[2]):
+            raise value.wrong("Give either `on` or the height z, which follows from `on`.")
+        return cls(at, setting.in_base, on, yaw)
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the way and the release. Raises InputError if it is not possible."""
+        held = held_object(builder, "place")
+        spot = self._spot(builder, held)
+        try:
+            builder.first(
+                _turns(builder, held, spot, self.yaw),
+                lambda low: _bring(builder, held, low),
+            )
+        except InputError as error:
+            raise InputError(f"{held.name} cannot be placed there: {error}") from error
+
+    def _spot(self, builder: PlanBuilder, held: SceneObject) -> FloatArray:
+        """Return the place (3,) [m] of the underside in the base frame. Raises InputError."""
+        objects = [each for each in builder.state.objects if not each.carried]
+        at = np.zeros(3)
+        if self.on:
+            at = builder.scene_object(self.on).T[:3, 3]
+        if self.at is not None:
+            T = np.eye(4) if self.in_base else builder.plan_context.T_base_shoulder
+            at = T[:3, :3] @ np.nan_to_num(self.at) + T[:3, 3]
+        if self.at is None or math.isnan(self.at[2]):
+            high = _standing(held, np.array((at[0], at[1], MAX_COORDINATE)))
+            at = np.array((at[0], at[1], surface_below(objects, high)))
+        standing = _standing(held, at)
+        if self.on:
+            below = builder.scene_object(self.on)
+            if abs(surface_below([below], standing) - at[2]) > RELEASE_HEIGHT or at[2] <= 0.0:
+                raise InputError(
+                    f"{self.on} cannot carry {held.name} there: its top must be level, and the "
+                    f"middle of {held.name} over it."
+                )
+        check_carried(builder.plan_context.session.environment.table, objects, standing)
+        return at
+
+
+@dataclass(frozen=True)
+class SetDown:
+    """Put the held object back to its place of the grasp, and draw back."""
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the step, which takes no value. Raises ScriptError."""
+        nothing(value, "set_down")
+        return cls()
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the motions. Raises InputError if nothing is held, or there is no room."""
+        taken = builder.taken
+        if builder.state.grip is None or taken is None:
+            raise InputError("The hand holds no object that this program grasped.")
+        at = taken.at
+        above = replace(at, position=at.position * (1, 1, 0) + builder.at.position * UP)
+        carry(builder, above, "back")
+        low = replace(at, position=at.position + RELEASE_HEIGHT * UP)
+        builder.lead([ToolLine(above, low)], "set down")
+        let_go(builder)
+
+
+@dataclass(frozen=True)
+class Release:
+    """Open the fingers where the arm is, and draw back; the object stands on what is below it."""
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read the step, which takes no value. Raises ScriptError."""
+        nothing(value, "release")
+        return cls()
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the release. Raises InputError if the object would fall, or there is no room."""
+        held = held_object(builder, "release")
+        T = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
+        lifted = replace(held, T=T, held=False)
+        objects = [each for each in builder.state.objects if not each.carried]
+        below = surface_below(objects, lifted)
+        check_carried(
+            builder.plan_context.session.environment.table,
+            objects,
+            _standing(held, np.append(T[:2, 3], below)),
+        )
+        fall = float(T[2, 3]) - below
+        if fall > MAX_FALL:
+            raise InputError(
+                f"{held.name} would fall {1e3 * fall:.0f} mm. Lower it to at most "
+                f"{1e3 * MAX_FALL:.0f} mm first, or use `place`."
+            )
+        let_go(builder)
+
+
+def held_object(builder: PlanBuilder, step: str) -> SceneObject:
+    """Return the object between the fingers. Raises InputError with the remedy if there is none."""
+    for each in builder.state.objects:
+        if each.held:
+            return each
+    raise InputError(f"The hand holds nothing to {step}. `pick` an object first.")
+
+
+def let_go(builder: PlanBuilder) -> None:
+    """Append the opening of the fingers and the retreat. Raises InputError without room."""
+    at = builder.at
+    opened = builder.plan_context.arm.gripper.upper
+    builder.note("let go", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
+
+    def draw_back(away: float) -> None:
+        end = before(at.position, Approach(at.pitch, at.roll), away)
+        builder.lead([ToolLine(at, end)], "draw back")
+
+    try:
+        builder.first(APPROACHES, draw_back)
+    except InputError as error:
+        raise InputError(f"There is no room to draw back: {error}") from error
+    builder.taken = None
+
+
+def _spot(value: YamlValue, setting: ScriptContext) -> tuple[FloatArray, float | None]:
+    """Read {x, y, z, yaw} or the name of a pose; z is NaN if it is absent. Raises ScriptError."""
+    if value.kind != "mapping":
+        return point(value, setting), None
+    fields = Fields(value, "the place of an object")
+    x, y = (fields.need(name, read.millimetres(), 0.0) for name in "xy")
+    z = fields.take("z", read.millimetres(), math.nan)
+    yaw = fields.take("yaw", read.degrees(-360.0, 360.0), None)
+    fields.done()
+    return np.array((x, y, z)), yaw
+
+
+def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
+    """Return the held object upright with its underside at ``at`` (3,) [m] in the base frame."""
+    return replace(held, T=se3.from_rotation_translation(np.eye(3), at), held=False)
+
+
+def _bring(builder: PlanBuilder, held: SceneObject, low: ToolTarget) -> None:
+    """Plan the way to ``low``, from above, and the release there. Raises InputError."""
+    name = f"place {held.name}"
+
+    def down_from(height: float, *, straight: bool) -> None:
+        above = replace(low, position=low.position + height * UP)
+        if straight:
+            carry(builder, above, f"{name}: carry")
+        else:
+            builder.move_to(builder.joints_of(above), f"{name}: carry")
+        builder.lead([ToolLine(builder.at, low)], f"{name}: lower")
+        let_go(builder)
+
+    try:
+        builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=True))
+    except InputError:
+        # A way round obstacles may tilt the object, and the cup would spill.
+        if held.name == CUP:
+            raise
+        builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=False))
+
+
+def _turns(
+    builder: PlanBuilder, held: SceneObject, spot: FloatArray, yaw: float | None
+) -> list[ToolTarget]:
+    """Return the tool poses that hold the object over ``spot`` with this ``yaw``.
+
+    Only an object that is held from above can be turned. Raises InputError for another.
+    """
+    at = builder.at
+    natural, low = _tool_over(builder, held, spot, at)
+    symmetry = _symmetry(held)
+    if yaw is None or symmetry == 0.0:
+        return [low]
+    turn = math.remainder(yaw - natural, symmetry)
+    if abs(turn) <= YAW_TOLERANCE:
+        return [low]
+    if abs(at.pitch - DOWN) > YAW_TOLERANCE:
+        raise InputError(
+            f"it turns with the arm, and its yaw would be {math.degrees(natural):.1f} deg there "
+            f"instead of {math.degrees(yaw):g}. Pick it with `side: above`, or leave out the yaw."
+        )
+    count = round(math.tau / symmetry)
+    rolls = sorted((wrapped(at.roll - turn + each * symmetry) for each in range(count)), key=abs)
+    return [_tool_over(builder, held, spot, replace(at, roll=roll))[1] for roll in rolls]
+
+
+def _tool_over(
+    builder: PlanBuilder, held: SceneObject, spot: FloatArray, at: ToolTarget
+) -> tuple[float, ToolTarget]:
+    """Return the yaw [rad] of the object over ``spot``, and the tool there.
+
+    The tool has the pitch and roll of ``at``, and holds the object as it does now.
+    """
+    chain, T_base_shoulder = builder.chain, builder.plan_context.T_base_shoulder
+    environment = builder.plan_context.session.environment
+    T_base_object = environment.pose(held, builder.state.x_setpoint)
+    T_base_tool = T_base_shoulder @ forward(chain, builder.q)
+    T_tool_object = se3.inverse(T_base_tool) @ T_base_object
+    goal = builder.point(spot + RELEASE_HEIGHT * UP, in_base=True)
+    branch = branch_of(chain, builder.q)
+    position = goal
+    for _ in range(ROUNDS):
+        tool = replace(at, position=position)
+        T = tool.pose(chain, tool.facing(chain, branch, float(builder.q[0]))) @ T_tool_object
+        error = goal - T[:3, 3]
+        if float(np.abs(error).max()) <= PLACED:
+            break
+        position = position + error
+    R = T_base_shoulder[:3, :3] @ T[:3, :3]
+    return math.atan2(R[1, 0], R[0, 0]), tool
+
+
+def _symmetry(held: SceneObject) -> float:
+    """Return the angle [rad] by which the object may turn and look the same; 0 for any."""
+    match held.shape:
+        case Shape.CYLINDER | Shape.SPHERE:
+            return 0.0
+        case Shape.BOX:
+            along_x, along_y, _ = held.extent
+            return 0.5 * math.pi if math.isclose(along_x, along_y) else math.pi
+    return math.tau
+
+
+STEPS: dict[str, type[Step]] = {"place": PlaceHeld, "set_down": SetDown, "release": Release}
+"""Steps of this module, by their names in a script."""

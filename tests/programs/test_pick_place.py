@@ -1,0 +1,183 @@
+"""Tests of the steps that pick objects up, place them, stack them and let them go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.geometry import se3, so3
+from tests.programs.conftest import Stage
+
+NEAR, AT = (240.0, 90.0), (230.0, -120.0)
+"""[mm] Places on the table that the arm reaches from above."""
+
+
+def box(
+    name: str,
+    at: tuple[float, float],
+    size: tuple[float, ...] = (40.0, 40.0, 60.0),
+    *,
+    yaw: float = 0.0,
+    shape: Shape = Shape.BOX,
+) -> SceneObject:
+    """Return an object that can be held; lengths in mm, the yaw in deg."""
+    T = se3.from_rotation_translation(so3.rotation_z(np.radians(yaw)), 1e-3 * np.array((*at, 0.0)))
+    return SceneObject(name, shape, tuple(1e-3 * each for each in size), T, can_be_held=True)
+
+
+def planned(stage: Stage, steps: str, *objects: SceneObject) -> tuple[Program, State]:
+    start = replace(stage.begin(), objects=objects, poured=None)
+    return compiled(parse(f"frame: base\nsteps:\n{steps}"), stage.plan_context, start), start
+
+
+def played(stage: Stage, steps: str, *objects: SceneObject) -> dict[str, SceneObject]:
+    """Run the steps; return the objects at the end by their names."""
+    program, start = planned(stage, steps, *objects)
+    run, states = stage.play(program, start)
+    assert run.phase is Phase.DONE
+    assert all(not state.findings for state in states[::10])
+    return {each.name: each for each in states[-1].objects}
+
+
+def place(scene_object: SceneObject) -> list[float]:
+    """Return x, y, z [mm] of an object, which must stand upright and free."""
+    assert not scene_object.held
+    assert scene_object.T[2, 2] == pytest.approx(1.0, abs=1e-12)
+    x, y, z = (1e3 * scene_object.T[:3, 3]).tolist()
+    return [x, y, z]
+
+
+def yaw(scene_object: SceneObject) -> float:
+    return float(np.degrees(np.arctan2(scene_object.T[1, 0], scene_object.T[0, 0])))
+
+
+@pytest.mark.parametrize("side", ["above", pytest.param("front", marks=pytest.mark.long)])
+def test_box_is_placed_where_the_script_says(stage: Stage, side: str) -> None:
+    steps = f"- pick: {{object: part, side: {side}}}\n- place: {{at: {{x: 230, y: -120}}}}\n"
+    end = played(stage, steps, box("part", NEAR, yaw=18.0))
+    assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)
+
+
+def test_box_is_turned_as_the_script_says(stage: Stage) -> None:
+    steps = "- pick: part\n- place: {at: {x: 230, y: -120, yaw: 25}}\n"
+    end = played(stage, steps, box("part", NEAR, (30.0, 45.0, 60.0), yaw=50.0))
+    assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)
+    # Half a turn looks the same.
+    assert yaw(end["part"]) % 180.0 == pytest.approx(25.0, abs=1e-6)
+
+
+@pytest.mark.long
+def test_cylinder_is_placed_in_the_frame_of_the_shoulder(stage: Stage) -> None:
+    z = 1e3 * float(stage.plan_context.T_base_shoulder[2, 3])
+    start = replace(
+        stage.begin(), objects=(box("can", (320.0, 60.0), (20.0, 60.0), shape=Shape.CYLINDER),)
+    )
+    text = f"steps:\n- pick: can\n- place: {{at: {{x: 300, y: -120, z: {-z!r}}}}}\n"
+    program = compiled(parse(text), stage.plan_context, replace(start, poured=None))
+    _, states = stage.play(program, replace(start, poured=None))
+    assert place(states[-1].objects[0]) == pytest.approx([300.0, -120.0, 0.0], abs=1e-6)
+
+
+def test_three_boxes_are_stacked(stage: Stage) -> None:
+    steps = "- stack: {object: b, on: a}\n- stack: {object: c, on: b}\n- home\n"
+    end = played(
+        stage,
+        steps,
+        box("a", (240.0, -100.0), (50.0, 50.0, 40.0)),
+        box("b", (240.0, 60.0), (40.0, 40.0, 50.0), yaw=13.0),
+        box("c", (120.0, 220.0), (40.0, 40.0, 50.0), yaw=45.0),
+    )
+    assert [place(end[name])[2] for name in "abc"] == pytest.approx([0.0, 40.0, 90.0], abs=1e-9)
+    assert place(end["c"])[:2] == pytest.approx([240.0, -100.0], abs=1e-6)
+
+
+def test_stacked_box_is_picked_from_the_stack_again(stage: Stage) -> None:
+    steps = (
+        "- stack: {object: b, on: a}\n"
+        "- pick: b\n- place: {at: {x: 170, y: 200}}\n"
+        "- pick: a\n- place: {on: b}\n"
+    )
+    end = played(
+        stage,
+        steps,
+        box("a", (240.0, -100.0), (40.0, 40.0, 50.0)),
+        box("b", (240.0, 60.0), (40.0, 40.0, 50.0)),
+    )
+    assert place(end["b"]) == pytest.approx([170.0, 200.0, 0.0], abs=1e-6)
+    assert place(end["a"]) == pytest.approx([170.0, 200.0, 50.0], abs=1e-6)
+
+
+def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
+    steps = "- pick: b\n- line: {by: {z: -53}}\n- release\n- home\n"
+    end = played(stage, steps, box("b", NEAR))
+    assert place(end["b"]) == pytest.approx([*NEAR, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [
+        ("- pick: box\n", "no object 'box'. Known objects: part, low, far"),
+        ("- pick: low\n", "low cannot be grasped.* and table would touch first"),
+        ("- pick: far\n", r"far cannot be grasped at its place: The tool grasp cannot be at"),
+        ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
+        ("- release\n", "The hand holds nothing to release"),
+        ("- pick: part\n- pick: low\n", "already holds an object"),
+        ("- pick: part\n- release\n", "part would fall 60 mm. Lower it to at most 10 mm"),
+        ("- pick: part\n- place: {at: {x: 230, y: 720}}\n", "nothing carries it there"),
+        ("- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n", "put it 30.0 mm lower"),
+        ("- pick: part\n- place: {on: ball}\n", "ball cannot carry part"),
+        ("- pick: part\n- place: {on: far, at: {x: 230, y: -120}}\n", "far cannot carry part"),
+        ("- pick: part\n- place: {at: {x: 180, y: 150}}\n", "cannot be placed there: .*low"),
+        ("- pick: {object: part, side: front}\n", "its sides are skew, so the fingers"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_its_reason(
+    stage: Stage, steps: str, message: str
+) -> None:
+    objects = (
+        box("part", NEAR, yaw=60.0),
+        box("low", (170.0, 190.0), (40.0, 40.0, 15.0)),
+        box("far", (550.0, -100.0)),
+        replace(box("ball", (100.0, -250.0), (20.0,), shape=Shape.SPHERE), can_be_held=False),
+    )
+    with pytest.raises(InputError, match=message):
+        planned(stage, steps, *objects)
+
+
+def test_object_held_from_the_front_is_not_turned(stage: Stage) -> None:
+    steps = "- pick: {object: part, side: front}\n- place: {at: {x: 300, y: -120, yaw: 45}}\n"
+    with pytest.raises(ScriptError, match=r"its yaw would be .* Pick it with `side: above`"):
+        planned(stage, steps, box("part", (320.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        ("place: {}", "`place` needs `at` or `on`"),
+        ("place: {on: a, at: {x: 1, y: 2, z: 3}}", "either `on` or the height z"),
+        ("place: {at: {x: 1}}", "The place of an object needs 'y'"),
+        ("place: a", "A place step must be a mapping"),
+        ("stack: {object: a, on: a}", "a cannot stand on itself"),
+        ("stack: {object: a}", "A stack needs 'on'"),
+        ("pick: {object: a, side: left}", "Expected one of front, above"),
+        ("release: a", "`release` takes no value"),
+    ],
+)
+def test_mistakes_are_reported_with_their_place(step: str, message: str) -> None:
+    with pytest.raises(ScriptError, match=rf"line 2, column \d+: .*{message}"):
+        parse(f"steps:\n- {step}\n")
+
+
+def test_cup_is_poured_only_if_held_from_the_front(stage: Stage) -> None:
+    text = "frame: base\nsteps:\n- pick: {object: cup, side: above}\n"
+    with pytest.raises(ScriptError, match="from above the wrist could not pour it"):
+        compiled(parse(text), stage.plan_context, stage.begin())
