@@ -90,6 +90,7 @@ def test_every_control_of_the_panel_has_a_name_and_can_be_hit(
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_chosen_option_of_a_list_is_shown_whole(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=("/arm", MOVE), window=WIDE)
     take(page)
@@ -112,6 +113,7 @@ def test_chosen_option_of_a_list_is_shown_whole(server: AppServer, open_page: Op
     assert page.frame.evaluate(cut) == []
 
 
+@pytest.mark.long
 def test_hint_goes_when_its_control_is_used(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=("/arm", MOVE))
     hint = page.frame.get_by_role("tooltip")

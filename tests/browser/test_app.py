@@ -142,6 +142,7 @@ def pitch_of(T: FloatArray) -> float:
     return math.asin(-T[2, 0])
 
 
+@pytest.mark.long
 def test_picture_is_opaque_while_viser_would_draw_it_faintly(robot: Robot) -> None:
     assert robot.page.frame.evaluate(FAINTEST) == "1"
 
@@ -157,6 +158,7 @@ def test_arm_follows_the_dragged_arrow(robot: Robot, artefacts: Path) -> None:
     robot.page.keep(artefacts / "app-arrow.png")
 
 
+@pytest.mark.long
 def test_tool_turns_with_the_arm_in_a_sideways_drag(robot: Robot) -> None:
     start = robot.drawn()
     robot.page.drag_arrow(MOVE, "y", 0.12)
@@ -178,6 +180,7 @@ def test_the_pitch_ring_turns_the_tool_about_its_point(robot: Robot, artefacts: 
     robot.page.keep(artefacts / "app-pitch.png")
 
 
+@pytest.mark.long
 def test_the_roll_ring_turns_the_tool_about_itself(robot: Robot) -> None:
     start = robot.drawn()
     before = robot.q
@@ -199,6 +202,7 @@ def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artef
     robot.page.keep(artefacts / "app-slider.png")
 
 
+@pytest.mark.long
 def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot) -> None:
     node, since = robot.path["pan_link"], time.time()
     robot.page.drag_slider("1 base turn", 120.0)
@@ -322,6 +326,7 @@ def test_typed_pose_reports_the_impossible_yaw(robot: Robot) -> None:
     assert f"{off:.0f}° off" in robot.text()
 
 
+@pytest.mark.long
 def test_browsers_show_the_same_arm_and_drive_it_in_turn(
     robot: Robot, server: AppServer, open_page: OpenPage
 ) -> None:

@@ -92,6 +92,7 @@ def test_each_window_looks_from_where_its_person_asks(
     assert page.errors == other.errors == []
 
 
+@pytest.mark.long
 def test_a_theme_is_of_one_window(pair: tuple[ViserPage, ViserPage], artefacts: Path) -> None:
     page, other = pair
 

@@ -109,10 +109,7 @@ def test_stop_is_always_visible_and_the_largest_button(
 
 @pytest.mark.parametrize(
     "size",
-    [
-        each if each in (WIDE, PORTRAIT) else pytest.param(each, marks=pytest.mark.long)
-        for each in ROOM
-    ],
+    [each if each == PORTRAIT else pytest.param(each, marks=pytest.mark.long) for each in ROOM],
 )
 def test_bar_keeps_its_height_and_the_reason_its_room(
     server: AppServer, open_page: OpenPage, artefacts: Path, size: tuple[int, int]
@@ -225,6 +222,7 @@ def test_the_page_is_small() -> None:
     assert sum(path.stat().st_size for path in (STATIC / "instruments").iterdir()) < 70_000
 
 
+@pytest.mark.long
 def test_access_link_signs_in_and_leaves_no_trace(
     browser: Any, tmp_path: Path, artefacts: Path
 ) -> None:

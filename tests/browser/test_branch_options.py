@@ -41,6 +41,7 @@ def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
         yield page
 
 
+@pytest.mark.long
 def test_branches_are_shown_and_one_is_taken(
     page: ViserPage, arm: MountedArm, artefacts: Path
 ) -> None:

@@ -50,6 +50,7 @@ def drag_to_the_gap(page: ViserPage) -> None:
     page.wait_until(lambda: page.page.locator("#go").is_visible(), "the offer", seconds=20.0)
 
 
+@pytest.mark.long
 def test_detour_is_offered_in_the_sentence_and_taken_by_enter_or_go(
     page: ViserPage, artefacts: Path
 ) -> None:

@@ -51,7 +51,7 @@ def pixel_of(page: ViserPage, reader: Client, name: str) -> tuple[float, float]:
     return page.project(T[:3, 3] + (0.0, 0.0, 0.5 * found.size[-1]))
 
 
-@pytest.mark.parametrize("document", ["scene", "page"])
+@pytest.mark.parametrize("document", ["scene", pytest.param("page", marks=pytest.mark.long)])
 def test_dropped_file_is_put_on_the_table(page: ViserPage, reader: Client, document: str) -> None:
     before = names(reader)
     data = trimesh.creation.box((30.0, 30.0, 30.0)).export(file_type="stl")
@@ -92,6 +92,7 @@ def test_clicked_object_is_removed_by_delete_and_returns(
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_bar_of_an_object_at_the_edge_stays_below_stop(page: ViserPage, reader: Client) -> None:
     page.page.mouse.click(*pixel_of(page, reader, "cup"))
     page.page.wait_for_selector("#selection:not([hidden])")
@@ -145,6 +146,7 @@ def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> 
     assert np.allclose(truth.status()["q"], moved, atol=1e-6)
 
 
+@pytest.mark.long
 def test_undo_names_the_stops_that_its_page_knows(new_page: ViserPage, truth: Truth) -> None:
     """An undo that waits on its way while the arm is stopped and cleared is refused."""
     page, start = new_page, np.array(truth.status()["goal"])
@@ -166,6 +168,7 @@ def test_undo_names_the_stops_that_its_page_knows(new_page: ViserPage, truth: Tr
     assert not np.allclose(moved, start, atol=1e-2)
 
 
+@pytest.mark.long
 def test_undo_is_on_the_letter_z_and_needs_a_connection(page: ViserPage) -> None:
     press = """([code, key]) => document.body.dispatchEvent(
         new KeyboardEvent("keydown", {code, key, ctrlKey: true, bubbles: true}))"""
@@ -177,6 +180,7 @@ def test_undo_is_on_the_letter_z_and_needs_a_connection(page: ViserPage) -> None
     page.wait_until(lambda: "ndo" in bar(page, "toast"), "the undo")
 
 
+@pytest.mark.long
 def test_undo_in_a_text_box_is_that_of_the_browser(page: ViserPage, truth: Truth) -> None:
     start = np.array(truth.status()["goal"])
     page.drag_arrow(MOVE, "y", 0.1)

@@ -121,6 +121,7 @@ def test_pouring_is_planned_with_progress_and_runs(
     assert truth.status()["water"]["basin_ml"] > 190.0
 
 
+@pytest.mark.long
 def test_pouring_leaves_another_program_paused(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=("/arm", MOVE), script=f"{FIRST_VISIT}{WORKER}")
     truth = Truth(server)
@@ -164,6 +165,7 @@ def test_planning_is_shown_and_a_stop_ends_it(visit: ViserPage, server: AppServe
     Truth(server).wait(stopped=None)
 
 
+@pytest.mark.long
 def test_card_is_dismissed_for_good_and_returns_by_the_help(visit: ViserPage) -> None:
     window = visit.page
     # The card has no focus of its own; its buttons can be reached and pressed by keys.
@@ -184,6 +186,7 @@ def test_card_is_dismissed_for_good_and_returns_by_the_help(visit: ViserPage) ->
     window.wait_for_selector("#welcome:not([hidden])")
 
 
+@pytest.mark.long
 def test_window_without_storage_shows_the_card(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=("/arm",), script=f"{FIRST_VISIT}{NO_STORAGE}")
     page.page.wait_for_selector("#welcome:not([hidden])")
@@ -230,7 +233,8 @@ def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
         assert found["shown"] == 0
 
 
-@pytest.mark.parametrize("size", ["portrait", pytest.param("landscape", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("size", ["portrait", "landscape"])
 def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
     server: AppServer, open_page: OpenPage, size: str
 ) -> None:
@@ -249,7 +253,7 @@ def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
     assert hit == "welcome"
 
 
-@in_sizes_and_schemes(SIZES, ("wide", "light"), ("portrait", "dark"))
+@in_sizes_and_schemes(SIZES, ("portrait", "dark"))
 def test_card_fits_every_size(
     server: AppServer, open_page: OpenPage, size: str, scheme: str, artefacts: Path
 ) -> None:

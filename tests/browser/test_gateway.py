@@ -156,6 +156,7 @@ def test_arm_is_handed_over(
     assert other.errors == []
 
 
+@pytest.mark.long
 def test_reloaded_page_still_drives(new_page: ViserPage) -> None:
     name = bar(new_page, "name")
     new_page.page.reload()

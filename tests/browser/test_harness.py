@@ -110,6 +110,7 @@ def test_a_number_is_typed_beside_a_slider(page: ViserPage) -> None:
     )
 
 
+@pytest.mark.long
 def test_a_second_window_sees_the_same_pose(
     page: ViserPage, open_page: OpenPage, server: AppServer
 ) -> None:

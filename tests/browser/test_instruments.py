@@ -285,6 +285,7 @@ BROKEN = (
 )
 
 
+@pytest.mark.long
 def test_damaged_layout_is_repaired(page: ViserPage) -> None:
     first = places(page)
     for kept in BROKEN:

@@ -79,6 +79,7 @@ def test_one_press_is_one_step(sheet: ViserPage, truth: Truth, artefacts: Path) 
     truth.wait(10.0, moving=False)
 
 
+@pytest.mark.long
 def test_key_held_while_a_step_is_chosen_is_released(sheet: ViserPage, truth: Truth) -> None:
     sheet.page.keyboard.down("KeyA")
     truth.wait(moving=True)

@@ -86,6 +86,7 @@ def drag(page: ViserPage, start: Pixel, by: Pixel, *, steps: int = 10) -> None:
         page.page.wait_for_timeout(30)
 
 
+@pytest.mark.long
 def test_link_under_the_mouse_is_named_and_highlighted(
     page: ViserPage, links: list[str], artefacts: Path
 ) -> None:
@@ -250,7 +251,8 @@ def test_stop_ends_a_drag_and_a_stopped_arm_refuses_another(
     clear_stop(page, truth)
 
 
-@pytest.mark.parametrize("loss", ["pointercancel", pytest.param("blur", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("loss", ["pointercancel", "blur"])
 def test_lost_pointer_ends_the_drag_and_the_arm_holds(
     page: ViserPage, links: list[str], truth: Truth, loss: str
 ) -> None:

@@ -146,6 +146,7 @@ SLOW = 0.05
 """Fraction of full speed at which the arm still moves after the reload."""
 
 
+@pytest.mark.long
 def test_reload_during_a_drag_stops_the_arm_with_a_reason(
     open_page: OpenPage, artefacts: Path
 ) -> None:
@@ -191,6 +192,7 @@ def test_reload_during_a_drag_stops_the_arm_with_a_reason(
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_closed_window_frees_the_arm_and_a_reloaded_one_keeps_it(open_page: OpenPage) -> None:
     with AppServer(APP) as server:
         truth = Truth(server)

@@ -21,6 +21,7 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 def test_person_chooses_a_name_and_saves_picture_and_link(
     server: AppServer, open_page: OpenPage, tmp_path: Path, artefacts: Path
 ) -> None:

@@ -109,6 +109,7 @@ def poll(program: Client) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.long
 def test_disconnected_page_says_why_and_comes_back(site: Site, browser: Browser) -> None:
     url = site.server.url
     boss, token = site.link("Ada", Role.ADMIN), site.link("Kai", Role.OPERATOR)
@@ -155,6 +156,7 @@ def test_page_of_a_muted_viewer_shows_that_a_stop_did_not_count(
         assert other.get_attribute("body", "data-mood") != "stopped"
 
 
+@pytest.mark.long
 def test_disconnected_person_stops_the_arm_on_a_phone(
     site: Site, browser: Browser, artefacts: Path
 ) -> None:
@@ -179,6 +181,7 @@ def test_disconnected_person_stops_the_arm_on_a_phone(
             assert guard.query(answers.State).stopped == "Kai pressed STOP."
 
 
+@pytest.mark.long
 def test_link_is_revoked_by_the_second_click(site: Site, browser: Browser) -> None:
     url = site.server.url
     boss, token = site.link("Ada", Role.ADMIN), site.link("Rita", Role.VIEWER)
@@ -201,6 +204,7 @@ def test_link_is_revoked_by_the_second_click(site: Site, browser: Browser) -> No
         assert all(grant.name != "Rita" for grant in site.file.grants.values())
 
 
+@pytest.mark.long
 def test_closed_list_of_people_is_not_queried(site: Site, browser: Browser) -> None:
     with visiting(browser, f"{site.server.url}/#{site.link('Ada', Role.ADMIN)}") as page:
         page.evaluate(COUNT_QUERIES)

@@ -25,6 +25,7 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 @pytest.mark.skipif(own_address() is None, reason="this machine is in no network")
 @pytest.mark.parametrize(
     ("size", "scheme"),

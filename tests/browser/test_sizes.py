@@ -209,6 +209,7 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_buttons_of_the_lease_fit_on_a_phone(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=("/arm",), window=PORTRAIT, **PHONE)
     with connect(server.url, "An arm driver with a long name") as other:

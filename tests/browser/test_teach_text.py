@@ -97,6 +97,7 @@ def test_space_in_the_text_stops_a_moving_arm(sheet: ViserPage, truth: Truth) ->
     clear_stop(sheet, truth)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "content",
     [
@@ -120,6 +121,7 @@ def test_broken_content_of_the_browser_is_refused(
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_script_is_saved_in_the_folder_and_listed(
     sheet: ViserPage, truth: Truth, folder: Path
 ) -> None:

@@ -131,6 +131,7 @@ def test_double_click_looks_at_a_point(page: ViserPage) -> None:
     assert np.allclose(camera(page), after, atol=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", SIZES)
 def test_cube_covers_no_other_control(
     server: AppServer, open_page: OpenPage, size: tuple[int, int], artefacts: Path

@@ -283,6 +283,7 @@ def test_hint_belongs_to_the_row_of_its_control(page: ViserPage) -> None:
     page.wait_until(lambda: ask(page, shown) == 0, "no hint")
 
 
+@pytest.mark.long
 def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=NODES, window=PORTRAIT, script=script())
     count = "document.querySelectorAll(Viser.{}).length"
@@ -316,6 +317,7 @@ def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page
         page.wait_until(lambda: ask(page, count.format("PANEL")) == 0, "the docked panel")
 
 
+@pytest.mark.long
 def test_page_connects_again_only_with_the_focus(open_page: OpenPage) -> None:
     blurred = "document.hasFocus = () => false;"
     with AppServer(APP) as server, part("keepFocus"):
@@ -329,6 +331,7 @@ def test_page_connects_again_only_with_the_focus(open_page: OpenPage) -> None:
         assert not left.connected
 
 
+@pytest.mark.long
 def test_page_needs_no_code_from_text(server: AppServer, open_page: OpenPage) -> None:
     with part("forgoCode"):
         page = open_page(server.url, nodes=NODES, script=script())
@@ -337,6 +340,7 @@ def test_page_needs_no_code_from_text(server: AppServer, open_page: OpenPage) ->
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_page_obeys_a_server_that_its_address_names(server: AppServer, open_page: OpenPage) -> None:
     with AppServer(APP) as other, part("websocket"):
         address = f"{other.url}/?websocket={server.url.replace('http', 'ws', 1)}"
@@ -346,6 +350,7 @@ def test_page_obeys_a_server_that_its_address_names(server: AppServer, open_page
         assert ask(page, "tapped.address") == server.url.replace("http", "ws", 1)
 
 
+@pytest.mark.long
 def test_page_plays_the_recording_that_its_address_names(
     server: AppServer, open_page: OpenPage
 ) -> None:

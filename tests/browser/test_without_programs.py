@@ -20,6 +20,7 @@ def server(tmp_path: Path) -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 def test_page_drives_stops_and_offers_no_programs(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
