@@ -18,7 +18,7 @@ from katana450.arm.control.stop_cause import pressed
 from katana450.arm.drivers.driver import SentSetpoint
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -222,7 +222,7 @@ def test_stop_does_not_wait_for_the_next_tick(arm: ArmModel, session: Session) -
     assert state.t == at[0]
 
 
-def test_flood_of_stops_adds_one_tick_per_period(arm: ArmModel, session: Session) -> None:
+def test_flood_of_stops_adds_at_most_one_tick_per_period(arm: ArmModel, session: Session) -> None:
     clock, mailbox = ClockOfPresses(10), Mailbox(session.check)
     loop = ControlLoop(session, SimulatedDriver(arm, session.ready, 0.0), mailbox, clock, RATE)
     numbers = iter(range(1000))
@@ -234,8 +234,33 @@ def test_flood_of_stops_adds_one_tick_per_period(arm: ArmModel, session: Session
     clock.press, clock.end = press, loop._stopping.set
     begun = clock.t
     loop._run()
-    assert loop.ticks == 20
-    assert clock.t == pytest.approx(begun + 10 / RATE)
+    assert loop.state_publisher.snapshot.state.stopped is not None
+    assert loop.ticks <= 2 * round((clock.t - begun) * RATE)
+
+
+def test_arm_at_rest_ticks_seldom_and_moves_at_once(arm: ArmModel, session: Session) -> None:
+    clock, mailbox = ClockOfPresses(12), Mailbox(session.check)
+    loop = ControlLoop(session, SimulatedDriver(arm, session.ready, 0.0), mailbox, clock, RATE)
+    given: list[float] = []
+    states = []
+
+    def give() -> None:
+        states.append(loop.state_publisher.snapshot.state)
+        if clock.left == 6:
+            given.append(clock.t)
+            mailbox.put(cmd.SetJoint(0, 0.4))
+
+    clock.press, clock.end = give, loop._stopping.set
+    begun = clock.t
+    loop._run()
+    # One period, and five rests, the last of which the command cuts short.
+    assert given[0] - begun == pytest.approx(5 * REST_PERIOD + 0.1 / RATE)
+    moving = states[6]
+    assert moving.t == given[0]
+    # The first step is that of one period, however long the arm rested.
+    step = float(np.abs(moving.setpoint - states[0].setpoint).max())
+    assert step == pytest.approx(float(arm.limits.jerk[0]) / RATE**3 / 6.0)
+    assert states[7].t - moving.t == pytest.approx(1 / RATE)
 
 
 def test_loop_runs_and_stops_on_the_machine_clock(arm: ArmModel, session: Session) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -30,6 +31,9 @@ from katana450.errors import InputError
 
 COMMAND_TIMEOUT = 0.5
 """[s] Silence of the arm's process after which only a stop is sent to it."""
+
+REST_HEARTBEAT = 0.05
+"""[s] Interval of the heartbeats to an arm at rest: less than a quarter of its silence timeout."""
 
 RECONNECT_INTERVAL = 0.05
 """[s] Interval of the attempts to connect to a new process of the arm."""
@@ -63,6 +67,8 @@ class FrontEnd:
         self._sending = threading.Lock()
         self._unsent: deque[CommandMessage] = deque()
         self._number = 0
+        self._drivers: tuple[str, ...] = ()
+        self._beaten = -math.inf
         self._plans = PlanStore()
         first = _loaded(pipe.recv_bytes(), self._plans)
         if first is None:
@@ -138,9 +144,16 @@ class FrontEnd:
         return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
 
     def heartbeat(self, drivers: tuple[str, ...] = ()) -> None:
-        """Send a heartbeat with the ``drivers``, unless commands still wait to be sent."""
+        """Send a heartbeat with the ``drivers``, unless commands still wait to be sent.
+
+        An arm at rest needs them seldom; the command that moves it counts as one.
+        """
         with self._sending:
-            if self._flush() and self._connected:
+            if not (self._flush() and self._connected):
+                return
+            now, resting = time.monotonic(), not self.state_publisher.snapshot.state.moving
+            if not resting or drivers != self._drivers or now - self._beaten >= REST_HEARTBEAT:
+                self._drivers, self._beaten = drivers, now
                 self._send(Heartbeat(drivers))
 
     def close(self) -> None:

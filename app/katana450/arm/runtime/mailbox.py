@@ -88,6 +88,8 @@ class Mailbox:
         self._tickets = 0
         self.stop_waits = threading.Event()
         """Set while a STOP waits for its tick."""
+        self.command_waits = threading.Event()
+        """Set while any command waits for its tick."""
 
     def put(self, command: Command, actor: Actor | None = None) -> int:
         """Leave ``command`` for the next tick, and return its ticket. Never blocks for long.
@@ -97,6 +99,7 @@ class Mailbox:
         """
         self._check(command)
         with self._lock:
+            self.command_waits.set()
             replaced: list[int] = []
             if isinstance(command, Stop):
                 if not self._presses.counts(command):
@@ -135,6 +138,7 @@ class Mailbox:
             )
             self._waiting, self._of_waiting, self._dropped, self._repeated = [], [], [], []
             self.stop_waits.clear()
+            self.command_waits.clear()
             return drained
 
     @property
