@@ -47,6 +47,11 @@ class Runner:
         self.hub = hub
         self.options = options
 
+    @property
+    def running(self) -> bool:
+        """True while a run drives the arm."""
+        return False
+
     def handle(self, participant: Participant, request: Request) -> answers.Answer:  # noqa: ARG002
         """Execute ``request``, one of ``request_types``, and return its answer.
 
