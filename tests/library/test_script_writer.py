@@ -46,6 +46,7 @@ steps:
 - grasp: {object: cup, pitch: 30}
 - pour: {into: basin, shake: 2}
 - set_down
+- pour: {into: basin, ml: 50}
 - pick: cup
 - place: {at: {x: 300, y: 40, yaw: 20}, on: box}
 - stack: {object: cup, on: box}
@@ -92,6 +93,7 @@ def everything() -> katana450.ScriptWriter:
         p.grasp("cup", pitch=30)
         p.pour("basin", shake=2)
         p.set_down()
+        p.pour("basin", ml=50)
         p.pick("cup")
         p.place({"x": 300, "y": 40, "yaw": 20}, on="box")
         p.stack("cup", on="box")

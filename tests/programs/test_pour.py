@@ -16,7 +16,9 @@ from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
+from katana450.maths.water.flow import Water
 from katana450.maths.water.score import score
+from katana450.maths.water.units import MILLILITRE
 from tests.programs.conftest import Stage
 
 
@@ -79,3 +81,56 @@ def test_invalid_start_scene_is_refused_before_motion(
     (problem,) = refused.value.problems
     assert said in problem.text
     assert problem.line > 0
+
+
+PART = """\
+frame: base
+steps:
+- fill: {0}
+- grasp: cup
+- line: {{by: {{z: 140}}}}
+{1}- set_down
+- home
+"""
+"""A script that fills the cup [ml] and has steps in which it is poured."""
+
+
+def poured(stage: Stage, full: float, *parts: float) -> Water:
+    """Pour parts of a cup [ml] into the basin; return the water at the end."""
+    pours = "".join(f"- pour: {{into: basin, ml: {part:g}}}\n" for part in parts)
+    program = compiled(parse(PART.format(full, pours)), stage.plan_context, stage.begin())
+    run, states = stage.play(program, stage.begin(), most=20_000)
+    assert run.phase is Phase.DONE
+    assert states[-1].poured is not None
+    return states[-1].poured.water
+
+
+@pytest.mark.parametrize(
+    "full",
+    [60.0, *(pytest.param(full, marks=pytest.mark.long) for full in (100.0, 140.0, 180.0, 220.0))],
+)
+def test_half_of_the_water_is_poured(stage: Stage, full: float) -> None:
+    water = poured(stage, full, 0.5 * full)
+    assert water.basin / MILLILITRE == pytest.approx(0.5 * full, rel=0.02)
+    assert water.spilled == 0
+
+
+@pytest.mark.long
+def test_water_is_poured_in_parts(stage: Stage) -> None:
+    water = poured(stage, 180.0, 50.0, 60.0)
+    assert water.basin / MILLILITRE == pytest.approx(110.0, rel=0.02)
+    assert water.spilled == 0
+
+
+@pytest.mark.parametrize(
+    ("pour", "message"),
+    [
+        ("- pour: {into: basin, ml: 120}\n", "The cup holds 100.0 ml at this step.* 120 ml"),
+        ("- pour: basin\n- pour: {into: basin, ml: 5}\n", "The cup holds 0.0 ml at this step"),
+        ("- pour: {into: basin, ml: 50, shake: 2}\n", "leave out `shake` or `ml`"),
+        ("- pour: {into: basin, ml: 0}\n", "0 is not between 1 and 1000 ml"),
+    ],
+)
+def test_part_that_cannot_be_poured_is_refused(stage: Stage, pour: str, message: str) -> None:
+    with pytest.raises(ScriptError, match=message):
+        compiled(parse(PART.format(100, pour)), stage.plan_context, stage.begin())

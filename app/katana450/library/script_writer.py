@@ -248,9 +248,10 @@ class ScriptWriter:
         """Open the fingers on the held object where it is."""
         self._steps.append("release")
 
-    def pour(self, into: str, *, shake: int | None = None) -> None:
-        """Pour the water of the cup in the hand into an object."""
-        self._add("pour", into if shake is None else {"into": into, "shake": shake})
+    def pour(self, into: str, *, ml: Number | None = None, shake: int | None = None) -> None:
+        """Pour the water of the cup in the hand into an object: all of it, or some [ml]."""
+        more = _given(ml=ml, shake=shake)
+        self._add("pour", {"into": into, **more} if more else into)
 
     def set_down(self) -> None:
         """Put the held object back to where it was grasped."""

@@ -30,6 +30,7 @@ from katana450.maths.planning.curve import Curve
 from katana450.maths.planning.path import Path, joint_derivatives
 from katana450.maths.planning.plan import JOIN_TOLERANCE, check_clear
 from katana450.maths.planning.tool_path import ToolPath
+from katana450.maths.water.units import FEMTOLITRE
 
 W = TypeVar("W")
 L = TypeVar("L")
@@ -270,9 +271,21 @@ class PlanBuilder:
     def standing(self, q: FloatArray) -> State:
         """Return the state of the arm at rest at ``q`` (5,) [rad]."""
         q, branch = frozen(q), branch_of(self.plan_context.arm.chain, q)
-        return replace(
-            self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE
+        return self._with_still_water(
+            replace(self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE)
         )
+
+    def predict_water(self, volume: float) -> None:
+        """Continue with ``volume`` [m^3] of water in the cup."""
+        self.state = self._with_still_water(self.state, volume)
+
+    def _with_still_water(self, state: State, volume: float | None = None) -> State:
+        """Return ``state`` with the water at rest in the cup, where the cup is now."""
+        pouring = self.plan_context.session.pouring
+        if pouring is None or state.poured is None:
+            return state
+        water = state.poured.water.cup * FEMTOLITRE if volume is None else volume
+        return replace(state, poured=pouring.fill(water, state.objects, state.x_setpoint))
 
     def joints_at(self, place: StepTarget) -> FloatArray:
         """Return the joints (5,) [rad] for ``place``. Raises InputError if it cannot be reached."""

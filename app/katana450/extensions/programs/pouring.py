@@ -1,4 +1,4 @@
-"""The step ``pour``: empty the cup into an object, planned from its place."""
+"""The step ``pour``: empty the cup, or a part of it, into an object, planned from its place."""
 
 from __future__ import annotations
 
@@ -22,12 +22,17 @@ from katana450.extensions.programs.step import Step
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import ToolLine
+from katana450.maths.water.flow import Water
+from katana450.maths.water.units import FEMTOLITRE, ML
 
 POUR_TURN = math.radians(165.0)
 """[rad] Roll of a pour: with any tilt of the tool, the cup then lies past its side."""
 
 POUR_PACE = 0.3
 """[1] Fraction of the speed while pouring: slow enough for a thin, coherent stream."""
+
+PART_PACE = 0.12
+"""[1] Fraction of the speed while a part is poured: the water in the cup hardly swings."""
 
 ABOVE_RIM = 0.13
 """[m] Height of the tool above the basin's rim: the cup turns over between them."""
@@ -41,6 +46,9 @@ SHAKE_ANGLE = math.radians(25.0)
 DRAIN_TIME = 1.5
 """[s] Time for the last water to run out."""
 
+SHAKES = 3
+"""Number of shakes after all is poured, unless given."""
+
 POURING = "pour"
 """Name of the task that turns the cup over."""
 
@@ -50,26 +58,40 @@ class Pour:
     """Carry the cup over an object, turn it over by the wrist, shake it, and turn it back.
 
     The cup stays upright until then: the tool keeps the pitch of the grasp.
+
+    Attributes:
+        into: name of the object.
+        shake: number of shakes.
+        volume: how much to pour [m^3]; None for all. The cup is then tilted as far as it holds the
+            rest, and kept so until no more water flows.
     """
 
     into: str
     shake: int
+    volume: float | None = None
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of an object, or {into, shake}. Raises ScriptError."""
+        """Read the name of an object, or {into, shake, ml}. Raises ScriptError."""
         if value.kind == "text":
-            return cls(read.text(value), 3)
+            return cls(read.text(value), SHAKES)
         fields = Fields(value, "a pour")
-        found = cls(fields.need("into", read.text, ""), fields.take("shake", read.whole(0, 20), 3))
+        into = fields.need("into", read.text, "")
+        ml = fields.take("ml", read.number(1.0, 1000.0, "ml"), None)
+        shake = fields.take("shake", read.whole(0, 20), SHAKES if ml is None else 0)
         fields.done()
-        return found
+        if ml is not None and shake:
+            raise value.wrong("A shaken cup does not keep the rest: leave out `shake` or `ml`.")
+        return cls(into, shake, None if ml is None else ML * ml)
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the pour, turning either way. Raises InputError if it is not possible."""
         cup, basin = builder.scene_object(CUP), builder.scene_object(self.into)
         if not cup.held:
             raise InputError("The cup is not in the hand: `grasp: cup` first.")
+        if builder.state.poured is None:
+            raise InputError("There is no water in the cup: `fill` it first.")
+        rest = self._rest(builder.state.poured.water)
         level = builder.at
         if level.pitch > MAX_POUR_PITCH:
             raise InputError(
@@ -77,11 +99,37 @@ class Pour:
                 "`side: front`."
             )
         try:
-            builder.first(
-                (POUR_TURN, -POUR_TURN), lambda turn: self._pour(builder, basin, level, turn)
-            )
+            turn = self._turn(builder, level, rest)
+            builder.first((turn, -turn), lambda turn: self._pour(builder, basin, level, turn))
         except InputError as error:
             raise InputError(f"The cup cannot be emptied into {self.into}: {error}") from error
+        builder.predict_water(rest)
+
+    def _rest(self, water: Water) -> float:
+        """Return the volume [m^3] that stays in the cup. Raises InputError for too little water."""
+        held = water.cup * FEMTOLITRE
+        if self.volume is None:
+            return 0.0
+        if self.volume > held:
+            raise InputError(
+                f"The cup holds {held / ML:.1f} ml at this step, which is less than "
+                f"{self.volume / ML:g} ml."
+            )
+        return held - self.volume
+
+    def _turn(self, builder: PlanBuilder, level: ToolTarget, rest: float) -> float:
+        """Return the roll [rad] at which the cup holds just ``rest`` [m^3]; POUR_TURN for all."""
+        pouring = builder.plan_context.session.pouring
+        if self.volume is None or pouring is None:
+            return POUR_TURN
+        inside = pouring.water_environment(builder.state.objects).cup.inside
+        # Rolling by phi about an axis with this pitch tilts the cup by
+        # cos(tilt) = cos(phi) + (1 - cos(phi)) sin(pitch)^2.
+        steep = math.sin(level.pitch) ** 2
+        cosine = (math.cos(inside.spills_at(rest)) - steep) / (1.0 - steep)
+        if cosine <= math.cos(POUR_TURN):
+            raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
+        return math.acos(cosine)
 
     def _pour(
         self, builder: PlanBuilder, basin: SceneObject, level: ToolTarget, turn: float
@@ -93,13 +141,16 @@ class Pour:
         over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height + ABOVE_RIM), in_base=True)
         position = over
         for _ in range(3):
-            # Iterate until the lip is over the basin's middle when the cup lies on its side.
+            # Iterate until the lip is over the basin's middle when the cup lies on its side, or
+            # is tilted as far as it will be.
             at = replace(level, position=position)
-            side = builder.joints_of(replace(at, roll=level.roll + 0.5 * turn))
+            tilted = 0.5 * turn if self.volume is None else turn
+            side = builder.joints_of(replace(at, roll=level.roll + tilted))
             position = position + (over - _lip(builder, side)) * (1.0, 1.0, 0.0)
         at = replace(level, position=position)
         carry(builder, at, f"over {self.into}")
-        builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
+        pace = POUR_PACE if self.volume is None else PART_PACE
+        builder.note("slowly", SetSpeed(pace), builder.state)
         down = replace(at, roll=level.roll + turn)
         builder.lead([ToolLine(at, down)], POURING)
         back = replace(at, roll=level.roll + turn - math.copysign(SHAKE_ANGLE, turn))

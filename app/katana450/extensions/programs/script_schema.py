@@ -241,9 +241,13 @@ STEP_VALUES: dict[str, Schema] = {
         "Carry the cup over an object, turn it over, shake it, and turn it back",
         OBJECT,
         _fields(
-            "An object, and the number of shakes",
+            "An object, and how much to pour",
             "into",
-            {"into": OBJECT, "shake": _number(0, 20, "Number of shakes, 3 unless given")},
+            {
+                "into": OBJECT,
+                "ml": _number(1.0, 1000.0, "How much to pour, ml; all unless given"),
+                "shake": _number(0, 20, "Number of shakes after all is poured, 3 unless given"),
+            },
         ),
     ),
     "repeat": _fields(
