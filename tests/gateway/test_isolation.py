@@ -81,7 +81,7 @@ def test_frozen_front_end_causes_a_stop_in_time() -> None:
         front = server.front
         os.kill(front, signal.SIGSTOP)
         # Shorter than the time after which the supervisor ends it.
-        time.sleep(1.0)
+        time.sleep(0.5)
         os.kill(front, signal.SIGCONT)
         # Messages that arrived meanwhile are read first.
         while (state := arm.query(answers.State)).stopped is None:

@@ -182,7 +182,7 @@ def test_frozen_front_end_pauses_a_simulated_arm() -> None:
         assert under_way(arm).silence_profile == "simulation"
         front = server.front
         os.kill(front, signal.SIGSTOP)
-        time.sleep(0.7)
+        time.sleep(0.5)
         os.kill(front, signal.SIGCONT)
         end = time.monotonic() + 10.0
         while (state := arm.query(answers.State)).status != "paused" or state.moving:

@@ -27,7 +27,6 @@ from katana450.server.api.fields import (
     Frame,
     Id,
     Name,
-    Press,
     Request,
     RequestTraits,
     Shape,
@@ -71,6 +70,7 @@ from katana450.server.api.scene_requests import (
     Remove,
     Set,
 )
+from katana450.server.api.stop_requests import Hello, Stop
 
 __all__ = [
     "MAX_REQUEST_BYTES",
@@ -134,20 +134,6 @@ __all__ = [
 ]
 
 
-class Hello(Request, frozen=True, kw_only=True):
-    """The first line on the TCP port: it identifies the program.
-
-    Attributes:
-        name: Name of the program that others see.
-        token: Token of an access link, where the server requires one.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    name: Name
-    token: Annotated[str, Meta(max_length=400)] = ""
-
-
 class Heartbeat(Request, frozen=True, kw_only=True):
     """A heartbeat. The holder of the lease sends ten a second.
 
@@ -160,20 +146,6 @@ class Heartbeat(Request, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = RequestTraits(free=True, answered=True)
 
     n: int = 0
-
-
-class Stop(Request, frozen=True, kw_only=True):
-    """Stop the arm as fast as possible. Every client may do this at any time.
-
-    Attributes:
-        press: Name of this press of STOP. A client that repeats an unanswered stop sends the same
-            name, and the stop counts once: a late repetition does not undo a ``clear_stop`` in
-            between.
-    """
-
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True, safety=True)
-
-    press: Press = None
 
 
 class ClearStop(Request, frozen=True):

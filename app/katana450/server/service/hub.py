@@ -345,13 +345,13 @@ class Hub:
             self._watch(arm)
             stopped = arm.state.stopped
             self.people.mutes.follow(None if stopped is None else stopped.cause)
-            for entry in self.event_log.follow(arm.event_log):
-                self.recorder.finding(entry)
             self.follow_stop()
             self.runner.tick()
 
     def follow_stop(self) -> None:
         """Make gate and arm agree on the stop, and spread the news of it."""
+        for entry in () if self.arm is None else self.event_log.follow(self.arm.event_log):
+            self.recorder.finding(entry)
         self.gate.reconcile()
         self.stop_news.note(self.stopped)
 

@@ -29,7 +29,7 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.errors import InputError
 from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
-from katana450.server.api.requests import Hello, Stop
+from katana450.server.api.stop_requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.mutes import MutedError, Mutes
 from katana450.server.web.acceptor import Acceptor
