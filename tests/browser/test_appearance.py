@@ -110,6 +110,7 @@ def test_a_theme_is_of_one_window(pair: tuple[ViserPage, ViserPage], artefacts: 
     assert page.errors == other.errors == []
 
 
+@pytest.mark.long
 def test_a_window_is_as_its_system_until_its_person_chooses(
     pair: tuple[ViserPage, ViserPage],
 ) -> None:

@@ -107,10 +107,8 @@ def test_stop_is_always_visible_and_the_largest_button(
     clear_stop(page, truth)
 
 
-@pytest.mark.parametrize(
-    "size",
-    [each if each == PORTRAIT else pytest.param(each, marks=pytest.mark.long) for each in ROOM],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("size", ROOM)
 def test_bar_keeps_its_height_and_the_reason_its_room(
     server: AppServer, open_page: OpenPage, artefacts: Path, size: tuple[int, int]
 ) -> None:

@@ -56,6 +56,7 @@ def wait_names(page: ViserPage, *wanted: str) -> None:
     page.wait_until(lambda: names(page) == list(wanted), f"the names {wanted}")
 
 
+@pytest.mark.long
 def test_row_under_the_mouse_shows_its_branch_here_alone(
     page: ViserPage, server: AppServer, robot: Robot, artefacts: Path
 ) -> None:

@@ -37,7 +37,9 @@ def server() -> Iterator[AppServer]:
 
 @pytest.fixture(scope="module")
 def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    """Return a window with the open folder of the branches."""
     with windows.open(server.url, nodes=("/arm", MOVE)) as page:
+        page.frame.get_by_text("Branches", exact=True).click()
         yield page
 
 
@@ -71,7 +73,6 @@ def test_branches_are_shown_and_one_is_taken(
         atol=1e-5,
     )
     page.open_tab("Drive")
-    page.frame.get_by_text("Branches", exact=True).click()
     # The view of the branches moved nothing.
     assert [page.slider_value(label) for label in AXES] == [
         round(math.degrees(angle), 6) for angle in READY

@@ -95,6 +95,7 @@ def test_first_drag_is_asked_for_and_noticed(visit: ViserPage, artefacts: Path) 
     assert visit.errors == []
 
 
+@pytest.mark.long
 def test_part_is_chosen_with_one_click(visit: ViserPage, tmp_path: Path) -> None:
     ring = tmp_path / "ring.stl"
     ring.write_bytes(trimesh.creation.torus(40.0, 12.0, 24, 12).export(file_type="stl"))

@@ -153,6 +153,7 @@ def test_the_box_is_drawn_where_it_is_projected(page: ViserPage, artefacts: Path
     assert page.screenshot(artefacts / "bare-app.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_page_reconnects_after_a_restart_of_its_server(open_page: OpenPage) -> None:
     with AppServer(BARE_APP) as server:
         page = open_page(server.url, nodes=NODES)

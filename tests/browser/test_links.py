@@ -224,6 +224,7 @@ def test_clicked_link_gets_a_bar_with_steps(
     clear_stop(page, truth)
 
 
+@pytest.mark.long
 def test_stop_ends_a_drag_and_a_stopped_arm_refuses_another(
     page: ViserPage, links: list[str], truth: Truth
 ) -> None:

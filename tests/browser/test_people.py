@@ -132,6 +132,7 @@ def test_disconnected_page_says_why_and_comes_back(site: Site, browser: Browser)
         waits(page, "Kai", "page")
 
 
+@pytest.mark.long
 def test_page_of_a_muted_viewer_shows_that_a_stop_did_not_count(
     site: Site, browser: Browser
 ) -> None:

@@ -74,6 +74,7 @@ def drag(page: ViserPage, by: float, seconds: float = 0.4) -> None:
         hand.lift()
 
 
+@pytest.mark.long
 def test_finger_moves_the_panel_between_three_heights(
     phone: ViserPage, server: AppServer, artefacts: Path
 ) -> None:

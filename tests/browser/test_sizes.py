@@ -111,6 +111,7 @@ def test_arm_and_gizmo_are_in_the_picture_at_every_size(desk: ViserPage, artefac
     desk.wait_until(lambda: np.allclose(eye(desk), first, atol=1e-3), "the first view again")
 
 
+@pytest.mark.long
 def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
     resize(desk, WIDE)
     wait_whole(desk, "before")

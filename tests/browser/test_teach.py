@@ -41,6 +41,7 @@ def sheet(new_page: ViserPage) -> ViserPage:
     return new_page
 
 
+@pytest.mark.long
 def test_poses_are_taught_reordered_played_and_kept(
     sheet: ViserPage, truth: Truth, artefacts: Path, tmp_path: Path
 ) -> None:

@@ -93,6 +93,7 @@ def test_faces_turn_the_camera_by_mouse_and_by_keys(page: ViserPage, artefacts: 
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_fit_fills_the_picture_with_the_arm(page: ViserPage) -> None:
     direction = np.array((1.0, -2.0, 0.8)) / np.linalg.norm((1.0, -2.0, 0.8))
     for distance in (4.0, 0.6):

@@ -251,6 +251,7 @@ def test_jog_without_renewal_ends(session: Session, state: State) -> None:
     assert held.findings == ()
 
 
+@pytest.mark.long
 def test_arm_comes_to_rest_at_its_goal_after_a_jog(session: Session, state: State) -> None:
     """Jogs in all directions follow each other until joints reach their limits."""
     random = np.random.default_rng(5)

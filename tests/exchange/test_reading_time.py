@@ -63,8 +63,8 @@ def spent() -> tuple[float, float]:
     ("name", "data", "count"),
     [
         ("soup.stl", stl(soup(20_000)), 20_000),
-        ("soup.stl", stl(soup(MAX_TRIANGLES)), MAX_TRIANGLES),
-        ("ball.stl", stl(ball(MAX_TRIANGLES)), MAX_TRIANGLES),
+        pytest.param("soup.stl", stl(soup(MAX_TRIANGLES)), MAX_TRIANGLES, marks=pytest.mark.long),
+        pytest.param("ball.stl", stl(ball(MAX_TRIANGLES)), MAX_TRIANGLES, marks=pytest.mark.long),
         ("star.obj", star(10_000), 9_998),
     ],
     ids=["soup of 20k", "soup of 200k", "ball of 200k", "polygon of 10k"],

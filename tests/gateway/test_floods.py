@@ -36,6 +36,7 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 def test_closed_browser_receives_no_more_frames(server: AppServer) -> None:
     """Each browser is closed while the scene is being sent to it."""
 

@@ -48,6 +48,7 @@ def check_kinematics(arm: MountedArm, angles: list[float], asked: list[list[floa
         assert min(np.abs(each.q - q).max() for each in inverse(chain, T)) < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
 def test_octave_follows_the_circle_of_the_paper(arm: MountedArm, server: AppServer) -> None:
     output = output_of(server, "circle")

@@ -70,6 +70,7 @@ def slow_scene() -> bytes:
     return packed.getvalue()
 
 
+@pytest.mark.long
 def test_abandoned_scene_stops_being_read(server: AppServer, links: AccessFile) -> None:
     scene = slow_scene()
     with socket.create_connection(("127.0.0.1", server.port)) as left:

@@ -100,6 +100,7 @@ def test_three_boxes_are_stacked(stage: Stage) -> None:
     assert place(end["c"])[:2] == pytest.approx([240.0, -100.0], abs=1e-6)
 
 
+@pytest.mark.long
 def test_stacked_box_is_picked_from_the_stack_again(stage: Stage) -> None:
     steps = (
         "- stack: {object: b, on: a}\n"
