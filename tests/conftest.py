@@ -9,6 +9,7 @@ import signal
 import tempfile
 from typing import Any
 
+import hypothesis
 import numpy as np
 import pytest
 
@@ -21,6 +22,10 @@ from katana450.settings import Settings
 from tests.schedule import Completeness, LowestPriority, Schedule
 
 LONG = "KATANA450_LONG" in os.environ
+
+# A machine that others keep busy delays single examples.
+hypothesis.settings.register_profile("katana450", deadline=None)
+hypothesis.settings.load_profile("katana450")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -21,12 +21,13 @@ SERVERS = "servers"
 KINDS = {
     "tests/browser": BROWSER,
     "tests/gateway": SERVERS,
-    "tests/event_log": SERVERS,
-    "tests/extensions": SERVERS,
-    "tests/runtime": SERVERS,  # control loops and supervisors on the clock of the machine
-    "tests/cli/test_lines.py": SERVERS,
-    "tests/cli/test_live.py": SERVERS,
-    # Some of these run servers too; they follow the browser to make both rows equally long.
+    # These run servers too, or control loops on the clock of the machine. They follow the browser,
+    # which makes both rows equally long.
+    "tests/event_log": BROWSER,
+    "tests/extensions": BROWSER,
+    "tests/runtime": BROWSER,
+    "tests/cli/test_lines.py": BROWSER,
+    "tests/cli/test_live.py": BROWSER,
     "tests/cli/test_serve.py": BROWSER,
     "tests/docs": BROWSER,
     "tests/examples": BROWSER,

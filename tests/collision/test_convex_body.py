@@ -37,7 +37,7 @@ def check_holds(found: ConvexBody, points: FloatArray) -> None:
     st.tuples(*(st.sampled_from((0.0, 1e-4, 0.01, 0.3, 1.0)),) * 3).filter(any),
     st.floats(0.01, 100.0),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_random_points_are_contained(
     count: int, seed: int, stretch: tuple[float, ...], scale: float
 ) -> None:

@@ -39,7 +39,7 @@ changes = st.one_of(
 names = st.sampled_from(["pan_link", "cup", "basin"])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(names, changes), max_size=12))
 def test_appearance_keeps_only_changed_parts(
     edits: list[tuple[str, tuple[AppearanceTrait, Any]]],

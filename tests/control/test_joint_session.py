@@ -65,7 +65,7 @@ def test_session_begins_at_the_posture_nearest_to_zero(state: State) -> None:
 joint_vectors = st.tuples(st.floats(-0.5, 0.9), st.floats(-4.0, 4.0), st.floats(-1.0, 1.0))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     st.lists(st.tuples(joint_vectors, st.floats(0.02, 0.6)), min_size=1, max_size=4),
     st.sampled_from([1.0, 0.3]),

@@ -43,7 +43,7 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
     check_mutations(seed, SEEDS[seed])
 
 
-@settings(max_examples=MUTATIONS, deadline=None)
+@settings(max_examples=MUTATIONS)
 @given(st.sampled_from(Format), st.binary(max_size=200), st.integers(0, 150))
 def test_random_bytes_after_any_header_are_read_or_refused(
     format: Format, data: bytes, kept: int

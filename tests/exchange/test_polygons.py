@@ -26,7 +26,7 @@ def shoelace(flat: FloatArray) -> float:
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) / 2.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.floats(0.1, 1.0), min_size=4, max_size=24),
     st.tuples(*[st.floats(-3.0, 3.0)] * 3),

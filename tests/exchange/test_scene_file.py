@@ -106,7 +106,7 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 
 @given(scenes())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_written_scene_is_read_back(scene: Scene) -> None:
     """Values are equal to a nanometre; their text is equal exactly."""
     file = MeshFile("meshes/it.stl", "mm", None, "0" * 64)

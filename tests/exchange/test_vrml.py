@@ -88,7 +88,7 @@ def plain(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
     return st.recursive(st.just(Node("Group")), some, max_leaves=6) | nodes
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(plain(st.just(Node("Shape"))), max_size=3), names)
 def test_any_world_is_read_back_as_it_was_written(nodes: list[Node], name: str) -> None:
     first = Node("Group", (("children", tuple(nodes)),), name)

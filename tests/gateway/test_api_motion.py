@@ -105,7 +105,9 @@ def test_other_branch_is_reached_on_a_clear_path(program: Client) -> None:
     time.sleep(2.0)
     rest = program.query(answers.State)
     assert not rest.moving
-    assert rest.q == back.q
+    assert rest.branch == back.branch
+    # A path that was found before the stop came may have begun.
+    np.testing.assert_allclose(rest.q, back.q, rtol=0, atol=0.02)
 
 
 def _rows(T: npt.ArrayLike) -> Matrix4:

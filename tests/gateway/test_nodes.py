@@ -99,7 +99,7 @@ def test_names_types_and_values_are_those_of_the_file(
     assert {"left_cube", "left_cube_look", "pan_link_look_2", "pan_link_look_paint"} <= objects
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.dictionaries(st.sampled_from(sorted(THERE)), st.floats(-2.0, 2.0), min_size=1))
 def test_setting_a_joint_is_a_motion_command(
     nodes: VrmlNodes, state: State, wanted: dict[str, float]
@@ -199,7 +199,7 @@ numbers = st.floats() | st.sampled_from([0.0, 1.0, -1.0, 0.5])
 anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.tuples(names, fields, anything), min_size=1, max_size=3))
 def test_setting_any_field_gives_a_valid_command_or_a_refusal(
     nodes: VrmlNodes, rules: Session, state: State, changes: list[tuple[str, str, Any]]

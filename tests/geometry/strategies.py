@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from katana450.maths.geometry.arrays import FloatArray
 
-repeatable = settings(max_examples=80, derandomize=True, deadline=None, database=None)
+repeatable = settings(max_examples=80, derandomize=True, database=None)
 
 # Angles near 0, near pi, and in between.
 angles = st.one_of(

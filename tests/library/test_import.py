@@ -44,6 +44,12 @@ def test_kinematics_load_neither_viewer_nor_plots() -> None:
     assert not loaded.intersection({"viser", "matplotlib", "starlette", "websockets"})
 
 
+@pytest.mark.parametrize("name", ["cli.serve", "assembly.stop_process"])
+def test_supervisor_and_process_of_stop_start_light(name: str) -> None:
+    loaded = modules_after(f"import katana450.{name}")
+    assert not loaded.intersection({"numpy", "viser", "starlette", "uvicorn"})
+
+
 @pytest.mark.parametrize("name", katana450.__all__)
 def test_every_public_name_has_a_docstring(name: str) -> None:
     assert getattr(katana450, name).__doc__

@@ -25,7 +25,7 @@ def random_vias(arm: ArmModel, seed: int) -> tuple[FloatArray, FloatArray]:
     return vias, rng.uniform(0.05, 1.0, count - 2)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_corners_join_their_legs_smoothly_and_stay_inside(arm: ArmModel, seed: int) -> None:
     vias, blend = random_vias(arm, seed)
@@ -44,7 +44,7 @@ def test_corners_join_their_legs_smoothly_and_stay_inside(arm: ArmModel, seed: i
     assert (q <= vias.max(axis=0) + 1e-12).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_the_tool_point_is_that_of_forward_kinematics(arm: ArmModel, seed: int) -> None:
     path = JointPath(arm.chain, *random_vias(arm, seed))

@@ -74,7 +74,7 @@ def test_arc_without_a_feasible_pitch_is_refused(arm: ArmModel, circle: ToolArc)
         roomiest(arm.chain, FRONT_UP, replace(circle, start=np.array([0.15, 0.0, 0.9])))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_lines_of_any_member_are_straight_and_keep_their_branch(seed: int) -> None:
     rng = np.random.default_rng(seed)

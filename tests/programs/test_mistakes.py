@@ -141,7 +141,7 @@ def test_wrong_fields_and_values_are_refused_with_their_place(name: str) -> None
     random = Random(name)
     refused = [is_refused(mistaken(SCRIPTS[name], random)) for _ in range(MISTAKES)]
     # The others are still scripts, such as one with another text for people.
-    assert sum(refused) > 0.5 * MISTAKES
+    assert sum(refused) > 0.2 * MISTAKES
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

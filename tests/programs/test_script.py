@@ -145,7 +145,7 @@ def wrong_with(text: str) -> tuple[Problem, ...]:
     return () if script.steps else (Problem(0, 0, "no steps"),)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(TREES)
 def test_any_tree_of_values_is_read_or_refused(tree: object) -> None:
     text = json.dumps({"steps": tree})
@@ -153,7 +153,7 @@ def test_any_tree_of_values_is_read_or_refused(tree: object) -> None:
     assert all(problem.line >= 1 and problem.column >= 1 for problem in problems)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.text(max_size=200) | st.text("steps:-[]{},&*!|>'\"# \n\t12xyhome", max_size=80))
 @example("steps: *a")
 @example("? - [\n")
@@ -164,7 +164,7 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     assert all(problem.line >= 1 for problem in wrong_with(text))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.data())
 def test_broken_script_is_reported_with_its_position(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(GOOD) - 1))

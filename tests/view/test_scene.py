@@ -11,7 +11,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.server.view.scene import COAT_THICKNESS, DETAIL, coarse, surface
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(5e-3, 0.05), st.integers(0, 4))
 def test_coarse_shape_is_near_the_fine_one(cell: float, subdivisions: int) -> None:
     ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.1)

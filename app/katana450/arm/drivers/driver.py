@@ -18,7 +18,9 @@ class SentSetpoint:
 
 
 class Driver(Protocol):
-    """An arm that takes a position setpoint each tick. Only the control loop calls it.
+    """An arm that takes a position setpoint each tick, 20 a second at rest.
+
+    Only the control loop calls it.
 
     Attributes:
         silence_profile: reaction of the moving arm to silence.
