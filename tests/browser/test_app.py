@@ -170,6 +170,7 @@ def test_tool_turns_with_the_arm_in_a_sideways_drag(robot: Robot) -> None:
     assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
 
 
+@pytest.mark.long
 def test_the_pitch_ring_turns_the_tool_about_its_point(robot: Robot, artefacts: Path) -> None:
     start = robot.drawn()
     robot.page.drag_ring(PITCH, "y", 0.25)

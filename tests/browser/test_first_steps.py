@@ -254,6 +254,7 @@ def test_poster_on_a_phone_does_not_hide_a_button_that_takes_a_tap(
     assert hit == "welcome"
 
 
+@pytest.mark.long
 @in_sizes_and_schemes(SIZES, ("portrait", "dark"))
 def test_card_fits_every_size(
     server: AppServer, open_page: OpenPage, size: str, scheme: str, artefacts: Path

@@ -30,7 +30,8 @@ KEYS = (("KeyW", 0, 1), ("KeyS", 0, -1), ("KeyA", 1, 1), ("KeyD", 1, -1), ("KeyR
 """Keys, each with the axis and the sign of the tool's motion."""
 
 
-@pytest.mark.parametrize("document", ["page", pytest.param("viser", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("document", ["page", "viser"])
 def test_a_held_key_moves_the_tool_along_one_axis(
     page: ViserPage, truth: Truth, document: str
 ) -> None:

@@ -64,6 +64,7 @@ def test_line_through_an_object_of_the_scene_is_refused(script: Path, post: Path
     assert "post" in done.stderr
 
 
+@pytest.mark.long
 def test_simulation_begins_at_the_joints_of_the_scene(
     script: Path, post: Path, tmp_path: Path
 ) -> None:
@@ -87,6 +88,7 @@ def test_scene_that_cannot_be_used_is_named(script: Path, post: Path, tmp_path: 
     assert f"{post.name}:" in done.stderr
 
 
+@pytest.mark.long
 def test_running_server_keeps_its_scene(script: Path, post: Path) -> None:
     with AppServer() as server:
         done = run(script, "--scene", post, "--url", server.url)

@@ -60,6 +60,7 @@ def test_libraries_are_loaded_on_use_only(python: Path, tmp_path: Path) -> None:
     assert run(tmp_path, python, "-c", words).split() == []
 
 
+@pytest.mark.long
 def test_report_of_a_demo(python: Path, tmp_path: Path) -> None:
     """The command of the README."""
     katana450 = python.parent / "katana450"

@@ -134,9 +134,19 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         ("- pick: part\n- pick: low\n", "already holds an object"),
         ("- pick: part\n- release\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         ("- pick: part\n- place: {at: {x: 230, y: 720}}\n", "nothing carries it there"),
-        ("- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n", "put it 30.0 mm lower"),
-        ("- pick: part\n- place: {on: ball}\n", "ball cannot carry part"),
-        ("- pick: part\n- place: {on: far, at: {x: 230, y: -120}}\n", "far cannot carry part"),
+        pytest.param(
+            "- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n",
+            "put it 30.0 mm lower",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "- pick: part\n- place: {on: ball}\n", "ball cannot carry part", marks=pytest.mark.long
+        ),
+        pytest.param(
+            "- pick: part\n- place: {on: far, at: {x: 230, y: -120}}\n",
+            "far cannot carry part",
+            marks=pytest.mark.long,
+        ),
         ("- pick: part\n- place: {at: {x: 180, y: 150}}\n", "cannot be placed there: .*low"),
         ("- pick: {object: part, side: front}\n", "its sides are skew, so the fingers"),
     ],

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from katana450.arm.robot import collision
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
@@ -38,6 +39,16 @@ def test_world_of_the_katana_has_every_link(robot: Robot) -> None:
     shaped = [body for body in robot.links if body.collisions]
     assert [part.name for part in world.parts] == [body.name for body in shaped]
     assert [len(part.shapes) for part in world.parts] == [len(b.collisions) for b in shaped]
+
+
+def test_pairs_that_meet_are_sampled_once(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    first, _ = world_of(robot)
+    monkeypatch.setattr(collision, "pairs_that_meet", lambda *_: pytest.fail("sampled again"))
+    again, _ = world_of(robot)
+    assert first is not None
+    assert again is not None
+    np.testing.assert_array_equal(again.first, first.first)
+    np.testing.assert_array_equal(again.second, first.second)
 
 
 def test_primitives_have_the_poses_of_the_file(tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Sequence
+
 import numpy as np
 
 from katana450.arm.control.scene_objects import Hand, SceneObject, Shape
@@ -10,7 +13,9 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.visual import Visual
+from katana450.disk_cache import kept
 from katana450.errors import InputError
+from katana450.maths.collision.engine import engine
 from katana450.maths.collision.linkage import GROUND, Linkage, RigidGroup
 from katana450.maths.collision.pairs import pairs_that_meet
 from katana450.maths.collision.shape import CollisionShape, half_space, hull
@@ -53,9 +58,21 @@ def world_of(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
     linkage = Linkage(groups)
     chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
-    return CollisionWorld(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(
-        notes
-    )
+    return CollisionWorld(linkage, parts, _pairs(groups, parts, lower, upper)), tuple(notes)
+
+
+def _pairs(
+    groups: Sequence[RigidGroup], parts: Sequence[Part], lower: FloatArray, upper: FloatArray
+) -> list[tuple[int, int]]:
+    """Return ``pairs_that_meet``, kept on the disk because its samples take half of a start."""
+
+    def pairs() -> list[tuple[int, int]]:
+        return pairs_that_meet(Linkage(groups), parts, lower, upper)
+
+    shapes = [each.mark for part in parts for each in part.shapes]
+    places = [(part.mover, part.T_mover_shape) for part in parts]
+    bodies = pickle.dumps((groups, places, shapes))
+    return kept(pairs, bodies, lower, upper, type(engine()).__name__)
 
 
 def table() -> Part:
