@@ -18,7 +18,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.water.environment import TableTop
 
-MAX_OBJECTS = 24
+MAX_OBJECTS = 64
 """Maximum number of objects at a time."""
 
 MAX_COORDINATE = 2.0
