@@ -1,7 +1,7 @@
 """Schedule of the tests when several processes run them.
 
-Tests that drive a browser would starve each other of time, and so would tests that run servers:
-each of these kinds runs in one process. The others only compute. They run file by file, at the
+Tests that drive a browser would starve each other of time, so they run in one process. Those that
+run servers mostly wait, and run in two. The others only compute. They run file by file, at the
 lowest priority, in the time that is left.
 """
 
@@ -16,13 +16,12 @@ import pytest
 from xdist.scheduler.loadscope import LoadScopeScheduling
 
 BROWSER = "browser"
-SERVERS = "servers"
+SERVERS = ("servers, first half", "servers, second half")
 
 KINDS = {
     "tests/browser": BROWSER,
-    "tests/gateway": SERVERS,
     # These run servers too, or control loops on the clock of the machine. They follow the browser,
-    # which makes both rows equally long.
+    # which makes the rows equally long.
     "tests/event_log": BROWSER,
     "tests/extensions": BROWSER,
     "tests/runtime": BROWSER,
@@ -36,10 +35,16 @@ KINDS = {
 }
 """Kinds of the tests that need their time at once, by their folders and files."""
 
+GATEWAY = PurePath("tests/gateway")
+SECOND_HALF = "test_m"
+"""Name from which on the files of this folder belong to the second half."""
+
 
 def kind_of(nodeid: str) -> str:
     """Return the kind of a test: browser, servers, or the file of a test that only computes."""
     path = PurePath(nodeid.partition("::")[0])
+    if path.parent == GATEWAY:
+        return SERVERS[path.name >= SECOND_HALF]
     for each in (path, *path.parents):
         if each.as_posix() in KINDS:
             return KINDS[each.as_posix()]
@@ -83,7 +88,7 @@ class LowestPriority:
 
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
         """Lower the priority of this process for good, before its first test that computes."""
-        if self._lowered or kind_of(item.nodeid) in (BROWSER, SERVERS):
+        if self._lowered or kind_of(item.nodeid) in (BROWSER, *SERVERS):
             return
         self._lowered = True
         if sys.platform == "win32":

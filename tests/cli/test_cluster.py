@@ -97,6 +97,7 @@ def address(scheduler: tuple[subprocess.Popen[str], str]) -> str:
     return scheduler[1]
 
 
+@pytest.mark.long
 def test_a_cluster_gives_the_bytes_of_one_machine(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -189,6 +189,7 @@ def test_server_runs_where_the_log_cannot_be(tmp_path: Path) -> None:
         assert "Not a directory" in server.output
 
 
+@pytest.mark.long
 def test_option_no_log_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     with AppServer((*APP, "--no-log")) as server:

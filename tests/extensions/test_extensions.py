@@ -171,6 +171,7 @@ def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:
     assert "unrecognized arguments: --scene" in output
 
 
+@pytest.mark.long
 def test_map_is_refused_for_a_mechanism_that_is_not_an_arm(tmp_path: Path) -> None:
     gantry = str(ROOT / "tests" / "exchange" / "gantry.urdf")
     options = ("--urdf", gantry, "--workspace", str(tmp_path / "map.npz"))

@@ -172,6 +172,7 @@ def test_option_of_the_missing_extension_is_refused(option: str, tmp_path: Path)
     assert f"unrecognized arguments: {option}" in done.stderr
 
 
+@pytest.mark.long
 def test_another_distribution_provides_the_runner(tmp_path: Path) -> None:
     """Its request, progress and folder are available, and its errors do not block a stop."""
     distribution(tmp_path, "station:EXTENSION", STATION)

@@ -119,6 +119,7 @@ def test_former_driver_gets_the_name_of_the_new_one(server: AppServer, by_progra
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_stop_names_the_page_that_pressed_it_after_a_restart() -> None:
     page = page_name()
 

@@ -101,6 +101,7 @@ def test_new_clients_are_served_among_silent_ones(
             assert time.monotonic() - began < 2.0 * SOON
 
 
+@pytest.mark.long
 def test_half_requests_are_closed_and_slow_bodies_refused(server: AppServer) -> None:
     head = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n".encode()
     upgrade = head.replace(b"/ ", b"/api/v1/socket ") + b"Upgrade: websocket\r\n"

@@ -289,6 +289,7 @@ def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> 
         assert stop(server.stop_url, path="/stop", Cookie=cookie, Origin=server.url)[0] == 200
 
 
+@pytest.mark.long
 def test_stop_of_a_muted_viewer_counts_once_per_interval(tmp_path: Path) -> None:
     path = tmp_path / "access.json"
     links = AccessFile.create(path)

@@ -63,6 +63,7 @@ def test_unattended_program_outlives_its_terminal(
     assert state_of(server)["stopped"] is None
 
 
+@pytest.mark.long
 def test_server_option_refuses_unattended_programs(tmp_path: Path) -> None:
     script = tmp_path / "wave.yaml"
     script.write_text(SCRIPT)

@@ -265,6 +265,7 @@ def test_the_commands_take_an_so101(tmp_path: Path) -> None:
     assert "The tool gripper_frame_link reaches" in ask("workspace", path, *coarse)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "joints",
     [

@@ -198,6 +198,7 @@ def test_shoulder_and_column_do_not_overlap_at_any_angle() -> None:
             assert min(gaps) > CLEARANCE
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("link", LINKS)
 def test_every_hull_stays_near_its_link(link: str) -> None:
     reference = filled(link)

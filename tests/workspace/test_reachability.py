@@ -89,6 +89,7 @@ def of_a_member(seed: int, *, beside: bool = False) -> Reachability:
     return Reachability(limited, se3.inverse(stand), -2.0, 8, 6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "made",
     [
