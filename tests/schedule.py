@@ -17,6 +17,7 @@ from xdist.scheduler.loadscope import LoadScopeScheduling
 
 BROWSER = "browser"
 SERVERS = ("servers, first half", "servers, second half")
+EARLY = "computes for long, so that nothing else would be left beside it at the end"
 
 KINDS = {
     "tests/browser": BROWSER,
@@ -32,8 +33,11 @@ KINDS = {
     "tests/examples": BROWSER,
     "tests/library/test_run.py": BROWSER,
     "tests/robot/test_other_arms.py": BROWSER,
+    # The most tests come first, so a file of many takes the single test of the types along.
+    "tests/control/test_transitions.py": EARLY,
+    "tests/packaging/test_types.py": EARLY,
 }
-"""Kinds of the tests that need their time at once, by their folders and files."""
+"""Kinds of the tests that need their time at once, or early, by their folders and files."""
 
 GATEWAY = PurePath("tests/gateway")
 SECOND_HALF = "test_m"

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import signal
 import sys
 import time
 from datetime import datetime
@@ -48,7 +46,7 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
             await driver.send(json.dumps({"do": "joints", "q": FAR.tolist()}))
             await heartbeat(0.5)
             last = time.time()
-            holding_up = asyncio.create_task(asyncio.to_thread(hold_up, server.front, awake))
+            holding_up = asyncio.create_task(asyncio.to_thread(hold_up, server, awake))
             if alive:
                 await heartbeat(LOADED)
             await holding_up
@@ -72,16 +70,13 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
         asyncio.run(act(server))
 
 
-def hold_up(process: int, awake: float) -> None:
+def hold_up(server: AppServer, awake: float) -> None:
+    """Suspend the front end again and again, and the supervisor that would end it."""
     end = time.monotonic() + LOADED
-    try:
-        while time.monotonic() < end:
-            os.kill(process, signal.SIGSTOP)
+    while time.monotonic() < end:
+        with server.frozen(server.front):
             time.sleep(HELD_UP)
-            os.kill(process, signal.SIGCONT)
-            time.sleep(awake)
-    finally:
-        os.kill(process, signal.SIGCONT)
+        time.sleep(awake)
 
 
 def look(server: AppServer, at: str) -> Any:
