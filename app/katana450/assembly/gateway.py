@@ -58,7 +58,7 @@ TLS_READ_CHUNK_BYTES = 65_536
 """Size of the receive buffer with TLS, which reads all that the system holds."""
 
 REST_TICK = 0.05
-"""[s] Interval of the checks while the arm rests; otherwise ``TICK``."""
+"""[s] Interval of the checks while the arm rests and is not stopped; otherwise ``TICK``."""
 
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
@@ -245,7 +245,8 @@ class Gateway:
             except Exception:
                 # The watchdog of the arm must survive every error.
                 log.exception("The watchdog of the driver met an error.")
-            rests = not (self.hub.gate.moves() or self.hub.runner.running)
+            hub = self.hub
+            rests = not (hub.stopped or hub.gate.moves() or hub.runner.running)
             await asyncio.sleep(REST_TICK if rests else TICK)
 
 
