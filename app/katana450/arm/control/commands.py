@@ -256,15 +256,18 @@ class Resume(BaseCommand):
 
 @dataclass(frozen=True, eq=False)
 class Follow(BaseCommand):
-    """Follow ``plan`` to its end; the arm has to stand at its start."""
+    """Follow ``plan`` to its end from ``tau`` [s] of it, where the arm has to stand."""
 
     traits: ClassVar[CommandTraits] = CommandTraits()
 
     plan: Plan
+    tau: float = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.plan, Plan):
             raise InputError(f"`plan` must be a Plan, not {self.plan!r}.")
+        if not 0.0 <= self.tau < self.plan.span:
+            raise InputError(f"`tau` must be from 0 to below {self.plan.span:g}, not {self.tau!r}.")
 
 
 @dataclass(frozen=True, eq=False)

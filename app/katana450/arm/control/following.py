@@ -31,9 +31,11 @@ class Following:
     towards: float
 
     @staticmethod
-    def begin(plan: Plan) -> Following:
-        """Return the place at the start of ``plan``, with its end as the next place of rest."""
-        return Following(plan, 0, JointMotion.rest(np.zeros(1)), plan.span)
+    def begin(plan: Plan, tau: float = 0.0) -> Following:
+        """Return the place of rest at ``tau`` [s] of ``plan``, on the way to its end."""
+        number = plan.segment_at(tau)
+        local = np.array([tau - plan.begins[number]])
+        return Following(plan, number, JointMotion.rest(local), plan.span)
 
     @property
     def segment(self) -> Segment:

@@ -128,18 +128,18 @@ def with_time(command: Command, t: float) -> Command:
     return replace(command, t=t)
 
 
-def follow_plan(chain: Chain, state: State, plan: Plan) -> State:
+def follow_plan(chain: Chain, state: State, plan: Plan, tau: float) -> State:
     """Return ``state`` that follows ``plan`` from here.
 
-    If the arm does not stand at the start, the only change is a finding that reports it.
+    If the arm does not stand at ``tau`` [s] of it, the only change is a finding that reports it.
     """
-    distances = np.abs(state.setpoint - plan.start)
+    distances = np.abs(state.setpoint - (plan.q(tau) if tau else plan.start))
     if distances.max() > START_TOLERANCE or not state.motion.at_rest:
         axis = int(distances.argmax())
         others = without_finding(state, Reason.NOT_AT_START).findings
         finding = Finding(Reason.NOT_AT_START, float(distances[axis]), axis)
         return replace(state, findings=(*others, finding))
-    return _along(chain, state, Following.begin(plan))
+    return _along(chain, state, Following.begin(plan, tau))
 
 
 def may_offer(state: State, plan: Plan) -> bool:

@@ -349,8 +349,8 @@ class Session:
                 return self._retooled(state, name)
             case cmd.Go():
                 return tool_targets.gone(arm, state)
-            case cmd.Follow(plan=plan):
-                return follow_plan(arm.chain, state, plan)
+            case cmd.Follow(plan=plan, tau=tau):
+                return follow_plan(arm.chain, state, plan, tau)
         raise AssertionError(f"The table of transitions has no rule for {command!r}.")
 
     def _retooled(self, state: State, name: str) -> State:

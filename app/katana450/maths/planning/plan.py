@@ -132,9 +132,13 @@ class Plan:
         path = self.segments[-1].path
         return frozen(path.chain.clamp(path.end))
 
+    def segment_at(self, tau: float) -> int:
+        """Return the index of the segment at `tau` [s], from 0 to `span`."""
+        return min(max(bisect_right(self.begins, tau) - 1, 0), len(self.segments) - 1)
+
     def q(self, tau: float) -> FloatArray:
         """Return the joint angles (5,) [rad] at `tau` [s], from 0 to `span`."""
-        number = min(max(bisect_right(self.begins, tau) - 1, 0), len(self.segments) - 1)
+        number = self.segment_at(tau)
         return self.segments[number].at(tau - self.begins[number]).q
 
     def postures(self, count: int) -> FloatArray:
