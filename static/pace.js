@@ -45,7 +45,7 @@ const Pace = (() => {
     const next = status?.paused ? "resume" : "pause";
     if (next !== order) turned = performance.now();
     order = next;
-    own = Boolean(status?.orders.length);
+    own = Boolean(status?.orders.includes("end"));
     const label = order === "resume" ? "Resume" : "Pause";
     const held = refusal || (stopped ? "The arm is stopped: clear the stop first." : "");
     pause.lastElementChild.textContent = label;

@@ -272,7 +272,8 @@
     const orders = [status.planning, ...status.orders].join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
-      const made = (order) => act(status.planning ? "Cancel" : "End", { do: "steer", order });
+      const words = { end: status.planning ? "Cancel" : "End", continue: "Continue" };
+      const made = (order) => act(words[order], { do: "steer", order }, order === "continue");
       keepingFocus(byId("orders"), status.orders.map(made));
     }
     Pace.draw(up ? status : null);

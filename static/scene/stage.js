@@ -3,6 +3,7 @@
 import { html } from "../instruments/shape.js";
 import { Branches } from "./branches.js";
 import { Joints } from "./joints.js";
+import { Steps } from "./steps.js";
 import { Views } from "./views.js";
 
 const CLICK = 5; // px, within which a press and its release count as a click
@@ -15,6 +16,7 @@ export class Stage {
   #page; // {say, toast, status}
   #joints;
   #views;
+  #steps;
   #branches = null; // only for an arm that has some
   #selection = null; // the selected object, loaded with the first click beside the arm
   #press = null; // [x, y] of a press that may become a click
@@ -28,6 +30,7 @@ export class Stage {
     this.#joints = new Joints(stage, scene, page);
     this.#load();
     this.#views = new Views(stage, scene);
+    this.#steps = new Steps(page.say);
     this.#listen();
     window.katana.turned = () => this.#views.turned();
     scene.addEventListener("load", () => this.#listen());
@@ -84,6 +87,7 @@ export class Stage {
     on("blur", this.#blur);
     on("dblclick", this.#focus);
     this.#branches?.listen(inner);
+    this.#steps.listen(inner);
   }
 
   // The focus may only have moved between the two documents.

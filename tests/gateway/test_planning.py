@@ -19,7 +19,7 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.compiler import TIMING, PlanningStage
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.requests import ProgramOrder
-from katana450.extensions.programs.server import program_planning
+from katana450.extensions.programs.server import program_planner
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.server.service import status
@@ -39,12 +39,12 @@ class Slow:
         self.begun = 0
         self._compiled = compiled
 
-    def compiled(self, *args: Any) -> Any:
+    def compiled(self, *args: Any, **options: Any) -> Any:
         self.begun += 1
         args[-1](PlanningStage(TIMING, 1, 2))
         while not self.released.wait(0.002):
             checkpoint()
-        return self._compiled(*args)
+        return self._compiled(*args, **options)
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def table(session: Session) -> Staged:
 @pytest.fixture
 def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
     slow = Slow()
-    monkeypatch.setattr(program_planning, "compiled", slow.compiled)
+    monkeypatch.setattr(program_planner, "compiled", slow.compiled)
     yield slow
     slow.released.set()
 
@@ -182,7 +182,7 @@ def test_run_request_during_planning_takes_effect_afterwards(table: Staged, slow
 def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, slow: Slow) -> None:
     participant, other = (table.join(page) for page in PAGES)
     ask(table, participant)
-    job = table.programs._planning
+    job = table.programs._planner.planning
     assert job is not None
     with pytest.raises(LeaseError, match="being planned"):
         table.programs.script(other, SCRIPT, more=False, speed=1.0)

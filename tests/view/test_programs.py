@@ -112,13 +112,21 @@ def test_panel_previews_and_steers(
 
 def marked(panel: ProgramsPanel) -> list[str]:
     """Return the names of the steps that the list marks as current."""
-    return re.findall(r"<li aria-current=step><span>(\w+)</span>", panel._list.content)
+    rows = panel._list.content.split("<li")
+    current = [row for row in rows if row.startswith(" aria-current=step>")]
+    return [re.findall(r"<span>(\w+)</span>", row)[0] for row in current]
 
 
 def test_names_of_steps_are_escaped_in_markup() -> None:
-    text = step_page((ListedStep("<b>", 1.25), ListedStep("wait", 0.0)), 1)
-    assert "<li><span>&lt;b&gt;</span><span>1.2 s</span></li>" in text
-    assert "<li aria-current=step><span>wait</span><span></span></li>" in text
+    text = step_page((ListedStep("<b>", 1.25), ListedStep("wait", 0.0)), 1, (2,))
+    first, second = text.split("<li")[1:]
+    assert "<span>&lt;b&gt;</span><span>1.2 s</span>" in first
+    assert "aria-label='Pause before step 1'" in first
+    assert "aria-pressed=false" in first
+    assert second.startswith(" aria-current=step>")
+    assert "<span>wait</span><span></span>" in second
+    assert "aria-pressed=true" in second
+    assert "aria-label='Run from step 2'" in second
     assert step_page((), None) == ""
 
 

@@ -39,13 +39,19 @@ class Action(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FollowPlan:
-    """Follow a plan to its end."""
+    """Follow ``plan`` to its end from ``tau`` [s] of it, 0 at its start."""
 
     plan: Plan
+    tau: float = 0.0
+
+    @property
+    def duration(self) -> float:
+        """The duration [s] at full speed, without the part before ``tau``."""
+        return self.plan.duration * (1.0 - self.tau / self.plan.span)
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command to follow the plan."""
-        return (cmd.Follow(self.plan),)
+        return (cmd.Follow(self.plan, self.tau),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return whether the end is reached. Raises InputError if the arm has left the plan."""

@@ -12,6 +12,9 @@ from katana450.server.api.fields import ADMIN, COMMAND, MAX_REQUEST_BYTES, Reque
 SLOWEST_SPEED = 0.01
 """Minimum fraction of its own speed at which a program can run."""
 
+MAX_BREAKPOINTS = 100
+"""Maximum number of breakpoints."""
+
 
 class ProgramOrder(Enum):
     """An order to a program."""
@@ -23,6 +26,8 @@ class ProgramOrder(Enum):
     RESUME = "resume"
     END = "end"
     """Bring the arm to rest and end the program."""
+    CONTINUE = "continue"
+    """Continue a program that has ended early, from where the arm stands."""
 
 
 class Program(Request, frozen=True, kw_only=True):
@@ -42,7 +47,7 @@ class Program(Request, frozen=True, kw_only=True):
 
 
 class Steer(Request, frozen=True, kw_only=True):
-    """Run, step, pause, resume or end the planned program.
+    """Run, step, pause, resume, end or continue the planned program.
 
     A program drives as a participant of its own. Its owner must stay connected unless ``run`` or
     ``step`` begins it with ``unattended``; then it ends by itself, by STOP, by ``end`` of its owner
@@ -51,12 +56,31 @@ class Steer(Request, frozen=True, kw_only=True):
     in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program that is
     to run from another posture or scene than it was planned for is planned again first. An arm that
     is paused when a program begins stays paused until ``resume``.
+
+    ``run`` and ``step`` with ``at`` begin at this step, from 1, from where the arm stands; the
+    steps before it are left out, except those that choose the tool frame or the speed. A program
+    that runs is ended first; its arm must be at rest. ``continue`` resumes a program that was
+    stopped, ended or failed, at the place of its path where the arm left it, after a motion back to
+    the path if the arm has been moved. It is refused if the gripper, the tool frame or the scene
+    has changed.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
     order: ProgramOrder
     unattended: bool = False
+    at: Annotated[int, Meta(ge=1)] | None = None
+
+
+class Breakpoints(Request, frozen=True, kw_only=True):
+    """Set the steps, from 1, before which the present program pauses, in place of earlier ones.
+
+    They last for all runs of scripts of this name, until another participant sends a script.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+    steps: Annotated[tuple[Annotated[int, Meta(ge=1)], ...], Meta(max_length=MAX_BREAKPOINTS)]
 
 
 class AllowUnattended(Request, frozen=True, kw_only=True):

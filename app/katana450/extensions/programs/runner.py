@@ -11,6 +11,9 @@ from katana450.errors import InputError
 from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan, SetSpeed, Wait
 from katana450.extensions.programs.program import Program
 
+FULL_SPEED = SetSpeed(1.0)
+"""The speed before any task."""
+
 
 class Phase(Enum):
     """The phase of a run. Only RUNNING can change."""
@@ -34,6 +37,9 @@ class Run:
         phase: phase of the run.
         why: reason of an early end.
         single: whether the run pauses after the current step.
+        pauses: indices of the steps before which the run pauses.
+        tau: place on the plan of the current task that the arm reached last [s]; 0 on no plan.
+        speed: the last speed that a task has set.
     """
 
     t: float
@@ -44,6 +50,9 @@ class Run:
     phase: Phase = Phase.RUNNING
     why: str = ""
     single: bool = False
+    pauses: frozenset[int] = frozenset()
+    tau: float = 0.0
+    speed: SetSpeed = FULL_SPEED
 
 
 @dataclass(frozen=True)
@@ -77,7 +86,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     """
     if run.phase is not Phase.RUNNING:
         return run, ()
-    dt, run = t - run.t, replace(run, t=t)
+    dt, run = t - run.t, replace(run, t=t, tau=_tau(program, run, state))
     if state.stopped is not None:
         return replace(run, phase=Phase.STOPPED, why="STOP was pressed."), ()
     if any(finding.reason is Reason.INTERNAL for finding in state.findings):
@@ -88,9 +97,9 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         return run, ()
     task = program.tasks[run.number]
     if not run.started:
-        return replace(run, started=True, waited=0.0, blocked=0.0), task.action.commands(
-            program.speed
-        )
+        speed = task.action if isinstance(task.action, SetSpeed) else run.speed
+        run = replace(run, started=True, waited=0.0, blocked=0.0, speed=speed)
+        return run, task.action.commands(program.speed)
     stands = state.blocked and state.motion.at_rest
     run = replace(run, waited=run.waited + dt, blocked=run.blocked + dt if stands else 0.0)
     try:
@@ -104,10 +113,19 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         return run, ()
     if run.number + 1 == len(program.tasks):
         return replace(run, phase=Phase.DONE), ()
-    after = replace(run, number=run.number + 1, started=False)
-    if run.single and program.tasks[after.number].number != task.number:
+    after = replace(run, number=run.number + 1, started=False, tau=0.0)
+    step_after = program.tasks[after.number].number
+    if step_after != task.number and (run.single or step_after in run.pauses):
         return replace(after, single=False), (cmd.Pause(),)
     return after, ()
+
+
+def _tau(program: Program, run: Run, state: State) -> float:
+    """Return the place [s] on the plan of the current task; the last one if it was left."""
+    action, following = program.tasks[run.number].action, state.following
+    if not run.started or following is None or not isinstance(action, FollowPlan):
+        return run.tau
+    return following.tau if following.plan is action.plan else run.tau
 
 
 def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:
@@ -125,7 +143,7 @@ def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0)
         if isinstance(action, SetSpeed):
             speed = min(action.scale(program.speed), allowed)
         elif isinstance(action, FollowPlan):
-            left += rest * action.plan.duration / speed
+            left += (rest * action.plan.duration if begun else action.duration) / speed
         elif isinstance(action, Wait):
             left += rest * action.seconds
     return left

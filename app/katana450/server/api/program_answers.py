@@ -23,6 +23,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         why: What is wrong with the program, or why it was planned again or not run.
         unattended: Whether it runs without heartbeats of its owner.
         began: Time at which the run began, in UTC, in ISO 8601; null before that.
+        breakpoints: Numbers of the steps before which it pauses.
+        can_continue: Whether it was interrupted, and the order continue may be given.
     """
 
     name: str
@@ -38,3 +40,5 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     why: str = ""
     unattended: bool = False
     began: str | None = None
+    breakpoints: tuple[int, ...] = ()
+    can_continue: bool = False

@@ -151,7 +151,8 @@ class ProgramsPanel:
     def _follow_steps(self, progress: Progress | None) -> None:
         look = 0.0 if self._look.disabled else self._look.value
         current = step_list.current_step(self._steps, progress, look)
-        page = step_list.page(self._steps, current)
+        breakpoints = () if progress is None else progress.breakpoints
+        page = step_list.page(self._steps, current, breakpoints)
         if page != self._list.content:
             self._list.content, self._list.visible = page, bool(page)
 

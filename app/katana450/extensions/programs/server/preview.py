@@ -87,7 +87,8 @@ class Preview:
             if paths:
                 self._path_line.points = np.concatenate(paths).astype(np.float32)
             self._path_line.visible = bool(paths)
-            if program is None or not paths:
+            # A program that is continued in the middle of a motion has no preview by time.
+            if program is None or not paths or program.first:
                 return 0.0
             self._shown = _Shown(program, Timeline.of(program), state)
             if ghosts:
@@ -248,12 +249,13 @@ class GhostSweep:
 def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
     """Return the tool's path of each plan, (PATH_SAMPLES, 2, 3) in the base frame [m]."""
     paths: list[FloatArray] = []
-    for task in program.tasks:
+    for task in program.tasks[program.first :]:
         if isinstance(task.action, UseTool):
             tool = task.action.name
         elif isinstance(task.action, FollowPlan):
-            chain = arm.chain_to(tool)
-            postures = task.action.plan.postures(PATH_SAMPLES + 1)
+            chain, plan = arm.chain_to(tool), task.action.plan
+            taus = np.linspace(task.action.tau, plan.span, PATH_SAMPLES + 1).tolist()
+            postures = [plan.q(tau) for tau in taus]
             points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
             paths.append(np.stack((points[:-1], points[1:]), axis=1))
     return paths

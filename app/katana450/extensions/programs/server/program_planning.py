@@ -10,9 +10,7 @@ from enum import Enum
 from katana450.arm.control.state import State
 from katana450.errors import CancelledError, KatanaError
 from katana450.extensions.programs.compiler import PlanningStage
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.situation import Situation
 from katana450.maths.planning.checkpoint import checked_by
 from katana450.server.api import answers
@@ -39,6 +37,7 @@ class Planning:
         text: the script.
         speed: fraction of the script's own speed.
         situation: the situation that it is planned for.
+        whole: whether the program begins at the first step of the script.
         name: name of the script; empty until it is parsed.
         stage: present stage of the planning; None before the first step.
         refused: reason why the program cannot run, else None.
@@ -50,15 +49,21 @@ class Planning:
         self,
         text: str,
         speed: float,
-        plan_context: PlanContext,
         state: State,
+        job: Callable[[Planning], Program],
         clock: Callable[[], float],
         note: str = "",
+        *,
+        whole: bool = True,
     ) -> None:
-        """Start the thread. ``clock`` returns the time [s]."""
+        """Start the thread, in which ``job`` plans from ``state``. ``clock`` returns the time [s].
+
+        ``job`` reports its progress to the planning, and sets its name.
+        """
         self.text = text
         self.speed = speed
         self.situation = Situation.of(state)
+        self.whole = whole
         self.name = ""
         self.stage: PlanningStage | None = None
         self.refused: str | None = None
@@ -67,9 +72,7 @@ class Planning:
         self._clock = clock
         self._began = clock()
         self._program: Program | None = None
-        self.thread = threading.Thread(
-            target=self._plan, args=(plan_context, state), name="planner", daemon=True
-        )
+        self.thread = threading.Thread(target=self._plan, args=(job,), name="planner", daemon=True)
         self.thread.start()
 
     @property
@@ -89,7 +92,7 @@ class Planning:
 
     def fits(self, text: str, speed: float, state: State) -> bool:
         """Return whether planning ``text`` at ``speed`` from ``state`` would give this program."""
-        same = self.program is not None and (self.text, self.speed) == (text, speed)
+        same = self.program is not None and (self.text, self.speed) == (text, speed) and self.whole
         return same and not self.changed_to(state)
 
     def changed_to(self, state: State) -> str:
@@ -123,12 +126,14 @@ class Planning:
             why=self.note,
         )
 
-    def _plan(self, plan_context: PlanContext, state: State) -> None:
+    def report(self, stage: PlanningStage) -> None:
+        """Show ``stage``, which begins."""
+        self.stage = stage
+
+    def _plan(self, job: Callable[[Planning], Program]) -> None:
         try:
-            script = parse(self.text)
-            self.name = script.name
             with checked_by(self._check):
-                self._program = compiled(script, plan_context, state, self.speed, self._report)
+                self._program = job(self)
         except CancelledError as error:
             if self.cancelled is None:
                 self.refused = str(error)
@@ -137,9 +142,6 @@ class Planning:
         except Exception:
             log.exception("Planning failed with an internal error.")
             self.refused = "Planning failed with an internal error. See the server's log."
-
-    def _report(self, stage: PlanningStage) -> None:
-        self.stage = stage
 
     def _check(self) -> None:
         if self.cancelled is not None:

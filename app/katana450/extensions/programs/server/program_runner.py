@@ -7,29 +7,32 @@ from __future__ import annotations
 
 import logging
 from argparse import Namespace
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
+
+import msgspec
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.state import State, Verdict
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import requests, runner
-from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.continuation import Interruption
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_owner import (
-    AlwaysAlive,
     ProgramOwner,
     check_may_drive,
-    program_identity,
 )
+from katana450.extensions.programs.server.program_participant import ProgramParticipant
+from katana450.extensions.programs.server.program_planner import PLANNED_ORDERS, ProgramPlanner
 from katana450.extensions.programs.server.program_planning import Planning
-from katana450.extensions.programs.server.script_parts import ScriptParts
+from katana450.extensions.programs.server.run_progress import run_progress
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
-from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.hub import Hub
 from katana450.server.service.last_pause import LastPause
 from katana450.server.service.participants import Participant, session_of
@@ -41,7 +44,12 @@ log = logging.getLogger(__name__)
 class ProgramRunner(Runner):
     """The runner of at most one program at a time."""
 
-    request_types = (requests.Program, requests.Steer, requests.AllowUnattended)
+    request_types = (
+        requests.Program,
+        requests.Steer,
+        requests.Breakpoints,
+        requests.AllowUnattended,
+    )
     controls = ("Script", "Program", "Look at")
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
@@ -53,13 +61,10 @@ class ProgramRunner(Runner):
         super().__init__(hub, options)
         allowed = not options.no_unattended
         self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
-        self._parts = ScriptParts()
-        self._planning: Planning | None = None
-        self._then: ProgramOrder | None = None
-        self._runs_as: Participant | None = None
+        self._planner = ProgramPlanner(hub, self._owner)
+        self._interruption: Interruption | None = None
+        self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
-        # The speed to restore at the end, the maximum that a person allows, and the last command.
-        self._speed = self._allowed = self._commanded = 1.0
 
     @property
     def running(self) -> bool:
@@ -69,12 +74,12 @@ class ProgramRunner(Runner):
     @property
     def program(self) -> Program | None:
         """The planned program."""
-        return None if self._planning is None else self._planning.program
+        return self._planner.program
 
     @property
     def waits(self) -> bool:
         """True if the program runs as soon as it is planned."""
-        return self._then is not None
+        return self._planner.then is not None
 
     def owns(self, participant: Participant) -> bool:
         """Return whether ``participant`` owns the present program."""
@@ -91,61 +96,50 @@ class ProgramRunner(Runner):
         match request:
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(participant, text, more=more, speed=speed)
-            case requests.Steer(order=order, unattended=unattended):
-                if ticket := self.steer(participant, order, unattended=unattended):
+            case requests.Steer(order=order, unattended=unattended, at=at):
+                if ticket := self.steer(participant, order, unattended=unattended, at=at):
                     return answers.Done(ticket=ticket)
                 return answers.Done(outcome=Verdict.ACCEPTED.value)
+            case requests.Breakpoints(steps=steps):
+                self.set_breakpoints(participant, steps)
             case requests.AllowUnattended(allowed=allowed):
                 self._owner.allow_unattended(participant.person, allowed=allowed)
         return answers.Done()
 
     def then(self, order: ProgramOrder | None) -> None:
         """Carry out ``order`` as soon as the present script is planned."""
-        self._then = order
+        self._planner.then = order
 
     def script(self, participant: Participant, text: str, *, more: bool, speed: float) -> None:
-        """Take a part of a script; after the last part, plan it from the present state of the arm.
+        """Take a part of a script, see ``ProgramPlanner.script``.
 
-        The last plan is kept if it is of the same script and nothing has changed since. Raises
-        LeaseError while another program runs or is planned, and InputError for too long a script.
+        Raises LeaseError while another program runs or is planned, and InputError for too long a
+        script.
         """
-        script = self._parts.add(participant.person.key, text, more=more)
-        if script is None:
-            return
-        if self.running:
+        if not more and self.running:
             raise LeaseError("A program is running. End it first.")
-        arm = self.hub.present()
-        if arm.state.moving:
-            raise LeaseError("The arm is moving. Plan the program when it is at rest.")
-        check_may_drive(participant.person)
-        before = self._planning
-        if before is not None and before.busy:
-            before.cancel(self._owner.superseded_by(participant))
-        if before is not None and before.fits(script, speed, arm.state):
-            before.refused, before.note = None, ""
-            self._own(participant)
-            return
-        changed = ""
-        if before is not None and (before.text, before.speed) == (script, speed) and before.program:
-            changed = before.changed_to(arm.state)
-        self._plan(participant, script, speed, changed)
+        before = self._planner.planning
+        if self._planner.script(participant, text, more=more, speed=speed):
+            self._run = None
+            now = self._planner.planning
+            if before is None or now is None or before.text != now.text:
+                self._interruption = None
 
-    def _plan(self, participant: Participant, text: str, speed: float, changed: str) -> None:
-        """Plan ``text`` from the present state; ``changed``: why an earlier plan is void."""
-        arm = self.hub.present()
-        note = f"Planned again: {changed}." if changed else ""
-        context = PlanContext(arm.session, arm.arm.T_base_shoulder)
-        self._planning = Planning(text, speed, context, arm.state, self.hub.clock, note)
-        self._own(participant)
-
-    def _own(self, participant: Participant) -> None:
-        self._run = self._then = None
-        self._owner.change_to(participant, self.hub.clock())
+    def set_breakpoints(self, participant: Participant, steps: Sequence[int]) -> None:
+        """Make the present program pause before ``steps``, from 1. Raises LeaseError."""
+        self._planner.set_breakpoints(participant, steps)
+        if self._run is not None:
+            self._run = replace(self._run, pauses=self._planner.breakpoints)
 
     def steer(
-        self, participant: Participant, order: ProgramOrder, *, unattended: bool = False
+        self,
+        participant: Participant,
+        order: ProgramOrder,
+        *,
+        unattended: bool = False,
+        at: int | None = None,
     ) -> int | None:
-        """Run, step, pause, resume or end the program. Raises LeaseError if it is refused.
+        """Carry out ``order`` for the program; see ``requests.Steer``. Raises LeaseError.
 
         During planning, RUN and STEP take effect at its end, PAUSE and RESUME decide whether the
         program then starts paused, and END cancels the planning.
@@ -153,16 +147,26 @@ class ProgramRunner(Runner):
         Returns the ticket of the command that the arm was given now; None for none.
         """
         check_may_drive(participant.person)
-        begins = order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running
+        plans = order is ProgramOrder.CONTINUE or at is not None
+        begins = order in PLANNED_ORDERS and (plans or not self.running)
         if unattended and not begins:
-            raise LeaseError("Only `run` and `step` begin an unattended program.")
+            raise LeaseError("Only `run`, `step` and `continue` begin an unattended program.")
+        if at is not None and order not in (ProgramOrder.RUN, ProgramOrder.STEP):
+            raise LeaseError("Only `run` and `step` begin at a step.")
         self._owner.check_unattended(unattended=unattended)
-        planning = self._planning
+        planning = self._planner.planning
         if planning is not None and planning.busy:
             self._owner.check_may_steer(participant.person)
-            ticket = self._steer_planning(planning, participant, order)
+            if at is not None:
+                planning.cancel(f"{participant.person.name} runs it from step {at}.")
+                self._plan_part(participant, order, at, unattended=unattended)
+                return None
+            ticket = self._planner.steer(participant, order)
             self._owner.unattended = self._owner.unattended or unattended
             return ticket
+        if plans:
+            self._plan_part(participant, order, at, unattended=unattended)
+            return None
         if begins:
             return self._begin(participant, order, unattended=unattended)
         if not self.running or self._run is None:
@@ -183,42 +187,23 @@ class ProgramRunner(Runner):
                 return ticket
             case ProgramOrder.END:
                 return self._end(f"{participant.person.name} ended it.")
-
-    def _steer_planning(
-        self, planning: Planning, participant: Participant, order: ProgramOrder
-    ) -> int | None:
-        match order:
-            case ProgramOrder.RUN | ProgramOrder.STEP:
-                self.hub.gate.check_not_stopped()
-                self._then, planning.note = order, ""
-            case ProgramOrder.PAUSE:
-                return self.hub.move(participant, cmd.Pause())
-            case ProgramOrder.RESUME:
-                return self.hub.move(participant, cmd.Resume())
-            case ProgramOrder.END:
-                self._then = None
-                planning.cancel(f"{participant.person.name} cancelled the planning.")
-        return None
+            case ProgramOrder.CONTINUE:
+                raise AssertionError("`continue` was handled above.")
 
     def stopped(self) -> None:
         """Cancel a run that waits for its planning, after STOP."""
-        self._forget_run("STOP was pressed during planning")
+        self._planner.forget_run("STOP was pressed during planning")
 
     def redirected(self) -> None:
         """Cancel a run that waits for its planning, after another command to the arm."""
-        self._forget_run("the arm was given another command during planning")
-
-    def _forget_run(self, why: str) -> None:
-        planning = self._planning
-        if self._then is not None and planning is not None:
-            self._then, planning.note = None, f"Not run: {why}."
+        self._planner.forget_run("the arm was given another command during planning")
 
     def leave(self, participant: Participant) -> None:
         """Forget ``participant``; end its program, or the run that waits for its planning."""
-        self._parts.forget(participant.person.key)
+        self._planner.forget_parts(participant)
         if not self.owns(participant):
             return
-        self._forget_run(f"{participant.person.name} left")
+        self._planner.forget_run(f"{participant.person.name} left")
         if self.running and not self._owner.unattended:
             self._end(f"{participant.person.name} left.")
 
@@ -232,20 +217,21 @@ class ProgramRunner(Runner):
     def tick(self) -> None:
         """Advance the running program by one step, or end it if owner, lease or stop demand it."""
         hub, t = self.hub, self.hub.clock()
-        if self._then is not None and self._owner.is_silent(t):
-            self._forget_run("its owner sends no heartbeats")
-        if self.program is not None and self._then is not None:
+        if self.waits and self._owner.is_silent(t):
+            self._planner.forget_run("its owner sends no heartbeats")
+        if self.program is not None and self.waits:
             self._start_planned()
         program = self.program
         if self._runs_as is None or self._run is None or program is None:
             return
-        if hub.lease.holder != self._runs_as.person:
+        if not self._runs_as.drives:
             # The next holder takes over an arm at rest, so no command is needed.
-            self._leave_with(Phase.STOPPED, "The lease was taken from the program.")
+            taken = "The lease was taken from the program."
+            self._leave_with(runner.ended(self._run, Phase.STOPPED, taken))
             return
         owner = self._owner.participant
         if (why := hub.halted) is not None:
-            self._leave_with(Phase.STOPPED, why)
+            self._leave_with(runner.ended(self._run, Phase.STOPPED, why))
             return
         if owner is not None and self._owner.is_missing(t):
             why = "sends no heartbeats" if self._owner.is_here else "left"
@@ -253,42 +239,43 @@ class ProgramRunner(Runner):
             return
         arm = hub.arm
         if arm is not None and arm.caught_up:
-            if arm.state.speed != self._commanded:
-                # A speed set by a person applies to the end of the program and after it.
-                self._speed = self._allowed = self._commanded = arm.state.speed
-            self._run, commands = runner.step(program, self._run, arm.state, t)
+            self._runs_as.follow_speed(arm.state)
+            run, commands = runner.step(program, self._run, arm.state, t)
             try:
                 self._send(*commands)
             except InputError as error:
-                self._leave_with(Phase.FAILED, str(error))
-                return
-            if self._run.phase is not Phase.RUNNING:
-                self._leave_with(self._run.phase, self._run.why)
+                run = runner.ended(run, Phase.FAILED, str(error))
+            if run.phase is Phase.RUNNING:
+                self._run = run
+            else:
+                self._leave_with(run)
 
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last program; None if there was none."""
-        planning, owner = self._planning, self._owner.participant
+        planning, owner = self._planner.planning, self._owner.participant
         if planning is None or owner is None:
             return None
         program, run, arm = planning.program, self._run, self.hub.arm
         if program is None or run is None or arm is None or planning.refused is not None:
-            return planning.progress(owner.person.name)
-        now, began = runner.progress(program, run, arm.state), self._owner.began
-        return answers.Progress(
-            name=program.name,
-            by=owner.person.name,
-            status=now.status,
-            step=now.step,
-            steps=now.steps,
-            line=now.line,
-            task=now.name,
-            fraction=now.fraction,
-            seconds=program.duration,
-            seconds_left=runner.seconds_left(program, run, arm.state, self._allowed),
-            why=now.why,
+            found = planning.progress(owner.person.name)
+        else:
+            allowed = 1.0 if self._runs_as is None else self._runs_as.allowed
+            found = run_progress(program, run, arm.state, owner.person.name, allowed)
+        began = self._owner.began
+        return msgspec.structs.replace(
+            found,
             unattended=self._owner.unattended and self.running,
             began=None if began is None else began.isoformat(timespec="seconds"),
+            breakpoints=tuple(sorted(each + 1 for each in self._planner.breakpoints)),
+            can_continue=self._may_continue,
         )
+
+    @property
+    def _may_continue(self) -> bool:
+        """True if the program was interrupted and nothing runs or is planned."""
+        planning = self._planner.planning
+        idle = not self.running and planning is not None and not planning.busy
+        return idle and self._interruption is not None
 
     def status_line(self, state: State, line: StatusLine) -> StatusLine:
         """Return the line for the program in place of ``line``."""
@@ -300,101 +287,106 @@ class ProgramRunner(Runner):
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
-        then, self._then = self._then, None
-        owner = self._owner.participant
-        if then is None or owner is None:  # It was cancelled meanwhile.
+        then, self._planner.then = self._planner.then, None
+        owner, planning = self._owner.participant, self._planner.planning
+        if then is None or owner is None or planning is None:  # It was cancelled meanwhile.
             return
+        unattended = self._owner.unattended
         try:
-            self.steer(owner, then, unattended=self._owner.unattended)
+            if planning.whole:
+                self.steer(owner, then, unattended=unattended)
+            elif changed := planning.changed_to(self.hub.present().state):
+                raise LeaseError(f"Not run: {changed}.")
+            else:
+                check_may_drive(owner.person)
+                self._owner.check_unattended(unattended=unattended)
+                self._start(planning, owner, then, unattended=unattended)
         except LeaseError as error:
-            assert self._planning is not None
-            self._planning.refused = str(error)
+            planning.refused = str(error)
+
+    def _plan_part(
+        self, participant: Participant, order: ProgramOrder, at: int | None, *, unattended: bool
+    ) -> None:
+        """Plan the program from a step, or from where it ended early, and then run it."""
+        planning, interruption = self._planner.planning, self._interruption
+        if planning is None:
+            raise LeaseError("No program is planned. Send a script first.")
+        if self.running and at is None:
+            raise LeaseError("The program is running. `resume` ends a pause.")
+        if at is None and interruption is None:
+            raise LeaseError("No program was interrupted. Run it from the beginning.")
+        self._owner.check_may_steer(participant.person)
+        self.hub.gate.check_not_stopped()
+        if self.running:
+            if self.hub.present().state.moving:
+                raise LeaseError("The arm is moving. Pause it first, and choose the step at rest.")
+            self._end(f"{participant.person.name} went to step {at}.")
+        self._planner.check_free(participant)
+        if at is None and interruption is not None:
+            self._planner.plan_rest(participant, interruption, planning)
+        else:
+            self._planner.plan(participant, planning.text, planning.speed, first_step=(at or 1) - 1)
+        self._run = None
+        self._planner.then, self._owner.unattended = order, unattended
 
     def _begin(
         self, participant: Participant, order: ProgramOrder, *, unattended: bool
     ) -> int | None:
         """Run the planned program. If the situation has changed, plan it again first."""
-        planning, hub = self._planning, self.hub
-        if planning is None or planning.program is None:
-            raise LeaseError("No program is planned. Send a script first.")
-        arm = hub.present()
-        changed = planning.changed_to(arm.state)
-        if changed:
+        planning = self._planner.require()
+        changed = planning.changed_to(self.hub.present().state)
+        if changed or not planning.whole:
             self.hub.gate.check_not_stopped()
-            if arm.state.moving:
-                raise LeaseError("The arm is moving. Plan the program when it is at rest.")
-            if hub.lease.holder != participant.person:
-                # Otherwise a refusal would come only at the end of the planning, which takes long.
-                hub.lease.acquire(participant.person, hub.clock())
-            self._plan(participant, planning.text, planning.speed, changed)
-            self._then, self._owner.unattended = order, unattended
+            self._planner.check_free(participant)
+            self._planner.plan(participant, planning.text, planning.speed, changed)
+            self._run = None
+            self._planner.then, self._owner.unattended = order, unattended
             return None
+        return self._start(planning, participant, order, unattended=unattended)
+
+    def _start(
+        self, planning: Planning, participant: Participant, order: ProgramOrder, *, unattended: bool
+    ) -> int | None:
+        """Run the program of ``planning``, which fits the present situation."""
+        assert planning.program is not None
         planning.refused, planning.note = None, ""
         program = planning.program
-        identity = program_identity(program.name, participant.person)
-        alive = AlwaysAlive(hub.clock)
-        joined = hub.join(identity, "program", lambda _notice: None, alive, CommandChannel.PROGRAM)
-        try:
-            if hub.lease.holder == participant.person:
-                # A handover in one step: no other participant can take the lease in between.
-                hub.hand_over(participant, joined.number)
-            else:
-                hub.acquire(joined)
-            # Drops earlier targets; a pause lasts. Raises LeaseError if the arm is stopped.
-            ticket = hub.move(joined, cmd.Hold())
-        except LeaseError:
-            hub.leave(joined, for_good=True)
-            raise
-        began = hub.clock()
-        self._runs_as = joined
+        self._runs_as = ProgramParticipant(self.hub, program.name, participant)
+        began = self.hub.clock()
         self._owner.begin(participant, began, unattended=unattended)
-        hub.gate.program = RunningProgram(joined.person, participant.person.key)
-        self._speed = self._commanded = arm.state.speed
-        self._allowed = 1.0
-        self._run = Run(began, single=order is ProgramOrder.STEP)
+        self._interruption = None
+        single, pauses = order is ProgramOrder.STEP, self._planner.breakpoints
+        self._run = Run(began, number=program.first, single=single, pauses=pauses)
         how = "runs unattended" if unattended else "runs"
         log.info("%s %s the program %s.", participant.person.name, how, program.name)
         what = {"program": program.name, "order": order.value, "unattended": unattended}
-        hub.recorder.note("program", participant.actor, what)
-        return ticket
+        self.hub.recorder.note("program", participant.actor, what)
+        return self._runs_as.ticket
 
     def _send(self, *commands: cmd.Command) -> int | None:
         """Give ``commands`` to the arm; return the ticket of the last."""
         assert self._runs_as is not None
-        ticket = None
-        for command in commands:
-            ticket = self.hub.move(self._runs_as, self._as_allowed(command))
-        return ticket
-
-    def _as_allowed(self, command: cmd.Command) -> cmd.Command:
-        """Return ``command``, no faster than a person has allowed since the program began."""
-        if not isinstance(command, cmd.SpeedScale):
-            return command
-        self._commanded = min(command.value, self._allowed)
-        return cmd.SpeedScale(self._commanded)
+        return self._runs_as.send(*commands)
 
     def _end(self, why: str) -> int | None:
         assert self._run is not None
-        self._run, commands = runner.stopped(self._run, why)
+        run, commands = runner.stopped(self._run, why)
         ticket = None
         # An arm that is stopped or does not answer accepts no commands.
         with suppress(LeaseError, InputError):
             ticket = self._send(*commands)
-        self._leave_with(Phase.STOPPED, why)
+        self._leave_with(run)
         return ticket
 
-    def _leave_with(self, phase: Phase, why: str) -> None:
-        """End the run and release the lease; the arm is at rest or comes to rest."""
+    def _leave_with(self, run: Run) -> None:
+        """End with ``run`` and release the lease; the arm is at rest or comes to rest."""
         assert self._runs_as is not None
-        assert self._run is not None
-        joined, self._runs_as = self._runs_as, None
-        self.hub.gate.program = None
-        self._run = runner.ended(self._run, phase, why)
-        # The speed of a program does not outlast it.
-        with suppress(InputError):
-            self.hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
-        if self.hub.lease.holder == joined.person:
-            self.hub.release_lease(joined)
-        self.hub.leave(joined, for_good=True)
-        log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
-        self.hub.recorder.note("program", joined.actor, {"ended": phase.value}, why=why)
+        if self.program is not None:
+            # Set first, because the progress is read in other threads too.
+            self._interruption = Interruption.of(self.program, run, self.hub.present().state)
+        left, self._runs_as = self._runs_as, None
+        self._run = run
+        left.leave()
+        joined = left.joined
+        log.info("The program %s: %s", joined.person.name, run.why or f"{run.phase.value}.")
+        self.hub.recorder.note("program", joined.actor, {"ended": run.phase.value}, why=run.why)

@@ -78,5 +78,8 @@ def _unattended(program: Progress) -> str:
 
 def orders(program: Progress | None) -> tuple[str, ...]:
     """Return the orders that the page offers to the owner of ``program``."""
-    ends = program is not None and program.status in (PlanningPhase.PLANNING.value, *RUNS)
-    return (ProgramOrder.END.value,) if ends else ()
+    if program is None:
+        return ()
+    if program.status in (PlanningPhase.PLANNING.value, *RUNS):
+        return (ProgramOrder.END.value,)
+    return (ProgramOrder.CONTINUE.value,) if program.can_continue else ()

@@ -1,0 +1,80 @@
+"""The participant as which a program holds the lease, and the speed that it may use."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import SERVER, CommandChannel
+from katana450.arm.control.state import State
+from katana450.errors import InputError, LeaseError
+from katana450.extensions.programs.server.program_owner import AlwaysAlive, program_identity
+from katana450.server.service.command_gate import RunningProgram
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Participant
+
+
+class ProgramParticipant:
+    """The participant of one run of a program.
+
+    Attributes:
+        joined: the participant.
+        ticket: ticket of the first command, which drops earlier targets.
+        allowed: maximum fraction of full speed that a person has allowed since the run began.
+    """
+
+    def __init__(self, hub: Hub, name: str, owner: Participant) -> None:
+        """Join ``hub`` as the program ``name`` of ``owner``, and take the lease.
+
+        Raises LeaseError if another participant holds it, or the arm is stopped.
+        """
+        self._hub = hub
+        identity, alive = program_identity(name, owner.person), AlwaysAlive(hub.clock)
+        joined = hub.join(identity, "program", lambda _notice: None, alive, CommandChannel.PROGRAM)
+        try:
+            if hub.lease.holder == owner.person:
+                # A handover in one step: no other participant can take the lease in between.
+                hub.hand_over(owner, joined.number)
+            else:
+                hub.acquire(joined)
+            # Drops earlier targets; a pause lasts. Raises LeaseError if the arm is stopped.
+            self.ticket = hub.move(joined, cmd.Hold())
+        except LeaseError:
+            hub.leave(joined, for_good=True)
+            raise
+        self.joined = joined
+        hub.gate.program = RunningProgram(joined.person, owner.person.key)
+        # The speed to restore at the end, and the last one that was commanded.
+        self._speed = self._commanded = hub.present().state.speed
+        self.allowed = 1.0
+
+    @property
+    def drives(self) -> bool:
+        """True while the program holds the lease."""
+        return self._hub.lease.holder == self.joined.person
+
+    def follow_speed(self, state: State) -> None:
+        """Keep a speed that a person has set, to the end of the program and after it."""
+        if state.speed != self._commanded:
+            self._speed = self.allowed = self._commanded = state.speed
+
+    def send(self, *commands: cmd.Command) -> int | None:
+        """Give ``commands`` to the arm, no faster than allowed; return the ticket of the last."""
+        ticket = None
+        for command in commands:
+            sent = command
+            if isinstance(command, cmd.SpeedScale):
+                self._commanded = min(command.value, self.allowed)
+                sent = cmd.SpeedScale(self._commanded)
+            ticket = self._hub.move(self.joined, sent)
+        return ticket
+
+    def leave(self) -> None:
+        """Restore the speed, release the lease and leave the hub."""
+        hub = self._hub
+        hub.gate.program = None
+        with suppress(InputError):
+            hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
+        if self.drives:
+            hub.release_lease(self.joined)
+        hub.leave(self.joined, for_good=True)

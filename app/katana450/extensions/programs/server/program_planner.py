@@ -1,0 +1,193 @@
+"""The planning of the present script, and the order that waits for its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from katana450.arm.control import commands as cmd
+from katana450.errors import LeaseError
+from katana450.extensions.programs.continuation import Interruption, continued
+from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.requests import ProgramOrder
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
+from katana450.extensions.programs.server.program_planning import Planning
+from katana450.extensions.programs.server.script_parts import ScriptParts
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Participant
+
+PLANNED_ORDERS = (ProgramOrder.RUN, ProgramOrder.STEP, ProgramOrder.CONTINUE)
+"""The orders that need a planned program."""
+
+
+class ProgramPlanner:
+    """The planner of at most one script at a time, for its owner.
+
+    Attributes:
+        planning: the last planning; None before the first script.
+        then: the order that is carried out as soon as the planning has succeeded; None for none.
+    """
+
+    def __init__(self, hub: Hub, owner: ProgramOwner) -> None:
+        """Prepare to plan for the arm of ``hub``."""
+        self.planning: Planning | None = None
+        self.then: ProgramOrder | None = None
+        self._hub = hub
+        self._owner = owner
+        self._parts = ScriptParts()
+        # Name of the script that the breakpoints belong to, and the indices of their steps.
+        self._breakpoints: tuple[str, frozenset[int]] = "", frozenset()
+
+    @property
+    def program(self) -> Program | None:
+        """The planned program."""
+        return None if self.planning is None else self.planning.program
+
+    def script(self, participant: Participant, text: str, *, more: bool, speed: float) -> bool:
+        """Take a part of a script; after the last part, plan it from the present state of the arm.
+
+        The last plan is kept if it is of the same script and nothing has changed since. Returns
+        whether the script is complete. Raises LeaseError while another program is planned, and
+        InputError for too long a script.
+        """
+        script = self._parts.add(participant.person.key, text, more=more)
+        if script is None:
+            return False
+        arm = self._hub.present()
+        self.check_at_rest()
+        check_may_drive(participant.person)
+        before = self.planning
+        if not self._owner.is_person(participant.person):
+            self._breakpoints = "", frozenset()
+        if before is not None and before.busy:
+            before.cancel(self._owner.superseded_by(participant))
+        if before is not None and before.fits(script, speed, arm.state):
+            before.refused, before.note = None, ""
+            self._own(participant)
+            return True
+        changed = ""
+        if before is not None and (before.text, before.speed) == (script, speed) and before.program:
+            changed = before.changed_to(arm.state)
+        self.plan(participant, script, speed, changed)
+        return True
+
+    def require(self) -> Planning:
+        """Return the planning of the present program. Raises LeaseError if none is planned."""
+        if self.planning is None or self.planning.program is None:
+            raise LeaseError("No program is planned. Send a script first.")
+        return self.planning
+
+    @property
+    def breakpoints(self) -> frozenset[int]:
+        """Indices of the steps before which the present program pauses."""
+        name, steps = self._breakpoints
+        same = self.planning is not None and self.planning.name == name
+        return steps if same else frozenset()
+
+    def set_breakpoints(self, participant: Participant, steps: Iterable[int]) -> None:
+        """Make the present program pause before ``steps``, from 1. Raises LeaseError."""
+        if self.planning is None:
+            raise LeaseError("There is no program. Send a script first.")
+        self._owner.check_may_steer(participant.person)
+        self._breakpoints = self.planning.name, frozenset(step - 1 for step in steps)
+
+    def forget_parts(self, participant: Participant) -> None:
+        """Forget the parts of an incomplete script of ``participant``."""
+        self._parts.forget(participant.person.key)
+
+    def check_free(self, participant: Participant) -> None:
+        """Raise LeaseError unless the arm rests, and take the lease for ``participant``.
+
+        Otherwise a refusal would come only at the end of the planning, which takes long.
+        """
+        self.check_at_rest()
+        if self._hub.lease.holder != participant.person:
+            self._hub.lease.acquire(participant.person, self._hub.clock())
+
+    def check_at_rest(self) -> None:
+        """Raise LeaseError while the arm moves, because plans begin where it stands."""
+        if self._hub.present().state.moving:
+            raise LeaseError("The arm is moving. Plan the program when it is at rest.")
+
+    def plan(
+        self,
+        participant: Participant,
+        text: str,
+        speed: float,
+        changed: str = "",
+        first_step: int = 0,
+    ) -> None:
+        """Plan ``text`` from the present state, from the step with index ``first_step``.
+
+        ``speed`` is the fraction of the script's own speed, and ``changed`` a clause on why an
+        earlier plan is void.
+        """
+        note = f"Planned again: {changed}." if changed else ""
+        context, state = self._context(), self._hub.present().state
+
+        def job(planning: Planning) -> Program:
+            script = parse(text)
+            planning.name = script.name
+            return compiled(script, context, state, speed, planning.report, first_step=first_step)
+
+        self.planning = Planning(
+            text, speed, state, job, self._hub.clock, note, whole=not first_step
+        )
+        self._own(participant)
+
+    def plan_rest(
+        self, participant: Participant, interruption: Interruption, before: Planning
+    ) -> None:
+        """Plan the rest of the interrupted program of ``before``.
+
+        Raises LeaseError if something else than the posture of the arm has changed.
+        """
+        context, state = self._context(), self._hub.present().state
+        if changed := interruption.changed_to(state):
+            raise LeaseError(f"The program cannot continue: {changed}. Run it again.")
+
+        def job(planning: Planning) -> Program:
+            planning.name = interruption.program.name
+            return continued(interruption, context, state)
+
+        note = f"It continues at step {interruption.task.number + 1}."
+        self.planning = Planning(
+            before.text, before.speed, state, job, self._hub.clock, note, whole=False
+        )
+        self._own(participant)
+
+    def steer(self, participant: Participant, order: ProgramOrder) -> int | None:
+        """Note or carry out ``order`` while a program is being planned.
+
+        Returns the ticket of the command that the arm was given; None for none.
+        """
+        planning, hub = self.planning, self._hub
+        assert planning is not None
+        match order:
+            case ProgramOrder.RUN | ProgramOrder.STEP:
+                hub.gate.check_not_stopped()
+                self.then, planning.note = order, ""
+            case ProgramOrder.CONTINUE:
+                raise LeaseError("A program is being planned. Cancel it, or wait for it.")
+            case ProgramOrder.PAUSE:
+                return hub.move(participant, cmd.Pause())
+            case ProgramOrder.RESUME:
+                return hub.move(participant, cmd.Resume())
+            case ProgramOrder.END:
+                self.then = None
+                planning.cancel(f"{participant.person.name} cancelled the planning.")
+        return None
+
+    def forget_run(self, why: str) -> None:
+        """Cancel the order that waits for the planning, because of ``why``, a clause."""
+        if self.then is not None and self.planning is not None:
+            self.then, self.planning.note = None, f"Not run: {why}."
+
+    def _context(self) -> PlanContext:
+        arm = self._hub.present()
+        return PlanContext(arm.session, arm.arm.T_base_shoulder)
+
+    def _own(self, participant: Participant) -> None:
+        self.then = None
+        self._owner.change_to(participant, self._hub.clock())

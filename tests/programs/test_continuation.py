@@ -1,0 +1,242 @@
+"""Tests of programs that are interrupted at any time and continued from where the arm stands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import katana450.extensions.programs
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state import State
+from katana450.arm.control.stopping import HOLD_OFF
+from katana450.errors import BlockedError, InputError
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.continuation import RETURN, Interruption, continued
+from katana450.extensions.programs.pouring import POURING
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.script import parse
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from tests.programs.conftest import TICK, Stage
+
+SCRIPT = """\
+name: Interrupted
+tool: tcp
+frame: base
+steps:
+  - speed: 0.8
+  - move: {x: 320, y: -40, z: 150, pitch: 50, roll: 0}
+  - line: {by: {y: 60}}
+  - gripper: open
+  - wait: 0.2
+  - arc: {centre: {x: 320, y: 20, z: 130}, axis: y, angle: 40, pitch: 60}
+"""
+
+POUR = Path(katana450.extensions.programs.__file__).parent / "library" / "pour.yaml"
+
+
+@pytest.fixture(scope="module")
+def program(stage: Stage) -> Program:
+    return compiled(parse(SCRIPT), stage.plan_context, stage.begin())
+
+
+def given(stage: Stage, state: State, *commands: cmd.Command) -> State:
+    """Return the state in which ``commands`` are done and the arm is at rest."""
+    for _ in range(3000):
+        state = stage.session.step(state, commands, state.t + TICK)
+        state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
+        commands = ()
+        if not state.moving:
+            return state
+    raise AssertionError("The arm does not come to rest.")
+
+
+def stopped_after(
+    stage: Stage, program: Program, ticks: int, start: State | None = None
+) -> tuple[Run, State]:
+    """Return the run and the state after a stop at the tick ``ticks``, cleared at rest."""
+    state, run = start or stage.begin(), Run(0.0, number=program.first)
+    for _ in range(ticks):
+        run, state = stage.tick(program, run, state)
+    return stop(stage, program, run, state)
+
+
+def stop(stage: Stage, program: Program, run: Run, state: State) -> tuple[Run, State]:
+    """Return the run and the state after a stop that is cleared as soon as that is allowed."""
+    state = stage.session.step(state, [cmd.Stop()], state.t + TICK)
+    for _ in range(math.ceil(HOLD_OFF / TICK) + 100):
+        run, state = stage.tick(program, run, state)
+    assert run.phase is Phase.STOPPED
+    state = given(stage, state, cmd.ClearStop())
+    assert state.stopped is None
+    return run, state
+
+
+def interruption_of(program: Program, run: Run, state: State) -> Interruption:
+    found = Interruption.of(program, run, state)
+    assert found is not None
+    return found
+
+
+def played(stage: Stage, program: Program, state: State) -> list[State]:
+    """Return the states of the run of ``program``, which must succeed."""
+    run, states = Run(state.t, number=program.first), [state]
+    while run.phase is Phase.RUNNING and len(states) < 5000:
+        run, state = stage.tick(program, run, state)
+        states.append(state)
+    assert (run.phase, run.why) == (Phase.DONE, "")
+    return states
+
+
+def off_path(program: Program, states: list[State]) -> float:
+    """Return the maximum distance of the postures of ``states`` from the path of ``program``."""
+    plans = [task.action.plan for task in program.tasks if isinstance(task.action, FollowPlan)]
+    path = np.concatenate([plan.postures(800) for plan in plans])
+    return max(float(np.abs(path - state.setpoint).max(axis=1).min()) for state in states[::5])
+
+
+def after_return(rest: Program, states: list[State]) -> list[State]:
+    """Return the ``states`` after the return to the path, with which ``rest`` may begin."""
+    way = [task.action for task in rest.tasks if task.name == RETURN]
+    if not way:
+        return states
+    assert isinstance(way[-1], FollowPlan)
+    end = way[-1].plan.end
+    there = next(n for n, each in enumerate(states) if np.abs(each.setpoint - end).max() < 1e-9)
+    return states[there:]
+
+
+@pytest.mark.parametrize(
+    "ticks",
+    [30, 140, *(pytest.param(n, marks=pytest.mark.long) for n in range(10, 420, 17))],
+)
+def test_stopped_program_continues_on_its_path(stage: Stage, program: Program, ticks: int) -> None:
+    whole = played(stage, program, stage.begin())
+    run, state = stopped_after(stage, program, min(ticks, len(whole) - 20))
+    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    states = played(stage, rest, state)
+    assert states[-1].setpoint == pytest.approx(whole[-1].setpoint, abs=1e-9)
+    assert states[-1].gripper == whole[-1].gripper
+    # Where it is safe the arm brakes as hard as it can, which leads it off its path.
+    assert off_path(program, states) < 0.1
+    assert off_path(program, after_return(rest, states)) < 5e-3
+    assert max(stage.loads(states)) <= 1.0 + 1e-6
+
+
+def test_stopped_twice_it_still_continues(stage: Stage, program: Program) -> None:
+    run, state = stopped_after(stage, program, 60)
+    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    run, state = stopped_after(stage, rest, 25, state)
+    again = continued(interruption_of(rest, run, state), stage.plan_context, state)
+    states = played(stage, again, state)
+    assert off_path(program, after_return(again, states)) < 5e-3
+    assert states[-1].setpoint == pytest.approx(program_end(program), abs=1e-9)
+
+
+def program_end(program: Program) -> FloatArray:
+    last = [task.action for task in program.tasks if isinstance(task.action, FollowPlan)][-1]
+    return last.plan.end
+
+
+def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Program) -> None:
+    run, state = stopped_after(stage, program, 60)
+    interruption = interruption_of(program, run, state)
+    stood = state.setpoint
+    state = given(stage, state, cmd.SetJoints(stood + np.array([0.3, 0.1, -0.1, 0.2, 0.4])))
+    rest = continued(interruption, stage.plan_context, state)
+    assert [task.name for task in rest.tasks[rest.first : rest.first + 2]] == ["speed", RETURN]
+    assert rest.tasks[rest.first].number == interruption.task.number
+    states = played(stage, rest, state)
+    assert off_path(program, states[:1]) > 0.3
+    assert off_path(program, after_return(rest, states)) < 5e-3
+    assert states[-1].setpoint == pytest.approx(program_end(program), abs=1e-9)
+
+
+@pytest.mark.parametrize("changed", ["gripper", "scene", "tool frame"])
+def test_changed_surroundings_are_refused_by_name(
+    stage: Stage, program: Program, changed: str
+) -> None:
+    run, state = stopped_after(stage, program, 60)
+    interruption = interruption_of(program, run, state)
+    T = np.eye(4)
+    T[:3, 3] = (-0.3, 0.3, 0.0)
+    commands: dict[str, cmd.Command] = {
+        "gripper": cmd.SetGripper(stage.plan_context.arm.gripper.upper),
+        "scene": cmd.PlaceObject(SceneObject("box", Shape.BOX, (0.05, 0.05, 0.05), T)),
+        "tool frame": cmd.SetTool("flange"),
+    }
+    state = given(stage, state, commands[changed])
+    assert changed in interruption.changed_to(state)
+    with pytest.raises(InputError, match=changed):
+        continued(interruption, stage.plan_context, state)
+
+
+def test_completed_run_is_no_interruption(stage: Stage, program: Program) -> None:
+    run, states = stage.play(program, stage.begin())
+    assert Interruption.of(program, run, states[-1]) is None
+
+
+def test_speed_in_force_applies_to_the_rest(stage: Stage, program: Program) -> None:
+    run, state = stopped_after(stage, program, 60)
+    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    state = replace(state, speed=0.1)
+    assert {each.speed for each in played(stage, rest, state)[5:]} == {0.8}
+
+
+@pytest.fixture(scope="module")
+def pour(stage: Stage) -> Program:
+    return compiled(parse(POUR.read_text()), stage.plan_context, stage.begin())
+
+
+def cup(state: State) -> int:
+    assert state.poured is not None
+    return state.poured.water.cup
+
+
+def test_stopped_pour_loses_no_drop_and_is_completed(stage: Stage, pour: Program) -> None:
+    carried = next(n for n, task in enumerate(pour.tasks) if task.name == POURING)
+    state, run = stage.begin(), Run(0.0)
+    while run.number < carried:
+        run, state = stage.tick(pour, run, state)
+    full = cup(state)
+    while cup(state) > 0.9 * full:
+        run, state = stage.tick(pour, run, state)
+    run, state = stop(stage, pour, run, state)
+    interruption = interruption_of(pour, run, state)
+    rest = continued(interruption, stage.plan_context, state)
+    states = played(stage, rest, state)
+    assert 0.1 * full < cup(states[0]) < 0.9 * full
+    assert cup(states[-1]) < 0.01 * full
+    last = states[-1].poured
+    assert last is not None
+    assert last.water.basin > 0.99 * full
+    assert not any(each.held for each in states[-1].objects)
+
+
+def test_full_cup_returns_straight_or_not_at_all(stage: Stage, pour: Program) -> None:
+    """The tilt of the cup must stay between those of both ends of the way."""
+    lifted = next(n for n, task in enumerate(pour.tasks) if task.name == POURING)
+    state, run = stage.begin(), Run(0.0)
+    while run.number < lifted or not state.following:
+        run, state = stage.tick(pour, run, state)
+    run, state = stop(stage, pour, run, state)
+    interruption = interruption_of(pour, run, state)
+    aside = given(stage, state, cmd.SetJoints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
+    rest = continued(interruption, stage.plan_context, aside)
+    assert any(task.name == RETURN for task in rest.tasks)
+    T = np.eye(4)
+    chain = stage.plan_context.arm.chain_to("tcp")
+    middle = forward(chain, 0.5 * (state.setpoint + aside.setpoint))
+    T[:2, 3] = (stage.plan_context.T_base_shoulder @ middle)[:2, 3]
+    walled = given(
+        stage, aside, cmd.PlaceObject(SceneObject("wall", Shape.BOX, (0.02, 0.02, 0.6), T))
+    )
+    known = replace(interruption, situation=interruption_of(pour, run, walled).situation)
+    with pytest.raises(BlockedError, match="straight back"):
+        continued(known, stage.plan_context, walled)
