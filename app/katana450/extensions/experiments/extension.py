@@ -18,11 +18,32 @@ URL = "http://127.0.0.1:8080"
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 run`` to ``parser``."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a script; see docs/programs.md")
+    parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="plan the script again whenever the file is saved, and show it in the browser; "
+        "Enter runs it",
+    )
+    parser.add_argument(
+        "--from-step",
+        type=_step,
+        metavar="N",
+        help="begin at this step, from 1, where the arm stands; steps before it only choose the "
+        "tool frame and the speed",
+    )
+    parser.add_argument(
+        "--pause-before",
+        type=_steps,
+        default=(),
+        metavar="N,...",
+        help="pause before these steps, from 1, until the program is resumed",
+    )
     _add_common(parser)
 
 
 def add_demo_options(parser: argparse.ArgumentParser) -> None:
     """Add the demos and their options to ``parser``."""
+    parser.set_defaults(watch=False, from_step=None, pause_before=())
     demos = parser.add_subparsers(dest="demo", required=True, metavar="DEMO")
     circle = demos.add_parser("circle", help="the circle of the paper, or any other circle")
     default = CircleDemo()
@@ -128,6 +149,16 @@ def _fraction(text: str) -> float:
     if not MIN_SPEED <= value <= 1.0:
         raise argparse.ArgumentTypeError(f"expected a fraction from {MIN_SPEED} to 1, not {text!r}")
     return value
+
+
+def _step(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a step, from 1, not {text!r}")
+    return int(text)
+
+
+def _steps(text: str) -> tuple[int, ...]:
+    return tuple(_step(each) for each in text.split(","))
 
 
 def _number(text: str) -> float:

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
+from katana450.extensions.programs.requests import Breakpoints, Program, ProgramOrder, Steer
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
 from katana450.server.api import answers
@@ -36,10 +36,12 @@ END_STATUSES = ("done", "stopped", "failed", "refused", "cancelled")
 
 def run_live(text: str, script: Script, options: Namespace) -> int:
     """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError."""
-    with _server(script, options) as url, connect(url, NAME, options.token) as arm:
+    with server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
-            _send(arm, text, options.speed)
-            arm.ask(Steer(order=ProgramOrder.RUN, unattended=options.unattended))
+            send_script(arm, text, options.speed)
+            if options.from_step is None:
+                planned_program(arm)
+            begin(arm, options)
             return _follow(arm)
         except KeyboardInterrupt:
             if options.unattended and _runs(arm):
@@ -60,24 +62,50 @@ def _runs(arm: Client) -> bool:
     return program is not None and program.unattended
 
 
-def _send(arm: Client, text: str, speed: float) -> None:
-    """Send the script and wait until it is planned. Raises KatanaError with its errors."""
+def begin(arm: Client, options: Namespace) -> None:
+    """Run the script that was sent, from a step and with breakpoints if ``options`` say so."""
+    if options.pause_before:
+        arm.ask(Breakpoints(steps=options.pause_before))
+    at, unattended = options.from_step, options.unattended
+    arm.ask(Steer(order=ProgramOrder.RUN, unattended=unattended, at=at))
+    if at is not None:
+        planned_program(arm)
+
+
+def send_script(arm: Client, text: str, speed: float) -> None:
+    """Send the script, which the server then plans."""
     parts = [text[at : at + PART_CHARACTERS] for at in range(0, len(text), PART_CHARACTERS)] or [""]
     for part in parts[:-1]:
         arm.ask(Program(text=part, more=True))
     arm.ask(Program(text=parts[-1], speed=speed))
+
+
+def planned_program(arm: Client) -> None:
+    """Wait until the script is planned. Raises KatanaError with its errors."""
     while (now := arm.query(answers.State).program) is not None and now.status == "planning":
         if now.steps and sys.stderr.isatty():
             line = f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}"
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
         time.sleep(1.0 / STATE_RATE)
-    if now is None or now.status != "ready":
+    if now is None or now.status in END_STATUSES:
         raise KatanaError(now.why if now is not None else "The server no longer knows the script.")
     print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
 
 
 def _follow(arm: Client) -> int:
-    """Print the progress of the program until it ends. Raises KatanaError if it fails."""
+    """Print the progress of the program until it ends; return 0. Raises KatanaError if it fails.
+
+    A person at a terminal may continue it after a stop.
+    """
+    while (end := _to_end(arm)).status != "done":
+        if not (end.can_continue and sys.stdin.isatty() and _continued(arm, end)):
+            raise KatanaError(end.why)
+    print("Done.")
+    return 0
+
+
+def _to_end(arm: Client) -> answers.Progress:
+    """Print the progress of the program until it ends; return the last one."""
     shown = ""
     terminal = sys.stderr.isatty()
     for state in arm.states(STATE_RATE):
@@ -95,15 +123,31 @@ def _follow(arm: Client) -> int:
         if now.status in END_STATUSES:
             if terminal:
                 print(file=sys.stderr)
-            if now.status == "done":
-                print("Done.")
-                return 0
-            raise KatanaError(now.why)
+            return now
     raise LostError("The server closed the connection.")
 
 
+def _continued(arm: Client, ended: answers.Progress) -> bool:
+    """Ask the person whether the program shall continue; return whether it does."""
+    print(f"katana450: {ended.why}", file=sys.stderr)
+    ask = f"Enter continues at step {ended.step}, Ctrl-C ends: "
+    while True:
+        try:
+            input(ask)
+        except (KeyboardInterrupt, EOFError):
+            print(file=sys.stderr)
+            return False
+        try:
+            arm.ask(Steer(order=ProgramOrder.CONTINUE))
+            planned_program(arm)
+        except KatanaError as error:
+            print(f"katana450: {error}", file=sys.stderr)
+        else:
+            return True
+
+
 @contextmanager
-def _server(script: Script, options: Namespace) -> Iterator[str]:
+def server_at(script: Script, options: Namespace) -> Iterator[str]:
     """Return the address of the running server, or of one that is started for this block."""
     try:
         with connect(options.url, "Look", options.token):

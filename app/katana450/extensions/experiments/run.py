@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 
+from katana450.errors import InputError
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.script import parse
@@ -14,6 +15,12 @@ from katana450.extensions.programs.source import ScriptError
 
 def run(options: Namespace) -> int:
     """Execute ``katana450 run``; return the exit status."""
+    alone = options.headless or options.dry_run or options.report is not None
+    if alone and (options.watch or options.from_step is not None or options.pause_before):
+        raise InputError(
+            "--watch, --from-step and --pause-before need a server: leave out --headless, "
+            "--dry-run and --report."
+        )
     return _run(text_of(options.file), str(options.file), options)
 
 
@@ -46,6 +53,10 @@ def _run(text: str, source: str, options: Namespace) -> int:
             status = simulate(script, options)
             if status or options.headless or options.dry_run:
                 return status
+        if options.watch:
+            from katana450.extensions.experiments.watch import watch
+
+            return watch(options.file, script, options)
         from katana450.extensions.experiments.live import run_live
 
         return run_live(text, script, options)

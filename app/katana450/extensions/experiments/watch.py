@@ -1,0 +1,106 @@
+"""``katana450 run --watch``: plan a script again whenever its file is saved; Enter runs it."""
+
+from __future__ import annotations
+
+import queue
+import sys
+import threading
+import time
+from argparse import Namespace
+from pathlib import Path
+
+from katana450.client import Client, RefusedError, connect
+from katana450.errors import InputError, KatanaError
+from katana450.extensions.experiments.live import (
+    END_STATUSES,
+    begin,
+    planned_program,
+    send_script,
+    server_at,
+)
+from katana450.extensions.programs.requests import ProgramOrder, Steer
+from katana450.extensions.programs.script import Script, parse
+from katana450.extensions.programs.script_files import text_of
+from katana450.extensions.programs.source import ScriptError
+from katana450.server.api import answers
+
+EVERY = 0.2
+"""[s] Interval of the looks at the file and the keyboard."""
+
+HELP = "Save the file to plan it again. Enter runs it, Ctrl-C ends."
+
+
+def watch(path: Path, script: Script, options: Namespace) -> int:
+    """Watch the script at ``path`` until Ctrl-C; return the exit status. Raises KatanaError."""
+    with server_at(script, options) as url, connect(url, "Terminal", options.token) as arm:
+        keys = _keys()
+        print(HELP, flush=True)
+        seen, ready = "", False
+        try:
+            while True:
+                text = _read(path, seen)
+                if text != seen and not _runs(arm):
+                    seen, ready = text, _plan(arm, path, text, options)
+                if not keys.empty():
+                    keys.get()
+                    _run(arm, options, ready=ready)
+                time.sleep(EVERY)
+        except KeyboardInterrupt:
+            if _runs(arm):
+                arm.ask(Steer(order=ProgramOrder.END))
+            print("\nkatana450: no longer watching.", file=sys.stderr)
+            return 130
+
+
+def _read(path: Path, seen: str) -> str:
+    """Return the text of the file; ``seen`` while an editor replaces it."""
+    try:
+        return text_of(path)
+    except InputError:
+        return seen
+
+
+def _runs(arm: Client) -> bool:
+    """Return whether a program runs or is planned, so that no other can be planned."""
+    program = arm.query(answers.State).program
+    return program is not None and program.status not in (*END_STATUSES, "ready")
+
+
+def _plan(arm: Client, path: Path, text: str, options: Namespace) -> bool:
+    """Plan ``text`` and print the result or its errors; return whether it can run."""
+    try:
+        parse(text)
+        send_script(arm, text, options.speed)
+        planned_program(arm)
+    except ScriptError as error:
+        for problem in error.problems:
+            print(f"{path}:{problem.line}:{problem.column}: {problem.text}", file=sys.stderr)
+    except KatanaError as error:
+        print(f"{path}: {error}", file=sys.stderr)
+    else:
+        return True
+    return False
+
+
+def _run(arm: Client, options: Namespace, *, ready: bool) -> None:
+    """Run the program if it is ``ready``; print a refusal."""
+    if not ready:
+        print("The script has errors. Mend and save it first.", file=sys.stderr)
+        return
+    try:
+        begin(arm, options)
+    except RefusedError as error:
+        print(f"katana450: {error}", file=sys.stderr)
+
+
+def _keys() -> queue.Queue[str]:
+    """Return a queue of the lines that are typed; empty for ever without a terminal."""
+    found: queue.Queue[str] = queue.Queue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            found.put(line)
+
+    if sys.stdin is not None and sys.stdin.isatty():
+        threading.Thread(target=read, name="keys", daemon=True).start()
+    return found

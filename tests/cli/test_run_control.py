@@ -1,0 +1,173 @@
+"""``katana450 run`` at a terminal: watch a file, begin at a step, continue after a stop."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from katana450.client import Client, connect
+from katana450.server.api import answers, requests
+from tests.browser.server import AppServer
+
+pty = pytest.importorskip("pty", reason="Windows has no pseudo-terminals")
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SCRIPT = """\
+name: Three steps
+steps:
+  - joints: [12, -64, 85, 8, 0]
+  - joints: [24, -64, 85, 8, 0]
+  - joints: [12, -68, 85, 8, 0]
+"""
+
+
+class Terminal:
+    """A command at a pseudo-terminal."""
+
+    def __init__(self, *command: str) -> None:
+        self._end, inner = pty.openpty()
+        self.process = subprocess.Popen(command, stdin=inner, stdout=inner, stderr=inner, cwd=ROOT)
+        os.close(inner)
+        os.set_blocking(self._end, False)
+        self.text = ""
+
+    def read(self) -> str:
+        """Return everything that was printed."""
+        try:
+            while data := os.read(self._end, 10_000):
+                self.text += data.decode()
+        except (BlockingIOError, OSError):
+            pass
+        return self.text
+
+    def wait_for(self, text: str, seconds: float = 30.0) -> None:
+        """Wait until ``text`` is printed after what was waited for before."""
+        due = time.monotonic() + seconds
+        while text not in self.read():
+            assert time.monotonic() < due, self.text
+            time.sleep(0.05)
+        self.text = self.text.split(text, 1)[1]
+
+    def type(self, text: str) -> None:
+        os.write(self._end, text.encode())
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        os.close(self._end)
+
+
+@contextmanager
+def terminal(server: AppServer, *options: str | Path) -> Iterator[Terminal]:
+    command = [sys.executable, "-m", "katana450", "run", *map(str, options), "--url", server.url]
+    found = Terminal(*command)
+    try:
+        yield found
+    finally:
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def watcher(server: AppServer) -> Iterator[Client]:
+    with connect(server.url, "Watcher") as watcher:
+        yield watcher
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    path = tmp_path / "three.yaml"
+    path.write_text(SCRIPT, encoding="utf-8")
+    return path
+
+
+def program_that(
+    watcher: Client, is_so: Callable[[answers.Progress], bool], seconds: float = 20.0
+) -> answers.Progress:
+    due = time.monotonic() + seconds
+    program = None
+    while time.monotonic() < due:
+        program = watcher.query(answers.State).program
+        if program is not None and is_so(program):
+            return program
+        time.sleep(0.02)
+    raise AssertionError(program)
+
+
+def test_saved_file_is_planned_again_and_run_by_enter(
+    server: AppServer, watcher: Client, script: Path
+) -> None:
+    with terminal(server, script, "--watch") as shown:
+        shown.wait_for("Three steps: 3 steps")
+        script.write_text(SCRIPT.replace("joints: [24", "joints: [x"), encoding="utf-8")
+        shown.wait_for("three.yaml:4:")
+        shown.type("\n")
+        shown.wait_for("Mend and save it first")
+        script.write_text(SCRIPT + "  - wait: 0.1\n", encoding="utf-8")
+        shown.wait_for("Three steps: 4 steps")
+        # Nothing has moved it yet.
+        assert not watcher.query(answers.State).moving
+        shown.type("\n")
+        program_that(watcher, lambda each: each.status == "done")
+        script.write_text(SCRIPT, encoding="utf-8")
+        shown.wait_for("Three steps: 3 steps")
+        shown.process.send_signal(signal.SIGINT)
+        assert shown.process.wait(10.0) == 130
+
+
+def test_terminal_continues_after_a_stop(server: AppServer, watcher: Client, script: Path) -> None:
+    with terminal(server, script, "--from-step", "2", "--pause-before", "3") as shown:
+        running = program_that(watcher, lambda each: each.status == "running")
+        assert running.step == 2
+        assert running.breakpoints == (3,)
+        program_that(watcher, lambda each: each.fraction > 0.1)
+        watcher.stop()
+        shown.wait_for("Enter continues at step 2")
+        shown.type("\n")
+        shown.wait_for("clear the stop")
+        # Who clears the stop holds the arm.
+        watcher.clear_stop()
+        watcher.ask(requests.ReleaseLease())
+        shown.type("\n")
+        paused = program_that(watcher, lambda each: each.status == "paused")
+        assert paused.step == 3
+        watcher.ask(requests.Take())
+        watcher.ask(requests.Resume())
+        watcher.ask(requests.ReleaseLease())
+        shown.wait_for("Enter continues at step 3")
+        shown.type("\n")
+        shown.wait_for("Done.")
+        assert shown.process.wait(10.0) == 0
+    q = np.rad2deg(watcher.query(answers.State).q)
+    assert q == pytest.approx([12, -68, 85, 8, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--watch", "--headless"], "need a server"),
+        (["--from-step", "0"], "expected a step"),
+        (["--pause-before", "1,x"], "expected a step"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(script: Path, options: list[str], said: str) -> None:
+    command = [sys.executable, "-m", "katana450", "run", str(script), *options]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert ended.returncode in (1, 2)
+    assert said in ended.stderr
+    assert "Traceback" not in ended.stderr
