@@ -32,13 +32,13 @@ export class Steps {
     return button.ariaPressed === "true" ? steps : [...steps, at];
   }
 
-  // The server replaces the list, and the focus is lost.
+  // The server replaces the list, sometimes twice, and the focus is lost.
   #focus(inner, name, at, tries) {
     if (!tries) return;
     setTimeout(() => {
       if (inner.document.activeElement === inner.document.body)
         inner.document.querySelector(`.steps li:nth-child(${at}) button[name=${name}]`)?.focus();
-      else this.#focus(inner, name, at, tries - 1);
+      this.#focus(inner, name, at, tries - 1);
     }, AGAIN);
   }
 }

@@ -68,9 +68,8 @@ def page(
         f"<li{' aria-current=step' if number == current else ''}>"
         f"<button name=pause aria-label='Pause before step {number + 1}' title='Pause before "
         f"this step' aria-pressed={'true' if number + 1 in breakpoints else 'false'}></button>"
-        f"<span>{escape(step.name)}</span><span>{_duration(step)}</span>"
         f"<button name=run aria-label='Run from step {number + 1}' title='Run from this step'>"
-        "</button></li>"
+        f"</button><span>{escape(step.name)}</span><span>{_duration(step)}</span></li>"
         for number, step in enumerate(steps)
     )
     return f"<div class='k450'><ol class='steps' tabindex=0>{rows}</ol></div>" if rows else ""
