@@ -28,6 +28,7 @@ KINDS = {
     "tests/runtime": BROWSER,
     "tests/cli/test_lines.py": BROWSER,
     "tests/cli/test_live.py": BROWSER,
+    "tests/cli/test_run_control.py": SERVERS[0],
     "tests/cli/test_serve.py": BROWSER,
     "tests/docs": BROWSER,
     "tests/examples": BROWSER,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.importers import shape_file
 from katana450.resources import URDF_PATH
 
 GANTRY = Path(__file__).parent / "gantry.urdf"
@@ -20,6 +22,14 @@ POSES = (
 """Poses of the Katana, the gripper last."""
 
 GANTRY_POSE = (0.3, 2.0, -0.6)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def patience() -> Iterator[None]:
+    """Let a busy machine read meshes slowly; tests/gateway/test_uploads.py checks the limit."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(shape_file, "SECONDS", 60.0)
+        yield
 
 
 @pytest.fixture(scope="session")

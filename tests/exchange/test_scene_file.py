@@ -18,7 +18,7 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.solid import ObjectAppearance, Solid
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError
-from katana450.extensions.importers import scene_file, shape_file
+from katana450.extensions.importers import scene_file
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import (
     StoredScene,
@@ -41,12 +41,6 @@ NAMES = st.text(
 def ring() -> bytes:
     content: bytes = trimesh.creation.torus(40.0, 12.0, 24, 12).export(file_type="stl")
     return content
-
-
-@pytest.fixture(autouse=True)
-def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a busy machine read meshes slowly; other tests check the limit."""
-    monkeypatch.setattr(shape_file, "SECONDS", 60.0)
 
 
 @pytest.fixture(scope="module")
