@@ -17,8 +17,8 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.scene_reader import parsed
 from katana450.extensions.programs.script import Script, parse
-from katana450.extensions.scene.text import parsed
 from tests.browser.server import ROOT, AppServer
 from tests.programs.conftest import Stage
 

@@ -20,7 +20,7 @@ from katana450.errors import InputError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES
-from katana450.extensions.scene.scene import Scene
+from katana450.extensions.programs.scene_draft import Scene
 from katana450.maths.geometry import se3
 from katana450.server.service.scenes import free_name
 

@@ -17,9 +17,10 @@ from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Up
+from katana450.extensions.programs.scene_draft import MeshFile, Scene
+from katana450.extensions.programs.scene_reader import parsed
 from katana450.extensions.programs.source import MAX_BYTES, Problem, ScriptError
-from katana450.extensions.scene.scene import MeshFile, Scene
-from katana450.extensions.scene.text import parsed, written
+from katana450.extensions.scene.text import written
 from katana450.maths.geometry.arrays import FloatArray
 
 SCENE = "scene.yaml"

@@ -8,7 +8,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import LeaseError
 from katana450.extensions.importers.scene_file import StoredScene, scene_zip
-from katana450.extensions.scene.scene import Scene
+from katana450.extensions.programs.scene_draft import Scene
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers
 from katana450.server.service.hub import Hub

@@ -81,7 +81,7 @@ class Scope:
         text = str(value.held)
         if text in self.values:
             # Errors are reported where the name is used.
-            return replace(self.values[text], line=value.line, column=value.column)
+            return replace(self.values[text], line=value.line, column=value.column, file=value.file)
         try:
             found = evaluate(text, self.numbers)
         except ExpressionError as error:

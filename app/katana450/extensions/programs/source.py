@@ -17,7 +17,7 @@ from katana450.extensions.programs.expression import PLAIN
 MAX_BYTES = 64 * 1024
 """[bytes] Maximum size of a script."""
 
-MAX_DEPTH = 12
+MAX_DEPTH = 16
 """Maximum nesting of values."""
 
 MAX_VALUES = 10_000
@@ -29,21 +29,28 @@ WHOLE, REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem at one place of the text; line and column count from 1."""
+    """A problem at one place of the text; line and column count from 1.
+
+    ``file``: name of the file that the script names and in which it is; "" for the script itself.
+    """
 
     line: int
     column: int
     text: str
+    file: str = ""
 
     def __str__(self) -> str:
-        return f"line {self.line}, column {self.column}: {self.text}"
+        file = f"{self.file}, " if self.file else ""
+        return f"{file}line {self.line}, column {self.column}: {self.text}"
 
 
 class ScriptError(InputError):
-    """A script that cannot be run, with all its problems in the order of their lines."""
+    """A script that cannot be run, with all its problems in the order of their files and lines."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
-        self.problems = tuple(sorted(problems, key=lambda each: (each.line, each.column)))
+        self.problems = tuple(
+            sorted(problems, key=lambda each: (each.file, each.line, each.column))
+        )
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
@@ -59,6 +66,7 @@ class YamlValue:
         number: the number that the text stands for; None if it stands for none.
         unit: kind of quantity of the number, see ``expression.Quantity``.
         why: why a text is not an expression with a value; empty if that was not tried.
+        file: name of the file that the script names and in which it is; "" for the script itself.
     """
 
     line: int
@@ -68,6 +76,7 @@ class YamlValue:
     number: float | None = None
     unit: str = PLAIN
     why: str = ""
+    file: str = ""
 
     @property
     def items(self) -> tuple[YamlValue, ...]:
@@ -83,7 +92,7 @@ class YamlValue:
 
     def wrong(self, problem: str) -> ScriptError:
         """Return the error ``problem`` for the place of this value."""
-        return ScriptError((Problem(self.line, self.column, problem),))
+        return ScriptError((Problem(self.line, self.column, problem, self.file),))
 
     def __str__(self) -> str:
         return {"nothing": "nothing", "list": "a list", "mapping": "a mapping"}.get(
@@ -91,33 +100,41 @@ class YamlValue:
         )
 
 
-def read(text: str, what: str = "script") -> YamlValue:
+def read(text: str, what: str = "script", file: str = "") -> YamlValue:
     """Return ``text`` as one value. Raises ScriptError with the place of an error.
 
-    ``what`` names the text in messages.
+    ``what`` names the text in messages, and ``file`` is the name of its file; "" for the script.
     """
     if len(text.encode("utf-8", "replace")) > MAX_BYTES:
-        raise ScriptError((Problem(1, 1, f"A {what} has at most {MAX_BYTES // 1024} KB."),))
+        raise ScriptError((Problem(1, 1, f"A {what} has at most {MAX_BYTES // 1024} KB.", file),))
+    node = composed(text, what, file)
+    if node is None:
+        raise ScriptError((Problem(1, 1, f"The {what} is empty.", file),))
+    return _value(node, file)
+
+
+def composed(text: str, what: str, file: str) -> yaml.Node | None:
+    """Return the node of ``text``, which has the places of all values; None for an empty text.
+
+    Raises ScriptError, as ``read`` does.
+    """
     try:
         # The events are checked first: composing recurses, and resolves anchors.
-        _check_bounds(text, what)
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        _check_bounds(text, what, file)
+        return yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
-        problem = error.problem or error.context or "this is not YAML"
-        raise ScriptError((Problem(line, column, f"This cannot be read: {problem}."),)) from error
+        problem = f"This cannot be read: {error.problem or error.context or 'this is not YAML'}."
+        raise ScriptError((Problem(line, column, problem, file),)) from error
     except yaml.YAMLError as error:
         # The text has a character that YAML does not allow.
-        problem = str(error).partition("\n")[0]
+        problem = f"This cannot be read: {str(error).splitlines()[0]}."
         line = text[: getattr(error, "position", 0) or 0].count("\n") + 1
-        raise ScriptError((Problem(line, 1, f"This cannot be read: {problem}."),)) from error
-    if node is None:
-        raise ScriptError((Problem(1, 1, f"The {what} is empty."),))
-    return _value(node)
+        raise ScriptError((Problem(line, 1, problem, file),)) from error
 
 
-def _check_bounds(text: str, what: str) -> None:
+def _check_bounds(text: str, what: str, file: str) -> None:
     depth = 0
     for count, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
         problem = ""
@@ -134,24 +151,26 @@ def _check_bounds(text: str, what: str) -> None:
         elif count > MAX_VALUES:
             problem = f"A {what} holds at most {MAX_VALUES} values."
         if problem:
-            raise ScriptError((Problem(*_place(event.start_mark), problem),))
+            raise ScriptError((Problem(*_place(event.start_mark), problem, file),))
 
 
 def _place(mark: Any) -> tuple[int, int]:
     return mark.line + 1, mark.column + 1
 
 
-def _value(node: yaml.Node) -> YamlValue:
+def _value(node: yaml.Node, file: str) -> YamlValue:
     line, column = _place(node.start_mark)
     if isinstance(node, yaml.MappingNode):
-        fields = tuple((_value(key), _value(value)) for key, value in node.value)
-        return YamlValue(line, column, fields, "mapping")
+        fields = tuple((_value(key, file), _value(value, file)) for key, value in node.value)
+        return YamlValue(line, column, fields, "mapping", file=file)
     if isinstance(node, yaml.SequenceNode):
-        return YamlValue(line, column, tuple(_value(each) for each in node.value), "list")
+        items = tuple(_value(each, file) for each in node.value)
+        return YamlValue(line, column, items, "list", file=file)
     if node.tag == NULL:
-        return YamlValue(line, column, None, "nothing")
+        return YamlValue(line, column, None, "nothing", file=file)
     kind = {TEXT: "text", WHOLE: "whole", REAL: "number"}.get(node.tag, "other")
-    return YamlValue(line, column, str(node.value), kind, _number(str(node.value)))
+    text = str(node.value)
+    return YamlValue(line, column, text, kind, _number(text), file=file)
 
 
 def _number(text: str) -> float | None:
