@@ -2,7 +2,7 @@
 import { html } from "../instruments/shape.js";
 
 const AFTER = 400; // ms without typing after which the text is checked
-const PLACE = /^line (\d+), column \d+: (.*)$/;
+const PLACE = /^(?:(.+), )?line (\d+), column \d+: (.*)$/;
 
 export class Editor {
   element = html("div", { id: "teach-editor" });
@@ -51,12 +51,13 @@ export class Editor {
     return found;
   }
 
-  // Show `problems`: {line, text} each.
+  // Show `problems`: {line, text, file} each; `file` names a file that the script includes.
   explain(problems) {
-    const lines = new Set(problems.map(({ line }) => line));
+    const lines = new Set(problems.filter(({ file }) => !file).map(({ line }) => line));
     [...this.#numbers.children].forEach((each, i) => each.classList.toggle("bad", lines.has(i + 1)));
     this.#problems.replaceChildren(
-      ...problems.map(({ line, text }) => {
+      ...problems.map(({ line, text, file }) => {
+        if (file) return html("li", {}, html("b", {}, `${file}, line ${line}`), ` ${text}`);
         const button = html("button", { type: "button" }, html("b", {}, `Line ${line}`), ` ${text}`);
         button.addEventListener("click", () => this.#select(line));
         return html("li", {}, button);
@@ -78,12 +79,12 @@ export class Editor {
   }
 }
 
-// Return the problems that an error of a program names by their lines, and its other lines.
+// Return the problems that an error of a program names, with file and line, and its other lines.
 export function problemsOf(why) {
   const found = { problems: [], rest: [] };
   for (const each of why.split("\n")) {
     const place = PLACE.exec(each);
-    if (place) found.problems.push({ line: Number(place[1]), text: place[2] });
+    if (place) found.problems.push({ file: place[1] ?? "", line: Number(place[2]), text: place[3] });
     else if (each) found.rest.push(each);
   }
   return found;

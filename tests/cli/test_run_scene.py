@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests.browser.server import AppServer
+from tests.browser.server import AppServer, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -86,6 +88,72 @@ def test_scene_that_cannot_be_used_is_named(script: Path, post: Path, tmp_path: 
     assert done.returncode == 1
     assert "bax" in done.stderr
     assert f"{post.name}:" in done.stderr
+
+
+def test_scene_of_the_script_is_used_unless_another_is_given(script: Path, post: Path) -> None:
+    aside = script.parent / "aside.yaml"
+    aside.write_text(POST.replace("[330, 0,", "[330, 300,"), encoding="utf-8")
+    script.write_text(f"scene: {post.name}\n{SCRIPT}", encoding="utf-8")
+    done = run(script, "--dry-run")
+    assert done.returncode == 1
+    assert f"{script}:6:" in done.stderr
+    assert "post" in done.stderr
+    done = run(script, "--dry-run", "--scene", aside)
+    assert done.returncode == 0, done.stderr
+
+
+def test_error_in_an_included_file_is_reported_with_its_path(script: Path) -> None:
+    parts = script.parent / "parts.yaml"
+    parts.write_text("define:\n  up:\n    steps:\n      - line: {by: {z: 500}}\n", encoding="utf-8")
+    head, tail = SCRIPT.split("steps:\n")
+    included = f"{head}include: {parts.name}\nsteps:\n{tail}  - call: up\n"
+    script.write_text(included, encoding="utf-8")
+    done = run(script, "--dry-run")
+    assert done.returncode == 1
+    assert f"{parts}:4:" in done.stderr
+    script.write_text(included.replace(parts.name, "gone.yaml"), encoding="utf-8")
+    done = run(script, "--dry-run")
+    assert done.returncode == 1
+    assert f"{script}:3:10: " in done.stderr
+    assert "gone.yaml cannot be read" in done.stderr
+
+
+def test_alternatives_are_listed_with_their_beginnings(script: Path) -> None:
+    choice = "  - if: {time: {at_least: 9}, then: [{nudge: {axis: 5, by: 5}}, home]}\n"
+    script.write_text(f"{SCRIPT}{choice}  - home\n", encoding="utf-8")
+    done = run(script, "--dry-run")
+    assert done.returncode == 0, done.stderr
+    _, _, listed = done.stdout.partition("if the time\n")
+    assert listed.startswith("-- then of line 6\nline    6  nudge")
+    assert "\n-- else of line 6\nline    7  home" in listed
+    assert re.search(r"^7 steps, at most [\d.]+ s of motion", listed, re.MULTILINE)
+
+
+@pytest.mark.long
+def test_report_measures_only_the_alternative_that_was_taken(script: Path, tmp_path: Path) -> None:
+    up, down = ("line: {by: {z: 40}}", "line: {by: {z: -25}}")
+    choice = f"  - if: {{time: {{at_least: 1 min}}, then: [{{{up}}}], else: [{{{down}}}]}}\n"
+    script.write_text(f"{SCRIPT}{choice}", encoding="utf-8")
+    done = run(script, "--headless", "--report", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "Line 6, if the time: else." in done.stdout
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert report["path_length_mm"] == pytest.approx(225.0)
+    assert "Line 6, if the time: else." in report["notes"]
+
+
+@pytest.mark.long
+def test_server_is_started_with_the_scene_of_the_script(script: Path, post: Path) -> None:
+    aside = post.read_text(encoding="utf-8").replace("[330, 0,", "[330, 300,")
+    post.write_text(aside, encoding="utf-8")
+    script.write_text(f"scene: {post.name}\nsteps:\n  - nudge: {{axis: 5, by: 5}}\n", "utf-8")
+    url = f"http://127.0.0.1:{free_port()}"
+    done = run(script, "--url", url)
+    assert done.returncode == 0, done.stderr
+    other = script.parent / "other.yaml"
+    other.write_text(aside.replace("post", "pole"), encoding="utf-8")
+    done = run(script, "--url", url, "--scene", other)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.long

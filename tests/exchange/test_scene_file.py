@@ -157,6 +157,21 @@ def test_a_scene_is_read_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: P
         np.testing.assert_array_equal(other.solid.corners, mesh.solid.corners)
 
 
+def test_scene_of_a_script_is_read_with_its_meshes(mesh: Mesh, tmp_path: Path) -> None:
+    script = tmp_path / "script.yaml"
+    zipfile.ZipFile(io.BytesIO(scene_zip(scene_of(mesh), T_PALM_TOOL))).extractall(tmp_path / "a")
+    script.write_text("scene: a/scene.yaml\nsteps: [home]\n", encoding="utf-8")
+    back = read_scene_folder(script, T_PALM_TOOL)
+    assert [each.name for each in back.scene.objects] == ["ring", "camera"]
+    assert back.meshes[0].key == mesh.key
+    script.write_text("steps: [home]\n", encoding="utf-8")
+    with pytest.raises(InputError, match="a script without a `scene`"):
+        read_scene_folder(script, T_PALM_TOOL)
+    script.write_text("scene: a/b.yaml\nsteps: [home]\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 1, column 8: .*b\.yaml cannot be read"):
+        read_scene_folder(script, T_PALM_TOOL)
+
+
 def zipped(**files: bytes | str) -> bytes:
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -128,6 +128,50 @@ def test_schema_is_served_to_editors(server: AppServer) -> None:
     assert json.loads(body) == script_schema()
 
 
+def test_script_of_the_folder_is_returned_with_its_files(
+    server: AppServer, cookie: str, folder: Path
+) -> None:
+    (folder / "parts").mkdir()
+    (folder / "parts" / "waits.yaml").write_text("let: {long: 2}", encoding="utf-8")
+    text = "include: parts/waits.yaml\nsteps:\n  - wait: long\n"
+    (folder / "waiting.yaml").write_text(text, encoding="utf-8")
+    whole = ask(f"{server.url}/api/v1/scripts/waiting", Cookie=cookie)[2].decode()
+    assert read(server, cookie, whole)["problems"] == []
+    # A text that is sent stands alone: its files are not looked up in the folder.
+    problem, *_ = read(server, cookie, text)["problems"]
+    assert (problem["line"], problem["file"]) == (1, "")
+    assert "stands alone" in problem["text"]
+    problem, *_ = read(server, cookie, whole.replace("let:", "lett:"))["problems"]
+    assert (problem["line"], problem["file"]) == (3, "")
+    problem = read(server, cookie, whole.replace("let:", "lett:"))["problems"][-1]
+    assert (problem["line"], problem["file"]) == (1, "parts/waits.yaml")
+
+
+@pytest.mark.parametrize(
+    ("moved", "status", "why"),
+    [
+        (0.0, "ready", ""),
+        (5.0, "refused", "line 1, column 8: The scene is not that of the script: cup is at"),
+    ],
+)
+def test_server_checks_the_scene_of_a_script(
+    server: AppServer, moved: float, status: str, why: str
+) -> None:
+    with connect(server.url, "Owner") as arm:
+        objects = arm.query(answers.Objects).objects
+        scene = ", ".join(
+            f"{{name: {each.name}, shape: {each.shape}, "
+            f"size: {[1e3 * size for size in each.size]}, can_be_held: {each.can_be_held}, "
+            f"pose: {[1e3 * each.T[0][3] + moved, 1e3 * each.T[1][3], 0, 0, 0, 0]}}}"
+            for each in objects
+        )
+        arm.ask(Program(text=f"scene: [{scene}]\nsteps:\n  - nudge: {{axis: 5, by: 5}}\n"))
+        while (program := arm.query(answers.State).program) is None or program.status == "planning":
+            time.sleep(0.02)
+    assert program.status == status
+    assert program.why.startswith(why)
+
+
 @pytest.mark.parametrize(
     ("condition", "end", "why"),
     [

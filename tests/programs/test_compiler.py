@@ -11,6 +11,7 @@ from katana450.errors import CancelledError, InputError
 from katana450.extensions.programs.actions import PutObject
 from katana450.extensions.programs.compiler import FINDING, TIMING, Compiler, PlanningStage
 from katana450.extensions.programs.plan_builder import PlanBuilder, UntimedPath
+from katana450.extensions.programs.planned_steps import PlannedStep
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
@@ -158,7 +159,9 @@ def layout(stage: Stage, text: str) -> tuple[PlanBuilder, Compiler]:
 @pytest.mark.usefixtures("untimed")
 def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: Stage) -> None:
     builder, found = layout(stage, PourDemo(basin=NEAR).text)
-    names = [name for actions in found.all() for name, _ in actions]
+    names = [
+        name for step in found.all() if isinstance(step, PlannedStep) for name, _ in step.actions
+    ]
     # Failed attempts leave no actions behind.
     assert names.count("grasp cup: close") == 1
     assert names.count("pour") == 1

@@ -15,6 +15,7 @@ import yaml
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.source import Problem, ScriptError
 from tests.conftest import LONG
 from tests.programs.yaml_core import loaded
@@ -37,7 +38,7 @@ Place = tuple[Any, Any]
 def scripts() -> dict[str, str]:
     """Return valid scripts that together have every step."""
     paths = sorted((ROOT / "examples" / "programs").glob("*.yaml"))
-    found = {path.stem: path.read_text(encoding="utf-8") for path in paths}
+    found = {path.stem: script_text(path) for path in paths}
     page = (ROOT / "docs" / "programs.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     found |= {f"docs {n}": block for n, block in enumerate(blocks) if "steps:" in block}

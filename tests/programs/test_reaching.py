@@ -30,7 +30,7 @@ def refusal(builder: PlanBuilder, frame: str, p: tuple[float, ...], pitch: float
     (step,) = parse(text).steps
     try:
         # Only whether it can be reached; the way there is not planned.
-        builder.joints_at(step.step.place)  # type: ignore[attr-defined]
+        builder.joints_at(step.step.place)  # type: ignore[union-attr]
     except InputError as error:
         return str(error)
     return ""

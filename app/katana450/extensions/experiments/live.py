@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
+from katana450.extensions.programs.attached_files import without_scene
 from katana450.extensions.programs.requests import Breakpoints, Program, ProgramOrder, Steer
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
@@ -38,7 +39,7 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
     """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError."""
     with server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
-            send_script(arm, text, options.speed)
+            send_script(arm, text, options)
             if options.from_step is None:
                 planned_program(arm)
             begin(arm, options)
@@ -72,12 +73,14 @@ def begin(arm: Client, options: Namespace) -> None:
         planned_program(arm)
 
 
-def send_script(arm: Client, text: str, speed: float) -> None:
-    """Send the script, which the server then plans."""
+def send_script(arm: Client, text: str, options: Namespace) -> None:
+    """Send the script, which the server then plans. ``options.scene`` replaces its own scene."""
+    if options.scene is not None:
+        text = without_scene(text)
     parts = [text[at : at + PART_CHARACTERS] for at in range(0, len(text), PART_CHARACTERS)] or [""]
     for part in parts[:-1]:
         arm.ask(Program(text=part, more=True))
-    arm.ask(Program(text=parts[-1], speed=speed))
+    arm.ask(Program(text=parts[-1], speed=options.speed))
 
 
 def planned_program(arm: Client) -> None:
@@ -169,8 +172,12 @@ def server_at(script: Script, options: Namespace) -> Iterator[str]:
     command = [*python, "serve", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
         command.append("--bare")
-    if options.scene is not None:
-        command += ["--scene", str(options.scene)]
+    scene = options.scene
+    if scene is None and script.scene is not None:
+        # The file of the script, whose folder has the meshes of its scene.
+        scene = options.file
+    if scene is not None:
+        command += ["--scene", str(scene)]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **without_interrupts())
     try:
         _wait_for(server)

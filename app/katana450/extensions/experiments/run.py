@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 
 from katana450.errors import InputError
+from katana450.extensions.experiments.problems import print_problems
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import text_of
+from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.source import ScriptError
 
 
@@ -21,7 +21,12 @@ def run(options: Namespace) -> int:
             "--watch, --from-step and --pause-before need a server: leave out --headless, "
             "--dry-run and --report."
         )
-    return _run(text_of(options.file), str(options.file), options)
+    try:
+        text = script_text(options.file)
+    except ScriptError as error:
+        print_problems(error, str(options.file))
+        return 1
+    return _run(text, str(options.file), options)
 
 
 def demo(options: Namespace) -> int:
@@ -61,6 +66,5 @@ def _run(text: str, source: str, options: Namespace) -> int:
 
         return run_live(text, script, options)
     except ScriptError as error:
-        for problem in error.problems:
-            print(f"{source}:{problem.line}:{problem.column}: {problem.text}", file=sys.stderr)
+        print_problems(error, source)
         return 1

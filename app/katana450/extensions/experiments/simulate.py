@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections import Counter
+from collections.abc import Iterator
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -13,12 +15,15 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
-from katana450.extensions.importers.initial_scene import initial_scene
+from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.extensions.media.report import Report
-from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.clocked_run import plan_script, ready, run_by_clock
+from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
+from katana450.extensions.programs.script_scene import begun
+from katana450.extensions.programs.simulation import Simulation
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
@@ -27,7 +32,11 @@ BARE = "The arm is without its gripper: its fingers would reach into the table."
 
 def simulate(script: Script, options: Namespace) -> int:
     """Plan ``script``, run it unless only planning is requested, and report; return the status."""
-    begin = ready if options.scene is None else partial(_begin, scene=options.scene)
+    scene = options.scene
+    if scene is None and script.scene is not None:
+        # The file of the script, whose folder has the meshes of its scene.
+        scene = options.file
+    begin = ready if scene is None else partial(_begin, scene=scene)
     plan = plan_script(script, options.urdf, options.seed, options.speed, begin)
     program, robot = plan.program, plan.robot
     notes = (BARE,) if script.bare else ()
@@ -40,6 +49,9 @@ def simulate(script: Script, options: Namespace) -> int:
         _print_tasks(program)
         return 0
     simulation = run_by_clock(plan)
+    for choice in _choices(program, simulation):
+        print(choice)
+        notes = (*notes, choice)
     facts = {
         "version": version(),
         "arm": robot.name,
@@ -68,15 +80,31 @@ def simulate(script: Script, options: Namespace) -> int:
 
 def _begin(session: Session, scene: Path) -> State:
     """Return the state of an arm at rest in the scene of a file. Raises InputError."""
-    found = initial_scene(session, scene, ())
-    q = session.ready if found.joints is None else found.joints
-    start = session.begin(q, session.require_arm().gripper.clamp(0.0), 0.0)
-    return session.step(start, (found.command,), start.t)
+    stored, _ = load_initial_scene(session, scene, ())
+    return begun(session, stored.scene)
+
+
+def _choices(program: Program, simulation: Simulation) -> Iterator[str]:
+    """Yield which alternative the simulation has taken at each ``if``."""
+    tasks = {task.number: task for task in program.tasks if _is_choice(task)}
+    for number, held in simulation.run.choices:
+        task = tasks[number]
+        yield f"Line {task.line}, {task.name}: {'then' if held else 'else'}."
+
+
+def _is_choice(task: Task) -> bool:
+    return isinstance(task.action, ConditionalJump)
 
 
 def _print_tasks(program: Program) -> None:
-    """Print each task with its line, duration, length and minimum clearance."""
-    for task in program.tasks:
+    """Print each task with its line, duration, length and minimum clearance.
+
+    Where alternatives begin and where they meet is printed between them.
+    """
+    labels = _labels(program)
+    for number, task in enumerate(program.tasks):
+        if number in labels:
+            print(f"-- {', '.join(labels[number])}")
         details = ""
         if isinstance(task.action, FollowPlan):
             plan = task.action.plan
@@ -86,4 +114,20 @@ def _print_tasks(program: Program) -> None:
                 apart = 1e3 * plan.nearest.contact.distance
                 details += f", {apart:.0f} mm from {one} to {other}"
         print(f"line {task.line:>4}  {task.name:<24} {details}".rstrip())
-    print(f"{program.steps} steps, {program.duration:.2f} s of motion at full speed.")
+    longest = "at most " if program.alternatives else ""
+    print(f"{program.steps} steps, {longest}{program.duration:.2f} s of motion at full speed.")
+
+
+def _labels(program: Program) -> dict[int, list[str]]:
+    """Return what begins at the tasks of a program with alternatives."""
+    labels: dict[int, list[str]] = {}
+    before = Counter(each for number in range(len(program.tasks)) for each in program.next(number))
+    for task in program.tasks:
+        action = task.action
+        if isinstance(action, ConditionalJump):
+            for number, alternative in ((action.then, "then"), (action.otherwise, "else")):
+                # Where alternatives meet, no alternative begins.
+                if before[number] == 1:
+                    labels.setdefault(number, []).append(f"{alternative} of line {task.line}")
+    joined = {number: ["after the alternatives"] for number, count in before.items() if count > 1}
+    return labels | joined

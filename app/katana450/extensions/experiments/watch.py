@@ -18,9 +18,10 @@ from katana450.extensions.experiments.live import (
     send_script,
     server_at,
 )
+from katana450.extensions.experiments.problems import print_problems
 from katana450.extensions.programs.requests import ProgramOrder, Steer
 from katana450.extensions.programs.script import Script, parse
-from katana450.extensions.programs.script_files import text_of
+from katana450.extensions.programs.script_files import script_text, text_of
 from katana450.extensions.programs.source import ScriptError
 from katana450.server.api import answers
 
@@ -40,7 +41,7 @@ def watch(path: Path, script: Script, options: Namespace) -> int:
             while True:
                 text = _read(path, seen)
                 if text != seen and not _runs(arm):
-                    seen, ready = text, _plan(arm, path, text, options)
+                    seen, ready = text, _plan(arm, path, options)
                 if not keys.empty():
                     keys.get()
                     _run(arm, options, ready=ready)
@@ -53,8 +54,10 @@ def watch(path: Path, script: Script, options: Namespace) -> int:
 
 
 def _read(path: Path, seen: str) -> str:
-    """Return the text of the file; ``seen`` while an editor replaces it."""
+    """Return the text of the script; ``seen`` while an editor replaces its file."""
     try:
+        return script_text(path)
+    except ScriptError:
         return text_of(path)
     except InputError:
         return seen
@@ -66,15 +69,15 @@ def _runs(arm: Client) -> bool:
     return program is not None and program.status not in (*END_STATUSES, "ready")
 
 
-def _plan(arm: Client, path: Path, text: str, options: Namespace) -> bool:
-    """Plan ``text`` and print the result or its errors; return whether it can run."""
+def _plan(arm: Client, path: Path, options: Namespace) -> bool:
+    """Plan the script and print the result or its errors; return whether it can run."""
     try:
+        text = script_text(path)
         parse(text)
-        send_script(arm, text, options.speed)
+        send_script(arm, text, options)
         planned_program(arm)
     except ScriptError as error:
-        for problem in error.problems:
-            print(f"{path}:{problem.line}:{problem.column}: {problem.text}", file=sys.stderr)
+        print_problems(error, str(path))
     except KatanaError as error:
         print(f"{path}: {error}", file=sys.stderr)
     else:

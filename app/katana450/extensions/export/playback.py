@@ -64,16 +64,17 @@ def of_script(name: str, urdf: Path) -> Playback:
     from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
     from katana450.extensions.programs.pour import PourDemo
     from katana450.extensions.programs.script import parse
-    from katana450.extensions.programs.script_files import text_of
+    from katana450.extensions.programs.script_files import script_text
     from katana450.extensions.programs.source import ScriptError
 
     demos = {"circle": CircleDemo, "pour": PourDemo}
-    text = demos[name]().text if name in demos else text_of(Path(name))
     try:
+        text = demos[name]().text if name in demos else script_text(Path(name))
         plan = plan_script(parse(text), urdf)
     except ScriptError as error:
         found = error.problems[0]
-        raise InputError(f"{name}:{found.line}:{found.column}: {found.text}") from error
+        file = str(Path(name).parent / found.file) if found.file else name
+        raise InputError(f"{file}:{found.line}:{found.column}: {found.text}") from error
     states = run_by_clock(plan).states
     return Playback(plan.robot, plan.session, states, Settings().rate, plan.script.bare)
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.placement import free_place
-from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.robot.initial_scene import InitialScene
@@ -21,6 +20,7 @@ from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES
 from katana450.extensions.programs.scene_draft import Scene
+from katana450.extensions.programs.script_scene import check_scene
 from katana450.maths.geometry import se3
 from katana450.server.service.scenes import free_name
 
@@ -50,12 +50,10 @@ def load_initial_scene(
     stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).objects))
     if scene is not None:
         stored = read_scene_folder(scene, None if hand is None else hand.T_palm_tool)
-    if stored.scene.joints is not None:
-        q = session.require_arm().chain.check_q(stored.scene.joints)
-        if not session.require_arm().chain.within_limits(q):
-            raise InputError(f"{scene}: the joints lie outside the limits of this arm.")
-    if stored.scene.water is not None and all(t.name != CUP for t in stored.scene.objects):
-        raise InputError(f"{scene}: there is water, but no cup.")
+    try:
+        check_scene(session, stored.scene)
+    except InputError as error:
+        raise InputError(f"{scene}: {error}") from error
     objects, meshes, notes = list(stored.scene.objects), list(stored.meshes), []
     for argument in object_files:
         mesh, scene_object = _object(argument, objects)

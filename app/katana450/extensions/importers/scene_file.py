@@ -17,8 +17,11 @@ from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Up
-from katana450.extensions.programs.scene_draft import MeshFile, Scene
+from katana450.extensions.programs.attached_files import attached
+from katana450.extensions.programs.scene_draft import MeshFile, Scene, SceneDraft
 from katana450.extensions.programs.scene_reader import parsed
+from katana450.extensions.programs.script import is_script, parse
+from katana450.extensions.programs.script_files import files_in
 from katana450.extensions.programs.source import MAX_BYTES, Problem, ScriptError
 from katana450.extensions.scene.text import written
 from katana450.maths.geometry.arrays import FloatArray
@@ -92,7 +95,8 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
                     )
                 return content
 
-            return _read(_text(opened(SCENE, MAX_BYTES), SCENE), opened, T_palm_tool)
+            draft = parsed(_text(opened(SCENE, MAX_BYTES), SCENE))
+            return _stored(draft, opened, T_palm_tool)
     except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError) as error:
         raise InputError(f"This .zip cannot be read: {error}.") from error
     except (OSError, EOFError, ValueError, zlib.error) as error:
@@ -110,7 +114,7 @@ def _entries(data: bytes) -> int:
 def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene:
     """Return the scene of the text file ``path``, with meshes in or below its folder; or of a .zip.
 
-    Raises InputError.
+    The text is a scene, or a script that has one. Raises InputError.
     """
     folder = path.resolve().parent
 
@@ -123,7 +127,18 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
     try:
         if path.suffix.lower() == ".zip":
             return read_scene_zip(_content(path, MAX_ZIP_BYTES), T_palm_tool)
-        return _read(_text(_content(path, MAX_BYTES), path.name), opened, T_palm_tool)
+        text = _text(_content(path, MAX_BYTES), path.name)
+        if not is_script(text):
+            return _stored(parsed(text), opened, T_palm_tool)
+        scene = parse(attached(text, files_in(folder))).scene
+        if scene is None:
+            raise InputError(f"{path}: This is a script without a `scene`.")
+        below = PurePosixPath(scene.file).parent
+
+        def opened_beside(name: str, maximum: int) -> bytes:
+            return opened(str(below / name), maximum)
+
+        return _stored(scene.draft, opened_beside, T_palm_tool)
     except ScriptError as error:
         raise InputError(f"{path}:\n{error}") from error
 
@@ -152,10 +167,9 @@ def _files(stored: StoredScene, T_palm_tool: FloatArray | None) -> dict[str, byt
     return {SCENE: written(stored.scene, files, T_palm_tool).encode()} | contents
 
 
-def _read(
-    text: str, opened: Callable[[str, int], bytes], T_palm_tool: FloatArray | None
+def _stored(
+    draft: SceneDraft, opened: Callable[[str, int], bytes], T_palm_tool: FloatArray | None
 ) -> StoredScene:
-    draft = parsed(text)
     mesh_files = {
         entry.mesh: entry.at for entry in reversed(draft.entries) if entry.mesh is not None
     }

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
@@ -84,10 +84,16 @@ class Bound:
         return f"{self.name} {is_now}; expected is {self.wanted}."
 
 
-def alongs(program: Program) -> tuple[PathTrace, ...]:
-    """Return the paths of the tool, each repeated path once."""
+def executed_tasks(program: Program, trace: Trace) -> tuple[Task, ...]:
+    """Return the tasks of a run, without those of alternatives that it has not taken."""
+    executed = set(trace.task.tolist())
+    return tuple(task for number, task in enumerate(program.tasks) if number in executed)
+
+
+def alongs(program: Program, trace: Trace) -> tuple[PathTrace, ...]:
+    """Return the paths of the tool in a run, each repeated path once."""
     found: dict[int, PathTrace] = {}
-    for task in program.tasks:
+    for task in executed_tasks(program, trace):
         if not isinstance(task.action, FollowPlan):
             continue
         for segment in task.action.plan.segments:
@@ -98,7 +104,7 @@ def alongs(program: Program) -> tuple[PathTrace, ...]:
 
 def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, float | None]:
     """Return each of MEASURES by its name; None if it does not apply."""
-    paths = alongs(program)
+    paths = alongs(program, trace)
     errors = np.concatenate([path.error for path in paths]) if paths else np.empty(0)
     turned = np.concatenate([path.turned for path in paths]) if paths else np.empty(0)
     at_ticks, between = executed(program, trace)
@@ -113,7 +119,7 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
     ]
     nearest = [
         task.action.plan.nearest.contact.distance
-        for task in program.tasks
+        for task in executed_tasks(program, trace)
         if isinstance(task.action, FollowPlan)
         and task.action.plan.nearest is not None
         # An object to be lifted touches the table at first.
@@ -226,7 +232,8 @@ def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
     if end is None:
         return {}
     found = score(end.water, end.course)
-    pours = [number for number, task in enumerate(program.tasks) if task.name == POURING]
+    executed = sorted(set(trace.task.tolist()))
+    pours = [number for number in executed if program.tasks[number].name == POURING]
     carried = trace.task < (pours[0] if pours else len(program.tasks))
     return {
         "emptied_percent": found.emptied_percent,

@@ -171,7 +171,7 @@ class Report:
             raise InputError(
                 f"{directory} cannot be created: {error.strerror or error}."
             ) from error
-        paths = alongs(self.program)
+        paths = alongs(self.program, self.trace)
         images = dict(pictures)
         if paths:
             images["path.png"] = figures.path_figure(paths)

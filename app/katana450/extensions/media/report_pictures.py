@@ -57,12 +57,14 @@ DESIRED_RADIUS, TRACED_RADIUS = 1.2e-3, 2e-3
 
 def moments(program: Program, trace: Trace) -> dict[str, int]:
     """Return the tick of each picture by its name, for the moments that the run has."""
-    names = [task.name for task in program.tasks]
-    takes = [number for number, name in enumerate(names) if name.endswith(CLOSING)]
-    pours = [number for number, name in enumerate(names) if name == POURING]
+    # Tasks of alternatives that were not taken are left out.
+    executed = sorted(set(trace.task.tolist()))
+    names = {number: program.tasks[number].name for number in executed}
+    takes = [number for number, name in names.items() if name.endswith(CLOSING)]
+    pours = [number for number, name in names.items() if name == POURING]
     found: dict[str, int] = {}
     if takes:
-        start = next(n for n in range(len(names)) if _same(program, n, takes[0]))
+        start = next(number for number in executed if _same(program, number, takes[0]))
         found["initial"] = _ticks(trace, start)[0]
         found["grasping"] = _ticks(trace, takes[0])[-1]
     if pours:

@@ -198,9 +198,12 @@ class Task:
         line: line of the script, from 1.
         name: name that is shown to people.
         action: the action.
+        after: index of the task that follows; None for the next one. The number of tasks is the
+            end of the program. After a ``ConditionalJump`` the condition decides.
     """
 
     number: int
     line: int
     name: str
     action: Action
+    after: int | None = None

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.conditions import CHOICE_CONDITIONS, one_condition
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.located_step import Conditional, LocatedStep, count
 from katana450.extensions.programs.pick import stacked
 from katana450.extensions.programs.scope import Scope
 from katana450.extensions.programs.script_context import ScriptContext
@@ -21,16 +22,8 @@ MAX_STEPS = 1000
 MAX_REPETITIONS = 1000
 """Maximum count of a ``repeat``, and of the values of a ``for_each``."""
 
-BLOCKS = ("repeat", "for_each", "call", "stack")
+BLOCKS = ("repeat", "for_each", "call", "stack", "if")
 """Names of what stands for several steps."""
-
-
-class LocatedStep(NamedTuple):
-    """A step and its place in the text, from 1."""
-
-    step: Step
-    line: int
-    column: int
 
 
 @dataclass(frozen=True)
@@ -87,13 +80,16 @@ class StepReader:
     def steps(self, value: YamlValue) -> tuple[LocatedStep, ...]:
         """Read a list of steps. Raises ScriptError with all problems."""
         found: list[LocatedStep] = []
+        total = 0
         problems: list[Problem] = []
         for item in value.items if value.kind == "list" else ():
             try:
-                found += self._step(item)
+                steps = self._step(item)
+                found += steps
+                total += count(steps)
             except ScriptError as error:
                 problems += error.problems
-            if len(found) > MAX_STEPS:
+            if total > MAX_STEPS:
                 text = f"A script has at most {MAX_STEPS} steps, repetitions counted."
                 problems += item.wrong(text).problems
                 break
@@ -122,16 +118,26 @@ class StepReader:
             case "for_each":
                 found = self._for_each(value)
             case "call":
-                found = self._call(value)
+                found = self._call(name, value)
+            case "if":
+                found = _located(name, self._conditional(value))
             case "stack":
-                steps = stacked(self.scope.bound(value), self.setting)
-                return tuple(LocatedStep(step, name.line, name.column) for step in steps)
+                return _located(name, *stacked(self.scope.bound(value), self.setting))
             case _:
                 step = STEPS[str(name.held)].read(self.scope.bound(value), self.setting)
-                return (LocatedStep(step, name.line, name.column),)
-        if len(found) > MAX_STEPS:
-            raise name.wrong(f"This gives {len(found)} steps; the maximum is {MAX_STEPS}.")
+                return _located(name, step)
+        if count(found) > MAX_STEPS:
+            raise name.wrong(f"This gives {count(found)} steps; the maximum is {MAX_STEPS}.")
         return found
+
+    def _conditional(self, value: YamlValue) -> Conditional:
+        fields = Fields(value, "an if")
+        condition = one_condition(fields, CHOICE_CONDITIONS, self.setting, self.scope)
+        then = fields.need("then", self.steps, ())
+        otherwise = fields.take("else", self.steps, ())
+        fields.done()
+        assert condition is not None
+        return Conditional(condition, then, otherwise)
 
     def _repeated(self, value: YamlValue) -> tuple[LocatedStep, ...]:
         fields = Fields(value, "a repeat")
@@ -142,7 +148,7 @@ class StepReader:
             # The same steps again, which are planned only once.
             steps = fields.need("steps", self.steps, ())
             fields.done()
-            return steps * times if times * len(steps) <= MAX_STEPS else steps * (MAX_STEPS + 1)
+            return steps * times if times * count(steps) <= MAX_STEPS else steps * (MAX_STEPS + 1)
         index = fields.take("index", lambda each: each, value)
         numbers = [
             YamlValue(index.line, index.column, str(i), "whole", float(i)) for i in range(times)
@@ -166,9 +172,12 @@ class StepReader:
 
         def all_of(steps: YamlValue) -> tuple[LocatedStep, ...]:
             found: list[LocatedStep] = []
+            total = 0
             for each in values:
-                found += replace(self, scope=self.scope.having(name, each)).steps(steps)
-                if len(found) > MAX_STEPS:
+                inner = replace(self, scope=self.scope.having(name, each)).steps(steps)
+                found += inner
+                total += count(inner)
+                if total > MAX_STEPS:
                     break
             return tuple(found)
 
@@ -176,7 +185,7 @@ class StepReader:
         fields.done()
         return steps
 
-    def _call(self, value: YamlValue) -> tuple[LocatedStep, ...]:
+    def _call(self, call: YamlValue, value: YamlValue) -> tuple[LocatedStep, ...]:
         given: tuple[tuple[YamlValue, YamlValue], ...] = ()
         name = value
         if value.kind == "mapping":
@@ -192,7 +201,8 @@ class StepReader:
                 else f"There is no definition {name}; give it under `define:`, before it is called."
             )
         arguments = tuple((word, self.scope.bound(each)) for word, each in given)
-        return self._called(self.definitions[str(name.held)], arguments)
+        found = self._called(self.definitions[str(name.held)], arguments)
+        return tuple(each.called_at(call.line, call.file) for each in found)
 
     @staticmethod
     def _called(
@@ -216,3 +226,8 @@ def _pairs(value: YamlValue) -> tuple[tuple[YamlValue, YamlValue], ...]:
     """Read a mapping of names to values. Raises ScriptError."""
     Fields(value, "the parameters")
     return value.fields
+
+
+def _located(at: YamlValue, *steps: Step | Conditional) -> tuple[LocatedStep, ...]:
+    """Return ``steps`` with the place of ``at``."""
+    return tuple(LocatedStep(step, at.line, at.column, at.file) for step in steps)

@@ -42,7 +42,7 @@ def plan_script(
     urdf: Path,
     seed: int = 0,
     speed: float = 1.0,
-    begin: Callable[[Session], State] = ready,
+    begin: Callable[[Session], State] | None = None,
 ) -> Planned:
     """Return ``script`` planned for the arm of ``urdf``.
 
@@ -51,13 +51,16 @@ def plan_script(
         urdf: description of the arm.
         seed: seed of the planner's random search for paths round obstacles.
         speed: fraction of the script's own speed, up to 1.
-        begin: returns the state in which the script begins.
+        begin: returns the state in which the script begins; None for an arm in its ready posture,
+            in the scene of the script if it has one.
 
-    Raises ScriptError.
+    Raises ScriptError, and InputError if the arm cannot begin so.
     """
     settings = replace(Settings(), bare=script.bare)
     robot, session, _ = describe_robot(settings, urdf, None)
     plan_context = PlanContext(session, robot.require_arm().T_base_shoulder, seed)
+    if begin is None:
+        begin = ready if script.scene is None else script.scene.begin
     start = begin(session)
     program = compiled(script, plan_context, start, speed)
     return Planned(script, program, robot, session, start)

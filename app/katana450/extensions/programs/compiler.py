@@ -1,9 +1,13 @@
-"""Compilation of a script: each step is planned from the state in which the one before it ends."""
+"""Compilation of a script: each step is planned from the state in which the one before it ends.
+
+Both alternatives of an ``if`` are planned from the same state. The steps after it are planned for
+each of them, until both are in the same situation, and then once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,20 +15,49 @@ import numpy as np
 from katana450.arm.control.state import State
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.actions import Action, FollowPlan
-from katana450.extensions.programs.blocks import LocatedStep
-from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder, UntimedPath
+from katana450.extensions.programs.conditions import Condition, ProgramTime
+from katana450.extensions.programs.located_step import (
+    Conditional,
+    LocatedStep,
+    NumberedStep,
+    count,
+    numbered,
+)
+from katana450.extensions.programs.plan_builder import (
+    EXACT,
+    Approach,
+    GraspInfo,
+    PlanBuilder,
+    UntimedPath,
+)
+from katana450.extensions.programs.planned_steps import (
+    Actions,
+    PlannedChoice,
+    PlannedStep,
+    PlannedSteps,
+)
 from katana450.extensions.programs.script import Script
+from katana450.extensions.programs.settings_steps import Speed, Tool
 from katana450.extensions.programs.situation import Situation
 from katana450.extensions.programs.source import Problem, ScriptError
-
-Actions = list[tuple[str, Action]]
-"""The actions of one step, each with its name."""
+from katana450.extensions.programs.step import Step
 
 FINDING, TIMING = "finding paths", "timing paths"
 """The two phases of planning."""
 
 TIMING_FRACTION = 0.8
 """[1] Approximate fraction of the planning time that the timing takes."""
+
+JOIN_AFTER = (0, 1, 2, 4)
+"""Numbers of steps after an ``if`` at which its alternatives may join."""
+
+MAX_COPIES = 16
+"""Maximum number of situations for which a step after alternatives is planned."""
+
+TOO_MANY_COPIES = (
+    f"The steps after this `if` would be planned for more than {MAX_COPIES} situations, in which "
+    "the alternatives so far end. Let alternatives end in the same place, for example with `home`."
+)
 
 
 class PlanningStage(NamedTuple):
@@ -63,11 +96,53 @@ class CompiledStep(NamedTuple):
     taken: GraspInfo | None
 
 
+class _Place(NamedTuple):
+    """The place of the planning: everything that a later attempt starts from."""
+
+    state: State
+    taken: GraspInfo | None
+    given_up: tuple[Approach, ...]
+    # The number of situations for which the next steps are planned.
+    copies: int
+
+
+@dataclass(frozen=True, eq=False)
+class _UntimedStep:
+    number: int
+    located: LocatedStep
+    compiled: CompiledStep
+    used: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class _UntimedChoice:
+    number: int
+    located: LocatedStep
+    condition: Condition | ProgramTime
+    predicted: bool | None
+    then: list[_Untimed]
+    otherwise: list[_Untimed]
+    used: int
+    ends: tuple[_Place, ...]
+
+
+_Untimed = _UntimedStep | _UntimedChoice
+
+
+class _Line(NamedTuple):
+    """Steps that are planned one after another, and the different places where they end."""
+
+    steps: list[_Untimed]
+    ends: tuple[_Place, ...]
+
+
 class Compiler:
     """The compiler of a script, with backtracking to the last grasp when a later step fails.
 
     An object in the hand keeps the pitch at which it was grasped, and a later step may need
     another. The compiler then tries the remaining pitches, each once, before it refuses the script.
+    A grasp inside an ``if`` is tried again for later steps of the same alternative, and for those
+    after the ``if`` that are planned for this alternative alone.
     """
 
     def __init__(
@@ -80,49 +155,148 @@ class Compiler:
         self._script = script
         self._builder = builder
         self._report = report
-        self._compiled_steps: list[CompiledStep] = []
+        self._steps = count(script.steps)
         # A step repeated in the same situation is planned only once.
         self._known: dict[tuple[object, ...], CompiledStep] = {}
         self._plans: dict[int, FollowPlan] = {}
-        # The number of the step that grasped the held object, and the state before that step.
-        self._grasp: tuple[int, State] | None = None
-        self._refused: Problem | None = None
+        self._copies = 1
 
-    def all(self) -> list[Actions]:
-        """Return the actions of each step. Raises ScriptError with the line of a failed step."""
-        steps = self._script.steps
-        while len(self._compiled_steps) < len(steps):
-            number = len(self._compiled_steps)
-            before, taken = self._builder.state, self._builder.taken
-            self._builder.ahead = [placed.step for placed in steps[number + 1 :]]
-            self._report(PlanningStage(FINDING, number + 1, len(steps)))
-            try:
-                compiled_step = self._step(steps[number])
-            except ScriptError as error:
-                self._refused = self._refused or error.problems[0]
-                if not self._go_back():
-                    raise self._error() from error
-                continue
-            self._compiled_steps.append(compiled_step)
-            _, self._builder.state, self._builder.taken = compiled_step
-            self._note_grasp(taken, (number, before))
+    def all(self, first: int = 0) -> PlannedSteps:
+        """Return the planned steps from the index ``first``.
+
+        Of the steps before it only those are planned that choose the tool frame or the speed.
+        Raises InputError if no step, or one inside an ``if``, has this index, and ScriptError with
+        the line of a step that is not possible.
+        """
+        steps = [
+            each
+            for each in numbered(self._script.steps, 0)
+            if each.number >= first or isinstance(each.located.step, Tool | Speed)
+        ]
+        if first and first not in (each.number for each in steps):
+            raise InputError(self._no_beginning(first))
+        found = self._line(steps, len(steps))
         # Paths are timed last, so that no time is spent on a script that is refused.
-        found: list[Actions] = []
-        for number, compiled_step in enumerate(self._compiled_steps, 1):
-            self._report(PlanningStage(TIMING, number, len(steps)))
-            found.append(self._timed(compiled_step))
-        return found
+        return self._timed(found.steps)
 
-    def _step(self, placed: LocatedStep) -> CompiledStep:
+    def _no_beginning(self, first: int) -> str:
+        """Return why the program cannot begin at the step with the index ``first``."""
+        if first >= self._steps:
+            return f"There is no step {first + 1}: {self._script.name} has {self._steps} steps."
+        outer = max(each.number for each in numbered(self._script.steps, 0) if each.number < first)
+        return f"Step {first + 1} is inside an `if`. Begin at step {outer + 1}, the `if`."
+
+    def _line(self, steps: Sequence[NumberedStep], end: int) -> _Line:
+        """Plan ``steps[:end]`` one after another, from the present place. Raises ScriptError."""
         builder = self._builder
-        key = id(placed.step), *_situation(builder)
+        found: list[_Untimed] = []
+        # The index of the step that grasped the held object, and the place before that step.
+        grasp: tuple[int, _Place] | None = None
+        refused: Problem | None = None
+        while (index := sum(each.used for each in found)) < end:
+            before = self._place
+            try:
+                found.append(self._one(steps, index, end))
+            except ScriptError as error:
+                self._return_to(before)
+                refused = refused or error.problems[0]
+                if grasp is None or builder.taken is None or builder.taken.chosen is None:
+                    raise self._error(refused) from error
+                given_up = (*builder.given_up, builder.taken.chosen)
+                number, place = grasp
+                self._return_to(place._replace(given_up=given_up))
+                grasp = None
+                del found[number:]
+                continue
+            last = found[-1]
+            if isinstance(last, _UntimedChoice) and len(last.ends) > 1:
+                # Its alternatives have all steps that follow.
+                return _Line(found, last.ends)
+            if builder.taken is None:
+                grasp, refused, builder.given_up = None, None, ()
+            elif builder.taken is not before.taken:
+                tried_again = builder.taken.chosen is not None and isinstance(last, _UntimedStep)
+                grasp = (len(found) - 1, before) if tried_again else None
+        return _Line(found, (self._place,))
+
+    def _one(self, steps: Sequence[NumberedStep], index: int, end: int) -> _Untimed:
+        """Plan the step ``index`` of ``steps``; an ``if`` with those up to ``end`` that it needs.
+
+        Raises ScriptError.
+        """
+        number, located = steps[index]
+        self._report(PlanningStage(FINDING, number + 1, self._steps))
+        if isinstance(located.step, Conditional):
+            return self._choice(number, located, located.step, steps[index + 1 : end])
+        self._builder.ahead = [each.located.step for each in steps[index + 1 :]]
+        compiled_step = self._step(located, located.step)
+        _, self._builder.state, self._builder.taken = compiled_step
+        return _UntimedStep(number, located, compiled_step)
+
+    def _choice(
+        self,
+        number: int,
+        located: LocatedStep,
+        step: Conditional,
+        rest: Sequence[NumberedStep],
+    ) -> _UntimedChoice:
+        """Plan both alternatives of an ``if``, and steps of ``rest`` in each until they agree."""
+        condition: Condition | ProgramTime = step.condition
+        predicted = None
+        if not isinstance(condition, ProgramTime):
+            try:
+                condition = condition.checked(self._builder)
+            except InputError as error:
+                raise _at(located, error) from error
+            predicted = condition.holds(self._builder.state)
+        alternatives = (
+            list(numbered(step.then, number + 1)),
+            list(numbered(step.otherwise, number + 1 + count(step.then))),
+        )
+        before = self._place
+        used = 0
+        for used in sorted({min(most, len(rest)) for most in (*JOIN_AFTER, len(rest))}):
+            copies = before.copies * (2 if used else 1)
+            if copies > MAX_COPIES:
+                raise _at(located, InputError(TOO_MANY_COPIES))
+            start = before._replace(copies=copies)
+            lines = [
+                self._line_from(start, [*inner, *rest], len(inner) + used) for inner in alternatives
+            ]
+            ends = _different(end for line in lines for end in line.ends)
+            if len(ends) == 1:
+                break
+        self._return_to(ends[0]._replace(copies=before.copies))
+        then, otherwise = (line.steps for line in lines)
+        return _UntimedChoice(
+            number, located, condition, predicted, then, otherwise, 1 + used, ends
+        )
+
+    def _line_from(self, place: _Place, steps: Sequence[NumberedStep], end: int) -> _Line:
+        """Plan ``steps[:end]`` from ``place``. Raises ScriptError."""
+        self._return_to(place)
+        return self._line(steps, end)
+
+    @property
+    def _place(self) -> _Place:
+        builder = self._builder
+        return _Place(builder.state, builder.taken, builder.given_up, self._copies)
+
+    def _return_to(self, place: _Place) -> None:
+        builder = self._builder
+        builder.state, builder.taken, builder.given_up, self._copies = place
+
+    def _step(self, located: LocatedStep, step: Step) -> CompiledStep:
+        """Plan one step from the present place. Raises ScriptError."""
+        builder = self._builder
+        key = id(step), *_situation(builder)
         if key in self._known:
             return self._known[key]
         builder.actions = []
         try:
-            placed.step.build(builder)
+            step.build(builder)
         except InputError as error:
-            raise _at(placed, self._in_frame(error)) from error
+            raise _at(located, self._in_frame(error)) from error
         compiled_step = CompiledStep(builder.actions, builder.state, builder.taken)
         if any(isinstance(action, UntimedPath) for _, action in compiled_step.actions):
             self._known[key] = compiled_step
@@ -136,7 +310,24 @@ class Compiler:
         point = T[:3, :3] @ error.point + T[:3, 3]
         return PathError(error.text, point.tolist(), "the base frame")
 
-    def _timed(self, compiled_step: CompiledStep) -> Actions:
+    def _timed(self, line: Sequence[_Untimed]) -> PlannedSteps:
+        """Return the steps of ``line`` with all paths timed."""
+        found: list[PlannedStep | PlannedChoice] = []
+        for each in line:
+            self._report(PlanningStage(TIMING, each.number + 1, self._steps))
+            if isinstance(each, _UntimedStep):
+                actions = self._timed_actions(each.compiled)
+                found.append(PlannedStep(each.number, each.located, actions))
+            else:
+                then, otherwise = self._timed(each.then), self._timed(each.otherwise)
+                found.append(
+                    PlannedChoice(
+                        each.number, each.located, each.condition, each.predicted, then, otherwise
+                    )
+                )
+        return tuple(found)
+
+    def _timed_actions(self, compiled_step: CompiledStep) -> Actions:
         found: Actions = []
         for name, action in compiled_step.actions:
             if isinstance(action, UntimedPath):
@@ -147,41 +338,44 @@ class Compiler:
                 found.append((name, action))
         return found
 
-    def _note_grasp(self, before: GraspInfo | None, place: tuple[int, State]) -> None:
-        """Record the step that grasped an object at a freely chosen pitch, until it is set down."""
-        builder = self._builder
-        if builder.taken is None:
-            self._grasp, self._refused, builder.given_up = None, None, ()
-        elif builder.taken is not before:
-            self._grasp = None if builder.taken.chosen is None else place
-
-    def _go_back(self) -> bool:
-        """Return to the grasp to try the next pitch; return False if there is no alternative."""
-        builder = self._builder
-        if self._grasp is None or builder.taken is None or builder.taken.chosen is None:
-            return False
-        number, builder.state = self._grasp
-        builder.given_up = (*builder.given_up, builder.taken.chosen)
-        builder.taken, self._grasp = None, None
-        del self._compiled_steps[number:]
-        return True
-
-    def _error(self) -> ScriptError:
-        assert self._refused is not None
-        text = self._refused.text
+    def _error(self, refused: Problem) -> ScriptError:
+        text = refused.text
         pitches_tried = dict.fromkeys(each.pitch for each in self._builder.given_up)
         tried = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
         if len(tried) > 1:
             pitches = ", ".join(tried[:-1]) + f" and {tried[-1]}"
             text += f" No other pitch of the grasp helps: tried {pitches} deg."
-        return ScriptError((replace(self._refused, text=text),))
+        return ScriptError((replace(refused, text=text),))
 
 
-def _at(placed: LocatedStep, error: InputError) -> ScriptError:
-    return ScriptError((Problem(placed.line, placed.column, str(error)),))
+def _at(located: LocatedStep, error: InputError) -> ScriptError:
+    return ScriptError((Problem(located.line, located.column, str(error), located.file),))
 
 
 def _situation(builder: PlanBuilder) -> tuple[object, ...]:
     """Return a hashable key of everything on which the plans of a step depend."""
     taken = None if builder.taken is None else builder.taken.at.position.tobytes()
     return Situation.of(builder.state).key, taken, builder.given_up
+
+
+def _different(ends: Iterable[_Place]) -> tuple[_Place, ...]:
+    """Return ``ends`` without those that are the same as one before."""
+    found: list[_Place] = []
+    for end in ends:
+        if not any(_same(end, other) for other in found):
+            found.append(end)
+    return tuple(found)
+
+
+def _same(one: _Place, other: _Place) -> bool:
+    """Return whether a plan that begins in one place can also begin in the other."""
+    if Situation.of(one.state).changed_to(Situation.of(other.state)):
+        return False
+    if one.taken is None or other.taken is None:
+        return one.taken is other.taken
+    here, there = one.taken.at, other.taken.at
+    return (
+        float(np.abs(here.position - there.position).max()) <= EXACT
+        and abs(here.pitch - there.pitch) <= EXACT
+        and abs(here.roll - there.roll) <= EXACT
+    )

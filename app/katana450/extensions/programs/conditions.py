@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, Self
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.pouring import BASIN, CUP
 from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
@@ -17,10 +18,15 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.scope import Scope
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.units import MILLILITRE
+
+MAX_TIME = 86_400.0
+"""[s] Maximum time of a condition."""
 
 
 class ValueBounds(NamedTuple):
@@ -241,19 +247,129 @@ class FingerPlace:
         return self.bounds.hold(state.gripper)
 
 
-class ConditionReader(Protocol):
+@dataclass(frozen=True, eq=False)
+class ToolPlace:
+    """Coordinates of the tool point are within ``bounds`` [m], in the frame of the script.
+
+    Attributes:
+        bounds: the bounds by the names of the coordinates.
+        in_base: whether they are in the base frame, not in {S}.
+        arm: the arm model, once it is known.
+        T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
+    """
+
+    bounds: Mapping[str, ValueBounds]
+    in_base: bool
+    arm: ArmModel | None = None
+    T_base_shoulder: FloatArray = field(default_factory=lambda: np.eye(4))
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
+        """Read bounds of x, y and z. Raises ScriptError."""
+        fields = Fields(value, "a tool")
+        found = {name: fields.take(name, _length_bounds, None) for name in read.XYZ}
+        bounds = {name: each for name, each in found.items() if each is not None}
+        if not bounds and not fields.problems:
+            problem = "A tool needs bounds of `x`, `y` or `z`."
+            fields.problems += value.wrong(problem).problems
+        fields.done()
+        return cls(bounds, setting.in_base)
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return f"{' and '.join(self.bounds)} of the tool"
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return the condition for the arm of ``builder``."""
+        context = builder.plan_context
+        return replace(self, arm=context.arm, T_base_shoulder=context.T_base_shoulder)
+
+    def holds(self, state: State) -> bool:
+        """Return whether the point of the present tool frame is within the bounds."""
+        assert self.arm is not None
+        p = forward(self.arm.chain_to(state.tool), state.q)[:3, 3]
+        if self.in_base:
+            p = self.T_base_shoulder[:3, :3] @ p + self.T_base_shoulder[:3, 3]
+        at = dict(zip(read.XYZ, p.tolist(), strict=True))
+        return all(bounds.hold(at[name]) for name, bounds in self.bounds.items())
+
+
+def _length_bounds(value: YamlValue) -> ValueBounds:
+    fields = Fields(value, "a coordinate")
+    found = ValueBounds.read(fields, read.millimetres())
+    fields.done()
+    return found
+
+
+@dataclass(frozen=True)
+class ProgramTime:
+    """The time since the program began, with pauses, is within ``bounds`` [s]."""
+
+    bounds: ValueBounds
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {at_least, at_most}. Raises ScriptError."""
+        fields = Fields(value, "a time")
+        found = cls(ValueBounds.read(fields, read.number(0.0, MAX_TIME, "s")))
+        fields.done()
+        return found
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return "the time"
+
+
+C_co = TypeVar("C_co", covariant=True)
+
+
+class ConditionReader(Protocol[C_co]):
     """Reader of a condition."""
 
-    def __call__(self, value: YamlValue, setting: ScriptContext) -> Condition:
+    def __call__(self, value: YamlValue, setting: ScriptContext) -> C_co:
         """Return the condition ``value``. Raises ScriptError."""
         ...
 
 
-CONDITIONS: dict[str, ConditionReader] = {
+CONDITIONS: Mapping[str, ConditionReader[Condition]] = {
     "held": Held.read,
     "placed": Placed.read,
     "volume": Volume.read,
     "joint": JointAngle.read,
     "gripper": FingerPlace.read,
+    "tool": ToolPlace.read,
 }
-"""Readers of all conditions, by their names in a script."""
+"""Readers of the conditions on the state, by their names in a script."""
+
+CHOICE_CONDITIONS: Mapping[str, ConditionReader[Condition | ProgramTime]] = {
+    **CONDITIONS,
+    "time": ProgramTime.read,
+}
+"""Readers of all conditions of an ``if``, by their names in a script."""
+
+
+def one_condition(
+    fields: Fields,
+    readers: Mapping[str, ConditionReader[C_co]],
+    setting: ScriptContext,
+    scope: Scope | None = None,
+) -> C_co | None:
+    """Return the only condition of ``readers`` that ``fields`` has; None after a mistake.
+
+    Names of ``scope`` may stand for values. Mistakes are added to the problems of ``fields``.
+    """
+
+    def condition(name: str) -> C_co | None:
+        def bound(value: YamlValue) -> C_co:
+            return readers[name](value if scope is None else scope.bound(value), setting)
+
+        return fields.take(name, bound, None)
+
+    found = [condition(name) for name in readers if fields.has(name)]
+    if len(found) == 1:
+        return found[0]
+    problem = f"{fields.what.capitalize()} needs exactly one of {', '.join(readers)}."
+    fields.problems += fields.value.wrong(problem).problems
+    return None

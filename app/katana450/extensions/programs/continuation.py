@@ -10,7 +10,8 @@ import numpy as np
 from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.state import State
 from katana450.errors import BlockedError, InputError
-from katana450.extensions.programs.actions import FollowPlan, MoveFingers, SetSpeed, Task
+from katana450.extensions.programs.actions import FollowPlan, MoveFingers, Task
+from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, UntimedPath
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.runner import Phase, Run
@@ -36,16 +37,12 @@ class Interruption:
 
     Attributes:
         program: the program.
-        number: index of the task that was not completed.
-        tau: last known place on its plan [s]; None if it has no plan or had not begun.
-        speed: the speed that applied.
+        run: the run; its task was not completed.
         situation: the situation at the end of the run.
     """
 
     program: Program
-    number: int
-    tau: float | None
-    speed: SetSpeed
+    run: Run
     situation: Situation
 
     @staticmethod
@@ -53,13 +50,12 @@ class Interruption:
         """Return the interruption of ``run``, which ended in ``state``; None if it is complete."""
         if run.phase in (Phase.RUNNING, Phase.DONE):
             return None
-        tau = run.tau if run.started and run.tau > 0.0 else None
-        return Interruption(program, run.number, tau, run.speed, Situation.of(state))
+        return Interruption(program, run, Situation.of(state))
 
     @property
     def task(self) -> Task:
         """The task that was not completed."""
-        return self.program.tasks[self.number]
+        return self.program.tasks[self.run.number]
 
     def changed_to(self, state: State) -> str:
         """Return a clause that names what prevents a continuation from ``state``, else "".
@@ -85,20 +81,37 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
     """
     if changed := interruption.changed_to(state):
         raise InputError(f"The program cannot continue: {changed}. Run it again.")
-    program, number = interruption.program, interruption.number
+    program, run, task = interruption.program, interruption.run, interruption.task
     # Every other task is done at rest.
-    action, q = interruption.task.action, interruption.situation.posture
+    action, q = task.action, interruption.situation.posture
     if isinstance(action, FollowPlan):
-        tau = interruption.tau
-        tau = action.tau if tau is None else _nearest(action.plan, tau, state.setpoint)
+        tau = action.tau
+        if run.started and run.tau > 0.0:
+            tau = _nearest(action.plan, run.tau, state.setpoint)
         q = action.plan.q(tau)
         action = replace(action, tau=tau)
-    task = replace(interruption.task, action=action)
-    added = [replace(task, name="speed", action=interruption.speed)]
+    added = [replace(task, name="speed", action=run.speed, after=None)]
     if float(np.abs(state.setpoint - q).max()) > START_TOLERANCE:
-        added.append(replace(task, name=RETURN, action=_way(plan_context, state, q)))
-    tasks = (*program.tasks[:number], *added, task, *program.tasks[number + 1 :])
-    return replace(program, start=state.setpoint, tasks=tasks, first=number)
+        way = _way(plan_context, state, q)
+        added.append(replace(task, name=RETURN, action=way, after=None))
+    changed_tasks = (
+        *program.tasks[: run.number], replace(task, action=action), *program.tasks[run.number + 1 :]
+    )  # fmt: skip
+    moved = [_moved(each, run.number, len(added)) for each in changed_tasks]
+    tasks = (*moved[: run.number], *added, *moved[run.number :])
+    return replace(program, start=state.setpoint, tasks=tasks, first=run.number)
+
+
+def _moved(task: Task, number: int, by: int) -> Task:
+    """Return ``task``, with the tasks after ``number`` moved back ``by`` places."""
+
+    def place(index: int) -> int:
+        return index + by if index > number else index
+
+    if isinstance(task.action, ConditionalJump):
+        then, otherwise = place(task.action.then), place(task.action.otherwise)
+        return replace(task, action=replace(task.action, then=then, otherwise=otherwise))
+    return task if task.after is None else replace(task, after=place(task.after))
 
 
 def _nearest(plan: Plan, tau: float, q: FloatArray) -> float:

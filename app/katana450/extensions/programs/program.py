@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import FollowPlan, SetSpeed, Task
+from katana450.extensions.programs.actions import FollowPlan, SetSpeed, Task, Wait
 from katana450.extensions.programs.compiler import Compiler, Report
+from katana450.extensions.programs.conditional_jump import ConditionalJump
+from katana450.extensions.programs.conditions import ProgramTime
+from katana450.extensions.programs.located_step import (
+    Conditional,
+    LocatedStep,
+    count,
+    numbered,
+)
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
 from katana450.extensions.programs.script import Script
-from katana450.extensions.programs.settings_steps import Speed, Tool
+from katana450.extensions.programs.task_list import task_list
 from katana450.extensions.programs.wait_for import WaitUntil
 from katana450.maths.geometry.arrays import FloatArray
+
+
+class Alternatives(NamedTuple):
+    """The steps of an ``if``, by their indices in the script.
+
+    Attributes:
+        number: the step ``if``.
+        otherwise: the first step of ``else``; those before it belong to ``then``.
+        end: the first step after both.
+    """
+
+    number: int
+    otherwise: int
+    end: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +48,11 @@ class Program:
         name: name of the script.
         speed: speed of all motions, as a fraction of full speed.
         start: (5,) posture [rad] from which the program must start.
-        tasks: the actions in the order of their execution.
-        steps: number of steps of the script.
-        first: index of the task with which a run begins; the tasks before it are done or skipped.
+        tasks: the actions in the order of their execution. Those of an ``if`` jump forward. Steps
+            after an ``if`` are there once for each situation in which they are planned.
+        steps: number of steps of the script, with those of all alternatives.
+        alternatives: the alternatives of each ``if``, in their order.
+        first: index of the task with which a run begins.
     """
 
     name: str
@@ -33,13 +60,66 @@ class Program:
     start: FloatArray
     tasks: tuple[Task, ...]
     steps: int
+    alternatives: tuple[Alternatives, ...] = ()
     first: int = 0
 
-    @property
+    def next(self, number: int) -> tuple[int, ...]:
+        """Return the tasks that may follow the task ``number``.
+
+        The number of tasks stands for the end.
+        """
+        task = self.tasks[number]
+        if isinstance(task.action, ConditionalJump):
+            return tuple(dict.fromkeys((task.action.then, task.action.otherwise)))
+        return (number + 1 if task.after is None else task.after,)
+
+    def next_in(self, number: int, state: State, elapsed: float) -> int:
+        """Return the task that follows the task ``number`` in ``state``.
+
+        ``elapsed``: time since the program began [s].
+        """
+        action = self.tasks[number].action
+        if isinstance(action, ConditionalJump):
+            return action.then if action.holds(state, elapsed) else action.otherwise
+        return self.next(number)[0]
+
+    @cached_property
     def duration(self) -> float:
-        """Duration of all motions of a run at full speed [s]."""
-        actions = (task.action for task in self.tasks[self.first :])
-        return sum(action.duration for action in actions if isinstance(action, FollowPlan))
+        """Duration of all motions at full speed [s], of the longest possible run."""
+        latest = {self.first: 0.0}
+        for number, task in enumerate(self.tasks):
+            if number not in latest:
+                # It is done, or belongs to an alternative that is not taken.
+                continue
+            action = task.action
+            end = latest[number] + (action.duration if isinstance(action, FollowPlan) else 0.0)
+            for following in self.next(number):
+                latest[following] = max(latest.get(following, 0.0), end)
+        return latest[len(self.tasks)]
+
+    @cached_property
+    def predicted(self) -> tuple[int, ...]:
+        """The tasks that are executed if all is as predicted, in their order."""
+        found: list[int] = []
+        number, elapsed, speed = self.first, 0.0, self.speed
+        while number < len(self.tasks):
+            found.append(number)
+            action = self.tasks[number].action
+            match action:
+                case SetSpeed():
+                    speed = action.scale(self.speed)
+                case FollowPlan():
+                    elapsed += action.duration / speed
+                case Wait(seconds=seconds):
+                    elapsed += seconds
+            if isinstance(action, ConditionalJump):
+                holds = action.predicted
+                if isinstance(action.condition, ProgramTime):
+                    holds = action.condition.bounds.hold(elapsed)
+                number = action.then if holds else action.otherwise
+            else:
+                number = self.next(number)[0]
+        return tuple(found)
 
     @property
     def conditions(self) -> tuple[Task, ...]:
@@ -74,8 +154,7 @@ def compiled(
         state: the state before the program: posture, fingers, tool frame, scene and water.
         speed: fraction of the speed that the script sets.
         report: function that is called with each stage of the planning as it begins.
-        first_step: index of the first step of the program. Of the steps before it only those apply
-            that choose the tool frame or the speed.
+        first_step: index of the first step of the program, see ``Compiler.all``.
 
     Raises:
         ScriptError: a step is not possible; the error has its line.
@@ -89,19 +168,18 @@ def compiled(
         )
     builder = PlanBuilder(plan_context, state)
     builder.state = builder.standing(state.setpoint)
-    if not 0 <= first_step < len(script.steps):
-        raise InputError(
-            f"There is no step {first_step + 1}: {script.name} has {len(script.steps)} steps."
-        )
-    numbered = [
-        (number, located)
-        for number, located in enumerate(script.steps)
-        if number >= first_step or isinstance(located.step, Tool | Speed)
-    ]
-    taken = replace(script, steps=tuple(located for _, located in numbered))
-    compiled_steps = Compiler(taken, builder, report).all()
-    tasks = [Task(numbered[0][0], 1, "speed", SetSpeed(1.0))]
-    for (number, located), actions in zip(numbered, compiled_steps, strict=True):
-        tasks += [Task(number, located.line, name, action) for name, action in actions]
+    tasks = task_list(Compiler(script, builder, report).all(first_step))
     total_speed = script.speed * speed
-    return Program(script.name, total_speed, state.setpoint, tuple(tasks), len(script.steps))
+    steps, alternatives = count(script.steps), tuple(_alternatives(script.steps, 0))
+    return Program(script.name, total_speed, state.setpoint, tasks, steps, alternatives)
+
+
+def _alternatives(steps: Sequence[LocatedStep], first: int) -> Iterator[Alternatives]:
+    """Yield the alternatives of each ``if`` of ``steps``, which are numbered from ``first``."""
+    for number, located in numbered(steps, first):
+        step = located.step
+        if isinstance(step, Conditional):
+            otherwise = number + 1 + count(step.then)
+            yield Alternatives(number, otherwise, otherwise + count(step.otherwise))
+            yield from _alternatives(step.then, number + 1)
+            yield from _alternatives(step.otherwise, otherwise)

@@ -9,6 +9,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan, SetSpeed, Wait
+from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.program import Program
 
 FULL_SPEED = SetSpeed(1.0)
@@ -40,6 +41,8 @@ class Run:
         pauses: indices of the steps before which the run pauses.
         tau: place on the plan of the current task that the arm reached last [s]; 0 on no plan.
         speed: the last speed that a task has set.
+        elapsed: time since the run began, with pauses [s].
+        choices: index of each step ``if`` so far, and whether its condition held.
     """
 
     t: float
@@ -53,6 +56,8 @@ class Run:
     pauses: frozenset[int] = frozenset()
     tau: float = 0.0
     speed: SetSpeed = FULL_SPEED
+    elapsed: float = 0.0
+    choices: tuple[tuple[int, bool], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,8 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     """
     if run.phase is not Phase.RUNNING:
         return run, ()
-    dt, run = t - run.t, replace(run, t=t, tau=_tau(program, run, state))
+    dt = t - run.t
+    run = replace(run, t=t, tau=_tau(program, run, state), elapsed=run.elapsed + dt)
     if state.stopped is not None:
         return replace(run, phase=Phase.STOPPED, why="STOP was pressed."), ()
     if any(finding.reason is Reason.INTERNAL for finding in state.findings):
@@ -111,9 +117,12 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         return replace(run, phase=Phase.FAILED, why=why), (cmd.Hold(),)
     if not done:
         return run, ()
-    if run.number + 1 == len(program.tasks):
+    number = program.next_in(run.number, state, run.elapsed)
+    if isinstance(task.action, ConditionalJump):
+        run = replace(run, choices=(*run.choices, (task.number, number == task.action.then)))
+    if number == len(program.tasks):
         return replace(run, phase=Phase.DONE), ()
-    after = replace(run, number=run.number + 1, started=False, tau=0.0)
+    after = replace(run, number=number, started=False, tau=0.0)
     step_after = program.tasks[after.number].number
     if step_after != task.number and (run.single or step_after in run.pauses):
         return replace(after, single=False), (cmd.Pause(),)
@@ -131,13 +140,17 @@ def _tau(program: Program, run: Run, state: State) -> float:
 def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:
     """Return the approximate time until ``run`` ends [s], without pauses and finger motions.
 
-    ``allowed`` is the maximum fraction of full speed for the tasks to come.
+    Of alternatives the longer one counts. ``allowed`` is the maximum fraction of full speed for the
+    tasks to come.
     """
     if run.phase is not Phase.RUNNING:
         return 0.0
-    left, speed = 0.0, state.speed
-    for number, task in enumerate(program.tasks[run.number :], run.number):
-        action = task.action
+    latest = {run.number: (0.0, state.speed)}
+    for number in range(run.number, len(program.tasks)):
+        if number not in latest:
+            continue
+        left, speed = latest[number]
+        action = program.tasks[number].action
         begun = run.started and number == run.number
         rest = 1.0 - action.fraction(state, run.waited) if begun else 1.0
         if isinstance(action, SetSpeed):
@@ -146,7 +159,21 @@ def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0)
             left += (rest * action.plan.duration if begun else action.duration) / speed
         elif isinstance(action, Wait):
             left += rest * action.seconds
-    return left
+        for following in program.next(number):
+            if following not in latest or left > latest[following][0]:
+                latest[following] = left, speed
+    return latest[len(program.tasks)][0]
+
+
+def skipped(program: Program, run: Run) -> tuple[int, ...]:
+    """Return the steps, from 1, of the alternatives that ``run`` has not taken."""
+    held = dict(run.choices)
+    return tuple(
+        step + 1
+        for number, otherwise, end in program.alternatives
+        if number in held
+        for step in (range(otherwise, end) if held[number] else range(number + 1, otherwise))
+    )
 
 
 def _met(state: State) -> str:

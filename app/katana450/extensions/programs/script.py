@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 from katana450.arm.control.commands import MIN_SPEED
 from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.blocks import LocatedStep, StepReader
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.located_step import LocatedStep
 from katana450.extensions.programs.measures import MEASURES
-from katana450.extensions.programs.places import place
-from katana450.extensions.programs.plan_builder import StepTarget
-from katana450.extensions.programs.scope import Scope
-from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.script_scene import ScriptScene
 from katana450.extensions.programs.settings_steps import Tool
-from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
+from katana450.extensions.programs.source import ScriptError, YamlValue
 from katana450.extensions.programs.source import read as read_text
+from katana450.extensions.programs.vocabulary import FRAMES, Vocabulary
 
 MAX_NAME_LENGTH = 40
 """Maximum number of characters of a name."""
@@ -37,6 +35,7 @@ class Script:
         speed: fraction of full speed.
         steps: the steps in their order, all repetitions written out.
         expected: minimum and maximum of measures, by name.
+        scene: the scene that it needs; None for any.
     """
 
     name: str
@@ -46,6 +45,7 @@ class Script:
     speed: float
     steps: tuple[LocatedStep, ...]
     expected: Mapping[str, tuple[float, float]]
+    scene: ScriptScene | None = None
 
 
 def parse(text: str) -> Script:
@@ -54,51 +54,35 @@ def parse(text: str) -> Script:
     name = top.take("name", _name, "Script")
     about = top.take("about", read.text, "")
     fitted = top.take("gripper", read.choice("fitted", "none"), "fitted")
-    frame = top.take("frame", read.choice("shoulder", "base"), "shoulder")
+    frame = top.take("frame", read.choice(*FRAMES), "shoulder")
     speed = top.take("speed", read.number(MIN_SPEED, 1.0), 1.0)
     in_base = frame == "base"
-    scope = top.take("let", _let, Scope())
-    no_poses: dict[str, StepTarget] = {}
-    poses = top.take("poses", lambda value: _poses(scope.bound(value), in_base=in_base), no_poses)
-    setting = ScriptContext(in_base, poses)
-    tool = top.take("tool", lambda value: LocatedStep(Tool.read(value, setting), *_at(value)), None)
+    known = Vocabulary(in_base)
+    known = top.take("include", known.including, known).extended(top)
+    scene = top.take("scene", lambda value: _scene(value, known), None)
+    tool = top.take(
+        "tool", lambda value: LocatedStep(Tool.read(value, known.setting), *_at(value)), None
+    )
     expected = top.take("expect", _expected, NOTHING)
-    reader = StepReader(setting, scope)
-    reader = top.take("define", reader.defining, reader)
     steps: tuple[LocatedStep, ...]
-    steps = top.need("steps", reader.steps, ())
+    steps = top.need("steps", known.reader.steps, ())
     top.done()
     if tool is not None:
         steps = (tool, *steps)
-    return Script(name, about, fitted == "none", in_base, speed, steps, expected)
+    return Script(name, about, fitted == "none", in_base, speed, steps, expected, scene)
 
 
-def _let(value: YamlValue) -> Scope:
-    """Return the named values; each may use those before it."""
-    scope = Scope()
-    problems: list[Problem] = list(Fields(value, "the values").problems)
-    for name, inner in value.fields:
-        try:
-            scope = scope.having(name, inner)
-        except ScriptError as error:
-            problems += error.problems
-    if problems:
-        raise ScriptError(tuple(problems))
-    return scope
+def is_script(text: str) -> bool:
+    """Return whether ``text`` is meant as a script, because it has steps."""
+    try:
+        value = read_text(text)
+    except ScriptError:
+        return False
+    return value.kind == "mapping" and any(name.held == "steps" for name, _ in value.fields)
 
 
-def _poses(value: YamlValue, *, in_base: bool) -> dict[str, StepTarget]:
-    """Return the poses by name; each may refer to those before it."""
-    fields = Fields(value, "the poses")
-    found: dict[str, StepTarget] = {}
-    for name in [str(key.held) for key, _ in value.fields]:
-        read_place = fields.take(
-            name, lambda each: place(each, ScriptContext(in_base, found)), None
-        )
-        if read_place is not None:
-            found[name] = read_place
-    fields.done()
-    return found
+def _scene(value: YamlValue, known: Vocabulary) -> ScriptScene | None:
+    return None if value.kind == "nothing" else ScriptScene.read(value, known.scope)
 
 
 def _expected(value: YamlValue) -> dict[str, tuple[float, float]]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from katana450.atomic import write_files, writer_of
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions import programs
+from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.source import MAX_BYTES
 
 LIBRARY = Path(programs.__file__).parent / "library"
@@ -58,11 +59,15 @@ class Scripts:
         return found
 
     def text(self, name: str) -> str:
-        """Return the text of the script ``name``. Raises InputError if it cannot be read."""
+        """Return the text of the script ``name``, with those of all files that it names.
+
+        The files are in the folder of the script or below. Raises InputError if a file cannot be
+        read.
+        """
         path = self.paths.get(name)
         if path is None:
             raise InputError(f"The script {name!r} no longer exists.")
-        return text_of(path)
+        return script_text(path)
 
     def save(self, name: str, text: str) -> Path:
         """Save a new script in the folder and return its path. Raises InputError if that fails."""
@@ -93,6 +98,30 @@ def text_of(path: Path) -> str:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text: {error.reason}.") from error
+
+
+def script_text(path: Path) -> str:
+    """Return the text of a script file, with those of all files that it names.
+
+    Lines keep their numbers. Raises InputError if a file cannot be read.
+    """
+    return attached(text_of(path), files_in(path.parent))
+
+
+def files_in(folder: Path) -> Callable[[str], str]:
+    """Return a function that returns the text of a file in ``folder`` or below, by its name.
+
+    It raises InputError for a file that cannot be read, or that a link leads out of the folder.
+    """
+    root = folder.resolve()
+
+    def opened(name: str) -> str:
+        found = (root / name).resolve()
+        if not found.is_relative_to(root):
+            raise InputError(f"{name} is not in the folder of the script.")
+        return text_of(found)
+
+    return opened
 
 
 def _shown(path: Path) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from katana450.extensions.programs.blocks import LocatedStep
+from katana450.extensions.programs.located_step import LocatedStep
 from katana450.extensions.programs.moves import Joints, Via
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.settings_steps import Gripper, Speed, TimedPause
@@ -53,12 +53,12 @@ class TaughtScript:
 
 def taught(script: Script) -> TaughtScript | None:
     """Return ``script`` as poses; None if it says anything else."""
-    if script.bare or script.about or script.expected or script.speed != 1.0:
+    if script.bare or script.about or script.expected or script.scene or script.speed != 1.0:
         return None
     steps, times = _once(script.steps)
     poses: list[TaughtPose] = []
     speed = 1.0
-    for step, _, _ in steps:
+    for step in (each.step for each in steps):
         last = poses[-1] if poses else None
         match step:
             case Speed(value=value):

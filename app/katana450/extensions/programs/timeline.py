@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
@@ -33,34 +33,36 @@ TAU_SAMPLES = 65
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The motions of a program at full speed, on the clock of `Program.duration`.
+    """The motions of a program at full speed, on one clock.
 
-    Pauses between the motions, such as for the gripper, are left out.
+    Pauses between the motions, such as for the gripper, are left out. Of two alternatives it has
+    the predicted one.
 
     Attributes:
         pieces: segments in their order, each with its finger joint [rad].
         begins: start times of the segments and the end of the last [s].
-        firsts: index of the first segment of each task of the program; of tasks without motion,
-            that of the next segment.
+        firsts: index of the first segment of each task of the predicted run, by the index of the
+            task; of tasks without motion, that of the next segment.
     """
 
     pieces: tuple[tuple[Segment, float], ...]
     begins: tuple[float, ...]
-    firsts: tuple[int, ...]
+    firsts: Mapping[int, int]
 
     @staticmethod
     def of(program: Program) -> Timeline:
         """Return the timeline of ``program``."""
         pieces: list[tuple[Segment, float]] = []
-        firsts: list[int] = []
-        for task in program.tasks:
-            firsts.append(len(pieces))
-            if isinstance(task.action, FollowPlan):
-                plan = task.action.plan
+        firsts: dict[int, int] = {}
+        for number in program.predicted:
+            firsts[number] = len(pieces)
+            action = program.tasks[number].action
+            if isinstance(action, FollowPlan):
+                plan = action.plan
                 pieces += [(segment, plan.fingers) for segment in plan.segments]
         durations = (segment.scaling.duration for segment, _ in pieces)
         begins = tuple(accumulate(durations, initial=0.0))
-        return Timeline(tuple(pieces), begins, tuple(firsts))
+        return Timeline(tuple(pieces), begins, firsts)
 
     @property
     def span(self) -> float:
@@ -81,7 +83,7 @@ class Timeline:
         return [self.at(t) for t in np.linspace(0.0, self.span, count).tolist()]
 
     def time_of(self, state: State, task: int) -> float:
-        """Return the time [s] of ``state``, in which the program is at its ``task``."""
+        """Return the time [s] of ``state``, in which the program is at its ``task`` on it."""
         first, following = self.firsts[task], state.following
         segment = None if following is None else following.segment
         number = first if following is None else first + following.number
@@ -113,8 +115,9 @@ def moments(
 ) -> Iterator[Moment]:
     """Simulate ``program`` from ``state``; yield moments at increasing times of ``timeline``.
 
-    Of the time between two motions only the end is yielded. Conditions count as true. A
-    program that fails ends early, and one that takes longer than a day raises InputError.
+    Of the time between two motions only the end is yielded. Awaited conditions count as true. A
+    program that fails, or takes another alternative than predicted, ends early. One that takes
+    longer than a day raises InputError.
     """
     at_rest = JointMotion.rest(state.setpoint)
     start = replace(
@@ -125,6 +128,8 @@ def moments(
     last = Moment(0.0, start)
     yielded = -apart
     for now, run in simulated(program.rehearsed, session, start, TICK, follow_exactly):
+        if run.number not in timeline.firsts:
+            break
         t = max(timeline.time_of(now, run.number), last.t)
         if t > last.t and last.t - yielded >= apart:
             yield last

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Self
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.conditions import CONDITIONS, Condition
+from katana450.extensions.programs.conditions import CONDITIONS, Condition, one_condition
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.script_context import ScriptContext
@@ -65,16 +64,9 @@ class WaitFor:
         """Read one condition and a timeout. Raises ScriptError."""
         fields = Fields(value, "a wait_for")
         timeout = fields.take("timeout", read.number(0.01, MAX_PAUSE, "s"), TIMEOUT)
-        given = [name for name in CONDITIONS if fields.has(name)]
-        found = [
-            fields.take(name, partial(CONDITIONS[name], setting=setting), None) for name in given
-        ]
-        if len(given) != 1 and not fields.problems:
-            what = ", ".join(CONDITIONS)
-            problem = f"A wait_for needs exactly one of {what}."
-            fields.problems += value.wrong(problem).problems
+        condition = one_condition(fields, CONDITIONS, setting)
         fields.done()
-        return cls(found[0], timeout)
+        return cls(condition, timeout)
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the wait. Raises InputError if the condition can never hold."""

@@ -18,9 +18,10 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         line: Line of the present step in the script.
         task: Present task in words.
         fraction: Fraction of the task that is done, or of all planning.
-        seconds: Duration of all motions at full speed [s].
+        seconds: Duration of all motions at full speed [s], of the longest possible run.
         seconds_left: Approximate time until the run ends, at the present speed [s]; 0 if none runs.
         why: What is wrong with the program, or why it was planned again or not run.
+        skipped: Numbers of the steps of alternatives that the run has not taken.
         unattended: Whether it runs without heartbeats of its owner.
         began: Time at which the run began, in UTC, in ISO 8601; null before that.
         breakpoints: Numbers of the steps before which it pauses.
@@ -38,6 +39,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float = 0.0
     seconds_left: float = 0.0
     why: str = ""
+    skipped: tuple[int, ...] = ()
     unattended: bool = False
     began: str | None = None
     breakpoints: tuple[int, ...] = ()

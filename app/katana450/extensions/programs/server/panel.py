@@ -152,7 +152,8 @@ class ProgramsPanel:
         look = 0.0 if self._look.disabled else self._look.value
         current = step_list.current_step(self._steps, progress, look)
         breakpoints = () if progress is None else progress.breakpoints
-        page = step_list.page(self._steps, current, breakpoints)
+        skipped = () if progress is None else progress.skipped
+        page = step_list.page(self._steps, current, breakpoints, skipped)
         if page != self._list.content:
             self._list.content, self._list.visible = page, bool(page)
 

@@ -88,9 +88,10 @@ class Preview:
                 self._path_line.points = np.concatenate(paths).astype(np.float32)
             self._path_line.visible = bool(paths)
             # A program that is continued in the middle of a motion has no preview by time.
-            if program is None or not paths or program.first:
+            timeline = None if program is None else Timeline.of(program)
+            if program is None or timeline is None or not timeline.pieces or program.first:
                 return 0.0
-            self._shown = _Shown(program, Timeline.of(program), state)
+            self._shown = _Shown(program, timeline, state)
             if ghosts:
                 if self._sweep is None:
                     self._sweep = GhostSweep(self._server, self._robot)
@@ -247,9 +248,17 @@ class GhostSweep:
 
 
 def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
-    """Return the tool's path of each plan, (PATH_SAMPLES, 2, 3) in the base frame [m]."""
+    """Return the tool's path of each plan, (PATH_SAMPLES, 2, 3) in the base frame [m].
+
+    The paths of all alternatives are among them.
+    """
     paths: list[FloatArray] = []
-    for task in program.tasks[program.first :]:
+    # The tool frame at the beginning of each task that may be executed.
+    tools = {program.first: tool}
+    for number, task in enumerate(program.tasks):
+        if number not in tools:
+            continue
+        tool = tools[number]
         if isinstance(task.action, UseTool):
             tool = task.action.name
         elif isinstance(task.action, FollowPlan):
@@ -258,4 +267,5 @@ def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray
             postures = [plan.q(tau) for tau in taus]
             points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
             paths.append(np.stack((points[:-1], points[1:]), axis=1))
+        tools.update(dict.fromkeys(program.next(number), tool))
     return paths

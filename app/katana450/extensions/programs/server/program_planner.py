@@ -129,10 +129,12 @@ class ProgramPlanner:
         def job(planning: Planning) -> Program:
             script = parse(text)
             planning.name = script.name
+            if script.scene is not None:
+                script.scene.check_present(context.session, state)
             return compiled(script, context, state, speed, planning.report, first_step=first_step)
 
         self.planning = Planning(
-            text, speed, state, job, self._hub.clock, note, whole=not first_step
+            text, speed, state, job, self._hub.clock, note, first_step=first_step
         )
         self._own(participant)
 
@@ -153,7 +155,13 @@ class ProgramPlanner:
 
         note = f"It continues at step {interruption.task.number + 1}."
         self.planning = Planning(
-            before.text, before.speed, state, job, self._hub.clock, note, whole=False
+            before.text,
+            before.speed,
+            state,
+            job,
+            self._hub.clock,
+            note,
+            continues=interruption.run,
         )
         self._own(participant)
 

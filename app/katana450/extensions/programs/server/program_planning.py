@@ -11,6 +11,7 @@ from katana450.arm.control.state import State
 from katana450.errors import CancelledError, KatanaError
 from katana450.extensions.programs.compiler import PlanningStage
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.runner import Run
 from katana450.extensions.programs.situation import Situation
 from katana450.maths.planning.checkpoint import checked_by
 from katana450.server.api import answers
@@ -37,7 +38,8 @@ class Planning:
         text: the script.
         speed: fraction of the script's own speed.
         situation: the situation that it is planned for.
-        whole: whether the program begins at the first step of the script.
+        first_step: index of the step with which the program begins.
+        continues: the run that it continues; None for a new one.
         name: name of the script; empty until it is parsed.
         stage: present stage of the planning; None before the first step.
         refused: reason why the program cannot run, else None.
@@ -54,7 +56,8 @@ class Planning:
         clock: Callable[[], float],
         note: str = "",
         *,
-        whole: bool = True,
+        first_step: int = 0,
+        continues: Run | None = None,
     ) -> None:
         """Start the thread, in which ``job`` plans from ``state``. ``clock`` returns the time [s].
 
@@ -63,7 +66,8 @@ class Planning:
         self.text = text
         self.speed = speed
         self.situation = Situation.of(state)
-        self.whole = whole
+        self.first_step = first_step
+        self.continues = continues
         self.name = ""
         self.stage: PlanningStage | None = None
         self.refused: str | None = None
@@ -84,6 +88,11 @@ class Planning:
     def program(self) -> Program | None:
         """The planned program; None before the end of the planning, or without success."""
         return None if self.cancelled is not None else self._program
+
+    @property
+    def whole(self) -> bool:
+        """True if the program begins at the first step of the script."""
+        return not self.first_step and self.continues is None
 
     def cancel(self, why: str) -> None:
         """Cancel the planning. The thread ends at its next checkpoint, some milliseconds later."""

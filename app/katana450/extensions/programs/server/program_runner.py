@@ -355,8 +355,16 @@ class ProgramRunner(Runner):
         began = self.hub.clock()
         self._owner.begin(participant, began, unattended=unattended)
         self._interruption = None
-        single, pauses = order is ProgramOrder.STEP, self._planner.breakpoints
-        self._run = Run(began, number=program.first, single=single, pauses=pauses)
+        self._run = replace(
+            planning.continues or Run(began),
+            t=began,
+            number=program.first,
+            started=False,
+            phase=Phase.RUNNING,
+            why="",
+            single=order is ProgramOrder.STEP,
+            pauses=self._planner.breakpoints,
+        )
         how = "runs unattended" if unattended else "runs"
         log.info("%s %s the program %s.", participant.person.name, how, program.name)
         what = {"program": program.name, "order": order.value, "unattended": unattended}

@@ -29,4 +29,5 @@ def run_progress(
         seconds=program.duration,
         seconds_left=runner.seconds_left(program, run, state, allowed),
         why=now.why,
+        skipped=runner.skipped(program, run),
     )

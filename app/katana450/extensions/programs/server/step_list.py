@@ -13,8 +13,8 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.server.state_line import RUNS
 from katana450.server.api.answers import Progress
 
-SKIPPED = "nothing to do"
-"""Name of a step without a task: it is left out, or has nothing to change."""
+NOTHING = "nothing to do"
+"""Name of a step without a task: it is left out, or changes nothing."""
 
 
 class ListedStep(NamedTuple):
@@ -23,22 +23,49 @@ class ListedStep(NamedTuple):
     Attributes:
         name: its name, without the name of an action.
         seconds: duration of its motions at full speed [s].
+        alternative: ``then`` or ``else`` for a step of an alternative, otherwise "".
+        predicted: whether it is executed if all is as predicted.
     """
 
     name: str
     seconds: float
+    alternative: str = ""
+    predicted: bool = True
 
 
 def steps_of(program: Program) -> tuple[ListedStep, ...]:
-    """Return the steps of ``program`` in their order."""
-    names = [SKIPPED] * program.steps
+    """Return the steps of ``program`` in their order, with those of all alternatives."""
+    names: dict[int, str] = {}
     seconds = [0.0] * program.steps
+    predicted = set(program.predicted)
+    expected = {program.tasks[number].number for number in predicted}
+    last: dict[int, int] = {}
     # The first task belongs to no step; it sets the speed.
-    for task in reversed(program.tasks[1:]):
-        names[task.number] = task.name.partition(":")[0]
+    for number, task in enumerate(program.tasks[1:], 1):
+        step = task.number
+        # A step after different alternatives is there several times, and listed once.
+        is_first = last.get(step, number - 1) == number - 1
+        if not (number in predicted if step in expected else is_first):
+            continue
+        last[step] = number
+        names.setdefault(step, task.name.partition(":")[0])
         if isinstance(task.action, FollowPlan):
-            seconds[task.number] += task.action.duration
-    return tuple(map(ListedStep, names, seconds))
+            seconds[step] += task.action.duration
+    words = _words(program)
+    return tuple(
+        ListedStep(names.get(step, NOTHING), seconds[step], words[step], step in expected)
+        for step in range(program.steps)
+    )
+
+
+def _words(program: Program) -> list[str]:
+    """Return ``then`` or ``else`` for each step of an alternative, and "" for all others."""
+    found = [""] * program.steps
+    # Inner alternatives come after the outer ones.
+    for number, otherwise, end in program.alternatives:
+        found[number + 1 : otherwise] = ["then"] * (otherwise - number - 1)
+        found[otherwise:end] = ["else"] * (end - otherwise)
+    return found
 
 
 def current_step(
@@ -52,27 +79,44 @@ def current_step(
         return progress.step - 1
     if look <= 0.0 or not steps:
         return None
-    begins = list(accumulate((step.seconds for step in steps), initial=0.0))
+    seconds = (step.seconds if step.predicted else 0.0 for step in steps)
+    begins = list(accumulate(seconds, initial=0.0))
     return min(bisect_right(begins, look) - 1, len(steps) - 1)
 
 
 def page(
-    steps: tuple[ListedStep, ...], current: int | None, breakpoints: Collection[int] = ()
+    steps: tuple[ListedStep, ...],
+    current: int | None,
+    breakpoints: Collection[int] = (),
+    skipped: Collection[int] = (),
 ) -> str:
     """Return the list as HTML; the empty string without steps.
 
-    Each step has a button to pause before it, pressed if it is one of the ``breakpoints``, from 1,
-    and a button to run the program from it. static/scene/steps.js gives the orders.
+    Each step has a button to pause before it, pressed if it is one of the ``breakpoints``, and a
+    button to run the program from it. static/scene/steps.js gives the orders. ``skipped``: the
+    steps of alternatives that the run has not taken. All are numbers from 1.
     """
     rows = "".join(
-        f"<li{' aria-current=step' if number == current else ''}>"
-        f"<button name=pause aria-label='Pause before step {number + 1}' title='Pause before "
-        f"this step' aria-pressed={'true' if number + 1 in breakpoints else 'false'}></button>"
-        f"<button name=run aria-label='Run from step {number + 1}' title='Run from this step'>"
-        f"</button><span>{escape(step.name)}</span><span>{_duration(step)}</span></li>"
-        for number, step in enumerate(steps)
+        f"<li{_marks(number - 1 == current, number in skipped)}>"
+        f"<button name=pause aria-label='Pause before step {number}' title='Pause before this "
+        f"step' aria-pressed={'true' if number in breakpoints else 'false'}></button>"
+        f"<button name=run aria-label='Run from step {number}' title='Run from this step'>"
+        f"</button><span>{escape(_title(step))}</span>"
+        f"<span>{'not taken' if number in skipped else _duration(step)}</span></li>"
+        for number, step in enumerate(steps, 1)
     )
     return f"<div class='k450'><ol class='steps' tabindex=0>{rows}</ol></div>" if rows else ""
+
+
+def _marks(current: bool, skipped: bool) -> str:
+    """Return the attributes of a row."""
+    if current:
+        return " aria-current=step"
+    return " class=skipped" if skipped else ""
+
+
+def _title(step: ListedStep) -> str:
+    return f"{step.alternative}: {step.name}" if step.alternative else step.name
 
 
 def _duration(step: ListedStep) -> str:

@@ -1,0 +1,301 @@
+"""Test the step ``if``: both alternatives are planned, and the measured state chooses one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.extensions.programs import runner
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.compiler import MAX_COPIES, Compiler
+from katana450.extensions.programs.plan_builder import PlanBuilder, UntimedPath
+from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.server.step_list import current_step, page, steps_of
+from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.timeline import Timeline, moments
+from katana450.maths.water.units import ML
+from tests.programs.conftest import TICK, Stage
+
+HEAD = "frame: base\nsteps:\n"
+
+NESTED = """\
+  - if:
+      volume: {of: cup, at_least: 50}
+      then:
+        - nudge: {axis: 5, by: 10}
+        - if:
+            volume: {of: cup, at_least: 100}
+            then:
+              - nudge: {axis: 5, by: 20}
+  - nudge: {axis: 1, by: 3}
+"""
+"""Three ends: axis 5 is turned by 0, 10 or 30 deg, and axis 1 by 3 deg afterwards."""
+
+
+@pytest.fixture(scope="module")
+def empty(stage: Stage) -> State:
+    """A state with an empty cup."""
+    return with_water(stage, 0.0)
+
+
+@pytest.fixture(scope="module")
+def nested(stage: Stage, empty: State) -> Program:
+    return planned(stage, NESTED, empty)
+
+
+def planned(stage: Stage, text: str, state: State) -> Program:
+    return compiled(parse(HEAD + text), stage.plan_context, state)
+
+
+def with_water(stage: Stage, ml: float) -> State:
+    state = stage.begin()
+    state = stage.session.step(state, (cmd.Fill(ml * ML),), state.t + TICK)
+    return stage.session.observe(state, state.setpoint, state.gripper_setpoint)
+
+
+def turned(state: State, end: State, axis: int) -> float:
+    """Return by how many degrees an axis, from 1, has turned."""
+    return float(np.degrees(end.setpoint[axis - 1] - state.setpoint[axis - 1]))
+
+
+@pytest.mark.parametrize(
+    ("ml", "angle", "choices", "skipped"),
+    [
+        (0.0, 0.0, ((0, False),), (2, 3, 4)),
+        (60.0, 10.0, ((0, True), (2, False)), (4,)),
+        (120.0, 30.0, ((0, True), (2, True)), ()),
+    ],
+)
+def test_measured_state_chooses_the_alternative(
+    stage: Stage,
+    nested: Program,
+    ml: float,
+    angle: float,
+    choices: tuple[tuple[int, bool], ...],
+    skipped: tuple[int, ...],
+) -> None:
+    state = with_water(stage, ml)
+    run, states = stage.play(nested, state)
+    assert (run.phase, run.why) == (Phase.DONE, "")
+    assert turned(state, states[-1], 5) == pytest.approx(angle)
+    assert turned(state, states[-1], 1) == pytest.approx(3.0)
+    assert run.choices == choices
+    assert runner.skipped(nested, run) == skipped
+
+
+def test_step_after_different_ends_is_planned_for_each(nested: Program) -> None:
+    assert nested.steps == 5
+    assert [task.number for task in nested.tasks if isinstance(task.action, FollowPlan)] == [
+        1, 3, 4, 4, 4
+    ]  # fmt: skip
+
+
+def test_step_after_the_same_end_is_planned_once(stage: Stage, empty: State) -> None:
+    text = (
+        "  - if:\n      volume: {of: cup, at_least: 50}\n"
+        "      then: [{nudge: {axis: 5, by: 10}}, home]\n"
+        "      else: [{nudge: {axis: 5, by: -10}}, {nudge: {axis: 5, by: -10}}, home]\n"
+        "  - nudge: {axis: 1, by: 3}\n"
+    )
+    program = planned(stage, text, empty)
+    paths = [task for task in program.tasks if isinstance(task.action, FollowPlan)]
+    assert [task.number for task in paths] == [1, 2, 3, 4, 5, 6]
+    seconds = [task.action.plan.duration for task in paths if isinstance(task.action, FollowPlan)]
+    # The duration and the time left are those of the longest run.
+    assert program.duration == pytest.approx(sum(seconds[2:]))
+    assert program.duration > seconds[0] + seconds[1] + seconds[5]
+    left = runner.seconds_left(program, Run(0.0), empty)
+    assert left == pytest.approx(program.duration)
+    run, states = stage.play(program, with_water(stage, 60.0))
+    assert run.phase is Phase.DONE
+    assert turned(empty, states[-1], 1) == pytest.approx(3.0)
+
+
+def test_list_of_steps_and_timeline_show_the_predicted_alternative(
+    stage: Stage, nested: Program, empty: State
+) -> None:
+    steps = steps_of(nested)
+    assert [(each.alternative, each.name) for each in steps] == [
+        ("", "if the water in the cup"), ("then", "nudge"), ("then", "if the water in the cup"),
+        ("then", "nudge"), ("", "nudge"),
+    ]  # fmt: skip
+    assert [each.predicted for each in steps] == [True, False, False, False, True]
+    assert all(each.seconds > 0.0 for each in steps if each.name == "nudge")
+    timeline = Timeline.of(nested)
+    assert timeline.span == pytest.approx(steps[4].seconds)
+    assert current_step(steps, None, 0.5 * timeline.span) == 4
+    *_, last = moments(nested, timeline, stage.session, empty)
+    assert last.t == pytest.approx(timeline.span)
+    # Another alternative than the predicted one is not on the timeline.
+    *_, last = moments(nested, timeline, stage.session, with_water(stage, 60.0))
+    assert last.t == 0.0
+    html = page(steps, 4, (), (2, 3, 4))
+    assert html.count("not taken") == 3
+    assert "<span>then: nudge</span><span>not taken</span>" in html
+
+
+def test_state_is_measured_when_the_step_is_reached(stage: Stage, empty: State) -> None:
+    text = (
+        "  - wait: 0.5\n"
+        "  - if: {volume: {of: cup, at_least: 50}, then: [{nudge: {axis: 5, by: 10}}]}\n"
+    )
+    program = planned(stage, text, empty)
+    run, state = Run(empty.t), empty
+    while run.phase is Phase.RUNNING and state.t < 10.0:
+        run, commands = runner.step(program, run, state, state.t)
+        if empty.t + 0.2 < state.t < empty.t + 0.2 + 1.5 * TICK:
+            commands = (*commands, cmd.Fill(80.0 * ML))
+        state = stage.session.step(state, commands, state.t + TICK)
+        state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
+    assert run.phase is Phase.DONE
+    assert turned(empty, state, 5) == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [
+        ("time: {at_least: 500 ms}", True),
+        ("time: {at_least: 2}", False),
+        ("time: {at_most: 2 min}", True),
+        ("gripper: {at_least: 1}", False),
+        ("held: cup", False),
+        ("tool: {x: {at_least: -2000}, z: {at_least: 0}}", True),
+        ("tool: {z: {at_most: 0}}", False),
+    ],
+)
+def test_conditions_are_measured(stage: Stage, empty: State, condition: str, holds: bool) -> None:
+    text = f"  - wait: 1\n  - if: {{{condition}, then: [{{wait: 0.1}}], else: [{{wait: 0.2}}]}}\n"
+    program = planned(stage, text, empty)
+    run, _ = stage.play(program, empty)
+    assert run.choices == ((1, holds),)
+    taken = program.tasks[program.predicted[-1]].action
+    assert taken.fraction(empty, 0.1) == (1.0 if holds else 0.5)
+
+
+def test_tool_point_is_measured_in_the_frame_of_the_script(stage: Stage, empty: State) -> None:
+    p = PlanBuilder(stage.plan_context, empty).at.position
+    T = stage.plan_context.T_base_shoulder
+    for frame, z in (("shoulder", p[2]), ("base", (T[:3, :3] @ p + T[:3, 3])[2])):
+        bounds = f"{{at_least: {1e3 * z - 0.1:.4f}, at_most: {1e3 * z + 0.1:.4f}}}"
+        text = f"frame: {frame}\nsteps:\n  - wait_for: {{tool: {{z: {bounds}}}}}\n"
+        (task,) = compiled(parse(text), stage.plan_context, empty).conditions
+        assert task.action.done(empty, 0.0), frame
+
+
+def test_alternatives_in_loops_and_definitions(stage: Stage, empty: State) -> None:
+    text = """\
+let: {limit: 50}
+define:
+  turn:
+    with: {by: 5}
+    steps:
+      - if:
+          volume: {of: cup, at_least: limit}
+          then: [{nudge: {axis: 5, by: by}}]
+          else: [{nudge: {axis: 5, by: -by}}]
+steps:
+  - repeat: {times: 2, index: i, steps: [{call: {name: turn, with: {by: (i + 1) * 2}}}]}
+  - call: turn
+"""
+    program = compiled(parse(text), stage.plan_context, empty)
+    assert program.steps == 9
+    for ml, angle in ((0.0, -11.0), (60.0, 11.0)):
+        state = with_water(stage, ml)
+        run, states = stage.play(program, state)
+        assert run.phase is Phase.DONE
+        assert turned(state, states[-1], 5) == pytest.approx(angle)
+
+
+def test_step_by_step_pauses_behind_the_if(stage: Stage, nested: Program) -> None:
+    state = with_water(stage, 60.0)
+    run = Run(state.t, single=True)
+    while not state.paused and run.phase is Phase.RUNNING:
+        run, state = stage.tick(nested, run, state)
+    assert nested.tasks[run.number].number == 1
+    assert runner.progress(nested, run, state).step == 2
+
+
+def test_number_of_copies_of_a_step_is_bounded(stage: Stage, empty: State) -> None:
+    one = "  - if: {volume: {of: cup, at_least: 50}, then: [{nudge: {axis: 5, by: 5}}]}\n"
+    home = "  - home\n"
+    with pytest.raises(ScriptError, match=f"more than {MAX_COPIES} situations") as refused:
+        planned(stage, 5 * one + home, empty)
+    assert refused.value.problems[0].line == 7
+    builder = PlanBuilder(stage.plan_context, empty)
+    assert Compiler(parse(HEAD + 4 * one + home), builder).all()
+    assert Compiler(parse(HEAD + 8 * (one + home)), builder).all()
+
+
+def test_arrangement_after_different_ends_is_planned(stage: Stage, empty: State) -> None:
+    """The cup is put where the basin stands, which is moved by the step after that."""
+    cup, basin = (
+        "{{object: {}, x: {:.1f}, y: {:.1f}}}".format(name, *(1e3 * each.T[:2, 3]))
+        for name, each in zip(("basin", "cup"), empty.objects, strict=True)
+    )
+    text = (
+        "  - if: {time: {at_least: 50}, then: [{nudge: {axis: 5, by: 5}}]}\n"
+        f"  - put: {basin}\n  - put: {cup}\n  - home\n"
+    )
+    assert [each.name for each in empty.objects] == ["cup", "basin"]
+    assert planned(stage, text, empty).steps == 5
+
+
+def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State) -> None:
+    text = (
+        "  - if:\n      time: {at_least: 3}\n      then: [home]\n"
+        "      else:\n        - move: {x: 3, y: 0, z: 5}\n"
+    )
+    with pytest.raises(ScriptError, match="cannot be") as refused:
+        planned(stage, text, empty)
+    assert refused.value.problems[0].line == 7
+    with pytest.raises(ScriptError, match="no object 'jug'") as refused:
+        planned(stage, "  - if: {held: jug, then: [home]}\n", empty)
+    assert refused.value.problems[0].line == 3
+
+
+def test_grasp_before_an_if_is_tried_again(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The basin is so near that it can only be reached at another pitch than the first one."""
+    monkeypatch.setattr(UntimedPath, "timed", lambda self: self)
+    lines = PourDemo(basin=(165.0, 286.0)).text.partition("expect:")[0].splitlines()
+    at = next(number for number, line in enumerate(lines) if line.startswith("  - pour"))
+    inner = [f"    {line}" for line in lines[at:]]
+    text = "\n".join([*lines[:at], "  - if:", "      time: {at_least: 0}", "      then:", *inner])
+    builder = PlanBuilder(stage.plan_context, stage.begin())
+    Compiler(parse(text), builder).all()
+    assert builder.taken is None
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("{then: [home]}", "An if needs exactly one of held, placed, volume"),
+        ("{held: cup, time: {at_least: 1}, then: [home]}", "exactly one of"),
+        ("{held: cup}", "An if needs 'then'"),
+        ("{held: cup, then: []}", "Expected a list of steps"),
+        ("{held: cup, then: [home], else: []}", "Expected a list of steps"),
+        ("{held: cup, then: [home], otherwise: [home]}", "has no 'otherwise'"),
+        ("{held: cup, then: [hme]}", "did you mean 'home'"),
+        ("{time: {}, then: [home]}", "A time needs `at_least`, `at_most` or both"),
+        ("{time: {at_least: 3 mm}, then: [home]}", "not a length"),
+        ("{tool: {}, then: [home]}", "A tool needs bounds of `x`, `y` or `z`"),
+        ("{tool: {x: 3}, then: [home]}", "must be a mapping"),
+        ("{tool: {u: {at_least: 3}}, then: [home]}", "A tool has no 'u'"),
+        ("held", "must be a mapping"),
+    ],
+)
+def test_mistake_is_refused_with_its_place(value: str, said: str) -> None:
+    with pytest.raises(ScriptError, match=said) as refused:
+        parse(f"{HEAD}  - if: {value}\n")
+    assert refused.value.problems[0].line == 3
+
+
+def test_steps_of_alternatives_count() -> None:
+    inner = ", ".join(["home"] * 30)
+    text = f"steps:\n  - repeat: {{times: 40, steps: [{{if: {{held: cup, then: [{inner}]}}}}]}}\n"
+    with pytest.raises(ScriptError, match="maximum is 1000"):
+        parse(text)

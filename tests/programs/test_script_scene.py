@@ -1,0 +1,177 @@
+"""Test ``scene`` of a script: its forms, its use in a simulation, and the check of a server."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.attached_files import attached
+from katana450.extensions.programs.clocked_run import plan_script
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_scene import ScriptScene
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.water.units import MILLILITRE, ML
+from katana450.resources import URDF_PATH
+from tests.programs.conftest import TICK, Stage
+
+POST = "{name: post, shape: box, size: [30, 30, 250], pose: [330, 0, 0, 0, 0, 20]}"
+AT = "pose: [300, 200, 0, 0, 0, 0]"
+CUP = f"{{name: cup, shape: cylinder, size: [32, 90], {AT}, can_be_held: true}}"
+STEPS = "steps:\n  - home\n"
+
+FILE = f"""\
+scene: 1
+joints: [10, -68, 85, 8, 0]
+water: 50
+objects:
+- {POST}
+- {CUP}
+"""
+
+
+def scene_of(text: str) -> ScriptScene:
+    scene = parse(text).scene
+    assert scene is not None
+    return scene
+
+
+@pytest.fixture(scope="module")
+def scene() -> ScriptScene:
+    return scene_of(attached(f"scene: it.yaml\n{STEPS}", lambda _: FILE))
+
+
+@pytest.fixture(scope="module")
+def begun(stage: Stage, scene: ScriptScene) -> State:
+    return scene.begin(stage.session)
+
+
+def test_scene_of_a_file_begins_with_its_joints_and_water(begun: State) -> None:
+    assert [each.name for each in begun.objects] == ["post", "cup"]
+    assert np.degrees(begun.setpoint[0]) == pytest.approx(10.0)
+    assert begun.poured is not None
+    assert begun.poured.water.cup / MILLILITRE == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        f"scene:\n  - {POST}",
+        f"scene: [{POST}]",
+        f"scene:\n  objects:\n  - {POST}",
+        f"scene: {{scene: 1, objects: [{POST}]}}",
+        f"let: {{wide: 3 cm}}\nscene: [{POST.replace('30, 30, 250', 'wide, wide, 250')}]",
+    ],
+)
+def test_objects_may_be_in_the_script(stage: Stage, field: str) -> None:
+    (post,) = scene_of(f"{field}\n{STEPS}").begin(stage.session).objects
+    assert post.size == pytest.approx((0.03, 0.03, 0.25))
+    assert post.T[:3, 3].tolist() == pytest.approx([0.33, 0.0, 0.0])
+
+
+def test_simulation_uses_the_scene_of_the_script() -> None:
+    line = (
+        "frame: base\ntool: tcp\nsteps:\n"
+        "  - move: {x: 320, y: -100, z: 150, pitch: 50, roll: 0}\n  - line: {by: {y: 200}}\n"
+    )
+    with pytest.raises(ScriptError, match="post") as refused:
+        plan_script(parse(f"scene: [{POST}]\n{line}"), URDF_PATH)
+    assert refused.value.problems[0].line == 6
+
+
+def test_present_scene_is_accepted(stage: Stage, scene: ScriptScene, begun: State) -> None:
+    scene.check_present(stage.session, begun)
+    elsewhere = stage.session.begin(stage.session.ready, 0.5, 0.0)
+    elsewhere = replace(elsewhere, objects=begun.objects, poured=begun.poured)
+    scene.check_present(stage.session, elsewhere)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "difference"),
+    [
+        ("330, 0, 0", "331, 0, 0", "post is at (331.0, 0.0, 0.0) mm, not at (330.0, 0.0, 0.0) mm"),
+        ("0, 0, 20]", "0, 0, 25]", "post is turned"),
+        ("[30, 30, 250]", "[30, 31, 250]", "post has another shape or size"),
+        (", 250]", ", 250], scale: 0.5", "post has the scale 0.5, not 1"),
+        (", 0, 20]", ", 0, 20], can_be_held: true", "post can be held"),
+        ("- {name: post", "- {name: pole", "there is no post"),
+        ("objects:", f"objects:\n- {{name: ball, shape: sphere, size: [20], {AT}}}",
+         "there is also ball"),
+        ("water: 50", "water: 70", "the cup has 70.0 ml of water, not 50.0 ml"),
+    ],
+)  # fmt: skip
+def test_first_difference_is_named(
+    stage: Stage, scene: ScriptScene, old: str, new: str, difference: str
+) -> None:
+    text = FILE.replace(old, new, 1)
+    present = scene_of(attached(f"scene: it.yaml\n{STEPS}", lambda _: text)).begin(stage.session)
+    with pytest.raises(ScriptError) as refused:
+        scene.check_present(stage.session, present)
+    assert f"not that of the script: {difference}. Start a server with" in str(refused.value)
+    assert refused.value.problems[0].line == 1
+
+
+def test_held_object_is_a_difference(stage: Stage, scene: ScriptScene, begun: State) -> None:
+    post, cup = begun.objects
+    present = replace(begun, objects=(post, replace(cup, held=True)))
+    with pytest.raises(ScriptError, match="cup is in the hand"):
+        scene.check_present(stage.session, present)
+
+
+def test_meshes_are_compared_without_their_forms(stage: Stage, begun: State) -> None:
+    mesh = f"{{name: cup, shape: mesh, mesh: {{file: a.stl}}, {AT}}}"
+    scene = scene_of(f"scene: [{mesh}]\n{STEPS}")
+    with pytest.raises(ScriptError, match="cup has another shape or size"):
+        scene.check_present(stage.session, begun)
+    with pytest.raises(ScriptError, match="cup is a mesh, whose file is not read here") as refused:
+        scene.begin(stage.session)
+    assert refused.value.problems[0].line == 1
+
+
+@pytest.mark.parametrize(
+    ("field", "said"),
+    [
+        (f"scene:\n  - {POST}\n  - {POST}", "two objects called 'post'"),
+        ("scene:\n  - {name: a, shape: bax}", "not 'bax'"),
+        ("scene: 3", "Expected a text"),
+        ("scene: {water: 3, colour: red}", "has no 'colour'"),
+        ("scene: {scene: 2, objects: []}", "version must be 1"),
+    ],
+)
+def test_mistake_is_refused(field: str, said: str) -> None:
+    with pytest.raises(ScriptError, match=said):
+        parse(f"{field}\n{STEPS}")
+
+
+def test_mistake_in_a_file_has_its_line() -> None:
+    text = FILE.replace("shape: cylinder", "shape: cone")
+    with pytest.raises(ScriptError) as refused:
+        parse(attached(f"scene: below/it.yaml\n{STEPS}", lambda _: text))
+    (problem,) = refused.value.problems
+    assert (problem.file, problem.line) == ("below/it.yaml", 6)
+
+
+def test_scene_that_is_impossible_is_refused(stage: Stage) -> None:
+    high = POST.replace("330, 0, 0", "330, 0, 100").replace("]}", "], can_be_held: true}")
+    for field, said in (
+        (f"{{joints: [10, 0, 0, 0, 999], objects: [{POST}]}}", "outside the limits"),
+        (f"{{water: 10, objects: [{POST}]}}", "no cup"),
+        (f"[{high}]", "in the air"),
+    ):
+        with pytest.raises(InputError, match=said) as refused:
+            scene_of(f"\nscene: {field}\n{STEPS}").begin(stage.session)
+        assert isinstance(refused.value, ScriptError)
+        assert refused.value.problems[0].line == 2
+
+
+def test_water_of_a_script_without_water_is_none(stage: Stage) -> None:
+    scene = scene_of(f"scene: [{CUP}]\n{STEPS}")
+    state = scene.begin(stage.session)
+    scene.check_present(stage.session, state)
+    state = stage.session.step(state, (cmd.Fill(30.0 * ML),), state.t + TICK)
+    with pytest.raises(ScriptError, match=r"the cup has 30\.0 ml of water, not 0\.0 ml"):
+        scene.check_present(stage.session, state)
