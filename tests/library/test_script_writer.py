@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import katana450
+from katana450.extensions.programs.located_step import count
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.steps import STEPS
 from tests.programs.yaml_core import loaded
 
@@ -121,6 +123,40 @@ def test_saved_script_is_read_again(tmp_path: Path) -> None:
     everything().save(tmp_path / "all.yaml")
     text = (tmp_path / "all.yaml").read_text(encoding="utf-8")
     assert len(parse(text).steps) == len(parse(ALL).steps)
+
+
+def test_alternatives_scenes_and_files_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("parts.yaml").write_text("define: {rest: {with: {t: 1}, steps: [{wait: t}]}}", "utf-8")
+    with katana450.program() as p:
+        p.include("parts.yaml")
+        p.scene([{"name": "a", "shape": "box", "size": [9, 9, 9], "pose": np.zeros(6)}])
+        with p.when(time={"at_most": 9}):
+            p.home()
+            with p.when(held="a"):
+                p.wait(2)
+        with p.otherwise():
+            p.call("rest", t=3)
+        p.call("rest")
+    assert loaded(str(p))["steps"] == [
+        {
+            "if": {
+                "time": {"at_most": 9},
+                "then": ["home", {"if": {"held": "a", "then": [{"wait": 2}]}}],
+                "else": [{"call": {"name": "rest", "with": {"t": 3}}}],
+            }
+        },
+        {"call": "rest"},
+    ]
+    p.save(tmp_path / "script.yaml")
+    script = parse(script_text(tmp_path / "script.yaml"))
+    assert script.scene is not None
+    assert [each.name for each in script.scene.draft.entries] == ["a"]
+    assert count(script.steps) == 6
+    with pytest.raises(katana450.InputError, match="must follow a block `when`"), p.otherwise():
+        pass
 
 
 def test_mistakes_are_reported_at_the_end_of_the_block() -> None:

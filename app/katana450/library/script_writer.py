@@ -12,7 +12,9 @@ import numpy as np
 import yaml
 
 from katana450.errors import InputError
+from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import files_in
 from katana450.maths.geometry.arrays import FloatArray
 
 Number = float | str
@@ -49,13 +51,24 @@ class ScriptWriter:
         return text
 
     def check(self) -> None:
-        """Raise InputError with all mistakes of the script, by the lines of its YAML."""
-        parse(str(self))
+        """Raise InputError with all mistakes of the script, by the lines of its YAML.
+
+        Files that it names are those of the present folder.
+        """
+        parse(attached(str(self), files_in(Path())))
 
     def save(self, path: str | Path) -> None:
         """Write the script to a file, for ``katana450 run``. Raises InputError for a mistake."""
         self.check()
         Path(path).write_text(str(self), encoding="utf-8")
+
+    def scene(self, scene: str | Sequence[Mapping[str, Any]] | Mapping[str, Any]) -> None:
+        """Name the scene that it needs: a file, its objects, or a mapping as in a scene file."""
+        self._head["scene"] = _plain(scene)
+
+    def include(self, *files: str) -> None:
+        """Take poses, values and definitions from files beside the script."""
+        self._head["include"] = list(files)
 
     def pose(
         self,
@@ -80,12 +93,39 @@ class ScriptWriter:
     @contextmanager
     def repeat(self, times: int) -> Iterator[None]:
         """Repeat the steps of the block, which are planned once. A loop of Python does it too."""
+        with self._block() as inside:
+            yield
+        self._add("repeat", {"times": times, "steps": inside})
+
+    @contextmanager
+    def when(self, **condition: Any) -> Iterator[None]:
+        """Do the steps of the block if a condition holds when it is reached: ``held="cup"``."""
+        with self._block() as inside:
+            yield
+        self._add("if", {**condition, "then": inside})
+
+    @contextmanager
+    def otherwise(self) -> Iterator[None]:
+        """Do the steps of the block if the condition of the block ``when`` before it fails.
+
+        Raises InputError without such a block.
+        """
+        last = self._steps[-1] if self._steps else None
+        choice = last.get("if") if isinstance(last, dict) else None
+        if choice is None or "else" in choice:
+            raise InputError("A block `otherwise` must follow a block `when`.")
+        with self._block() as inside:
+            yield
+        choice["else"] = inside
+
+    @contextmanager
+    def _block(self) -> Iterator[list[Any]]:
+        """Add the steps of the block to a list of their own."""
         outside, self._steps = self._steps, []
         try:
-            yield
+            yield self._steps
         finally:
-            inside, self._steps = self._steps, outside
-        self._add("repeat", {"times": times, "steps": inside})
+            self._steps = outside
 
     def home(self) -> None:
         """Move to the ready posture."""
@@ -256,6 +296,10 @@ class ScriptWriter:
     def set_down(self) -> None:
         """Put the held object back to where it was grasped."""
         self._steps.append("set_down")
+
+    def call(self, name: str, **parameters: Any) -> None:
+        """Do the steps of a definition of an included file, with other values of parameters."""
+        self._add("call", {"name": name, "with": parameters} if parameters else name)
 
     def _add(self, name: str, value: Any) -> None:
         self._steps.append({name: _plain(value)})
