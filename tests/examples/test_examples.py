@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import urllib.request
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,8 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.scene_reader import parsed
 from katana450.extensions.programs.script import Script, parse
+from katana450.extensions.programs.script_files import script_text
 from tests.browser.server import ROOT, AppServer
 from tests.programs.conftest import Stage
 
@@ -164,16 +163,13 @@ def test_script_can_be_planned(stage: Stage, name: str) -> None:
 
 
 def script(name: str) -> Script:
-    return parse((EXAMPLES / "programs" / f"{name}.yaml").read_text(encoding="utf-8"))
+    return parse(script_text(EXAMPLES / "programs" / f"{name}.yaml"))
 
 
 def start_of(stage: Stage, name: str) -> State:
-    """Return the state in which a script begins, with the scene of its name if there is one."""
-    scene, start = EXAMPLES / "scenes" / f"{name}.yaml", stage.begin()
-    if not scene.exists():
-        return start
-    objects = parsed(scene.read_text(encoding="utf-8")).scene({}, None).objects
-    return replace(start, objects=objects, poured=None)
+    """Return the state in which a script begins, in its scene if it has one."""
+    scene = script(name).scene
+    return stage.begin() if scene is None else scene.begin(stage.session)
 
 
 @pytest.mark.long
