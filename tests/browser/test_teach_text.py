@@ -78,6 +78,12 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     press(sheet, "Edit as poses")
     sheet.wait_until(lambda: "no poses" in says(sheet), "the refusal")
     assert area.is_visible()
+    # A mistake in an attached file is named by that file, and marks no line of the script.
+    area.fill('include: {"a.yaml": "# A file.\\nlat: {a: 1}"}\nsteps:\n  - home\n')
+    sheet.wait_until(
+        lambda: page.inner_text("#teach-problems").startswith("a.yaml, line 2 "), "the file"
+    )
+    assert page.locator("#teach-editor pre .bad").count() == 0
 
 
 def test_space_in_the_text_stops_a_moving_arm(sheet: ViserPage, truth: Truth) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from katana450.cli.main import main
 from tests.browser.server import AppServer, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -90,40 +91,43 @@ def test_scene_that_cannot_be_used_is_named(script: Path, post: Path, tmp_path: 
     assert f"{post.name}:" in done.stderr
 
 
-def test_scene_of_the_script_is_used_unless_another_is_given(script: Path, post: Path) -> None:
+def test_scene_of_the_script_is_used_unless_another_is_given(
+    script: Path, post: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     aside = script.parent / "aside.yaml"
     aside.write_text(POST.replace("[330, 0,", "[330, 300,"), encoding="utf-8")
     script.write_text(f"scene: {post.name}\n{SCRIPT}", encoding="utf-8")
-    done = run(script, "--dry-run")
-    assert done.returncode == 1
-    assert f"{script}:6:" in done.stderr
-    assert "post" in done.stderr
-    done = run(script, "--dry-run", "--scene", aside)
-    assert done.returncode == 0, done.stderr
+    assert main(["run", str(script), "--dry-run"]) == 1
+    said = capsys.readouterr().err
+    assert f"{script}:6:" in said
+    assert "post" in said
+    assert main(["run", str(script), "--dry-run", "--scene", str(aside)]) == 0
 
 
-def test_error_in_an_included_file_is_reported_with_its_path(script: Path) -> None:
+def test_error_in_an_included_file_is_reported_with_its_path(
+    script: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     parts = script.parent / "parts.yaml"
     parts.write_text("define:\n  up:\n    steps:\n      - line: {by: {z: 500}}\n", encoding="utf-8")
     head, tail = SCRIPT.split("steps:\n")
     included = f"{head}include: {parts.name}\nsteps:\n{tail}  - call: up\n"
     script.write_text(included, encoding="utf-8")
-    done = run(script, "--dry-run")
-    assert done.returncode == 1
-    assert f"{parts}:4:" in done.stderr
+    assert main(["run", str(script), "--dry-run"]) == 1
+    assert f"{parts}:4:" in capsys.readouterr().err
     script.write_text(included.replace(parts.name, "gone.yaml"), encoding="utf-8")
-    done = run(script, "--dry-run")
-    assert done.returncode == 1
-    assert f"{script}:3:10: " in done.stderr
-    assert "gone.yaml cannot be read" in done.stderr
+    assert main(["run", str(script), "--dry-run"]) == 1
+    said = capsys.readouterr().err
+    assert f"{script}:3:10: " in said
+    assert "gone.yaml cannot be read" in said
 
 
-def test_alternatives_are_listed_with_their_beginnings(script: Path) -> None:
+def test_alternatives_are_listed_with_their_beginnings(
+    script: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     choice = "  - if: {time: {at_least: 9}, then: [{nudge: {axis: 5, by: 5}}, home]}\n"
     script.write_text(f"{SCRIPT}{choice}  - home\n", encoding="utf-8")
-    done = run(script, "--dry-run")
-    assert done.returncode == 0, done.stderr
-    _, _, listed = done.stdout.partition("if the time\n")
+    assert main(["run", str(script), "--dry-run"]) == 0
+    _, _, listed = capsys.readouterr().out.partition("if the time\n")
     assert listed.startswith("-- then of line 6\nline    6  nudge")
     assert "\n-- else of line 6\nline    7  home" in listed
     assert re.search(r"^7 steps, at most [\d.]+ s of motion", listed, re.MULTILINE)

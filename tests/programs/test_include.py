@@ -190,7 +190,9 @@ def test_number_and_size_of_files_are_bounded() -> None:
     with pytest.raises(ScriptError, match=f"at most {MAX_FILES} files"):
         parse(f"include: {{{texts}}}\nsteps: [home]")
     with pytest.raises(ScriptError, match="at most 64 KB"):
-        parse(whole(SCRIPT, {"parts.yaml": PARTS + "#" * 70_000}))
+        parse(whole(SCRIPT, {"parts.yaml": PARTS + "#" * 65_300}))
+    (problem,) = problems(SCRIPT, {"parts.yaml": PARTS + "#" * 70_000})
+    assert problem == Problem(2, 10, "parts.yaml has more than 64 KB.")
 
 
 @settings(max_examples=50)

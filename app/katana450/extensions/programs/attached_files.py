@@ -16,7 +16,7 @@ import yaml
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.source import ScriptError, YamlValue, composed
+from katana450.extensions.programs.source import MAX_BYTES, ScriptError, YamlValue, composed
 
 INCLUDE, SCENE = "include", "scene"
 """Fields of a script that name files."""
@@ -145,6 +145,8 @@ def _opened(
         text = opened(name)
     except InputError as error:
         raise at.wrong(str(error)) from error
+    if len(text) > MAX_BYTES:
+        raise at.wrong(f"{name} has more than {MAX_BYTES // 1024} KB.")
     texts[name] = text
     found = {name: text}
     for inner in _names(text, name):
