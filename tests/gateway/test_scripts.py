@@ -183,6 +183,23 @@ def test_server_waits_for_a_condition(
     server: AppServer, condition: str, end: str, why: str
 ) -> None:
     text = f"steps:\n  - wait_for: {{{condition}, timeout: 0.5}}\n  - nudge: {{axis: 5, by: 5}}\n"
+    program = run_to_the_end(server, text)
+    assert program.status == end
+    assert program.why.startswith(why)
+
+
+def test_server_reports_the_steps_that_were_not_taken(server: AppServer) -> None:
+    text = (
+        "steps:\n  - if:\n      gripper: {at_least: 1}\n      then: [home, {wait: 9}]\n"
+        "      else: [{nudge: {axis: 5, by: 2}}]\n  - nudge: {axis: 5, by: -2}\n"
+    )
+    program = run_to_the_end(server, text)
+    assert (program.status, program.why) == ("done", "")
+    assert (program.step, program.steps, program.skipped) == (5, 5, (2, 3))
+
+
+def run_to_the_end(server: AppServer, text: str) -> answers.Progress:
+    """Run a script and return its last progress."""
     with connect(server.url, "Owner") as arm:
         arm.ask(Program(text=text))
         deadline, ran = time.monotonic() + 30.0, False
@@ -196,5 +213,4 @@ def test_server_waits_for_a_condition(
                 break
             assert time.monotonic() < deadline, program
             time.sleep(0.02)
-    assert program.status == end
-    assert program.why.startswith(why)
+    return program
