@@ -24,8 +24,8 @@ class _Exit(NamedTuple):
 class _TaskList:
     """The tasks so far, and the next tasks of their ends."""
 
-    def __init__(self) -> None:
-        self.tasks: list[Task] = [Task(0, 1, "speed", SetSpeed(1.0))]
+    def __init__(self, first: int) -> None:
+        self.tasks: list[Task] = [Task(first, 1, "speed", SetSpeed(1.0))]
         self.next: dict[_Exit, int] = {}
 
     def add(self, task: Task, exits: Sequence[_Exit]) -> int:
@@ -75,6 +75,6 @@ def task_list(steps: PlannedSteps) -> tuple[Task, ...]:
 
     A task leads only to later ones. The number of tasks stands for the end.
     """
-    found = _TaskList()
+    found = _TaskList(steps[0].number)
     found.join(found.add_steps(steps, (_Exit(0, AFTER),)))
     return found.linked()
