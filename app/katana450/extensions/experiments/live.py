@@ -31,7 +31,10 @@ STATE_RATE = 10.0
 START_TIMEOUT = 60.0
 """[s] Timeout for the start of a server."""
 
-END_STATUSES = ("done", "stopped", "failed", "refused", "cancelled")
+UNPLANNED_STATUSES = ("refused", "cancelled")
+"""Statuses of a program whose planning has failed."""
+
+END_STATUSES = ("done", "stopped", "failed", *UNPLANNED_STATUSES)
 """Statuses of a program that has ended."""
 
 
@@ -90,7 +93,8 @@ def planned_program(arm: Client) -> None:
             line = f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}"
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
         time.sleep(1.0 / STATE_RATE)
-    if now is None or now.status in END_STATUSES:
+    # A program that runs at once may have ended already.
+    if now is None or now.status in UNPLANNED_STATUSES:
         raise KatanaError(now.why if now is not None else "The server no longer knows the script.")
     print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
 
