@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -268,6 +270,35 @@ def test_grasp_before_an_if_is_tried_again(stage: Stage, monkeypatch: pytest.Mon
     builder = PlanBuilder(stage.plan_context, stage.begin())
     Compiler(parse(text), builder).all()
     assert builder.taken is None
+
+
+@pytest.mark.long
+def test_missed_object_is_grasped_again(stage: Stage, empty: State) -> None:
+    """The cup is moved away before the fingers close, and back when they have opened again."""
+    text = (
+        "  - grasp: cup\n  - wait: 1\n"
+        "  - if: {held: cup, then: [{line: {by: {z: 60}}}], else: [{pick: cup}]}\n"
+    )
+    program = planned(stage, text, empty)
+    cup = next(each for each in empty.objects if each.name == "cup")
+    T = cup.T.copy()
+    T[:3, 3] = (0.0, 0.35, 0.0)
+    away = cmd.PlaceObject(replace(cup, T=T))
+    for missed in (True, False):
+        run, state, last = Run(empty.t), empty, ""
+        while run.phase is Phase.RUNNING and state.t < 60.0:
+            name = program.tasks[run.number].name
+            run, commands = runner.step(program, run, state, state.t)
+            if missed and name != last == "open" and run.choices:
+                commands = (cmd.PlaceObject(cup), *commands)
+            elif missed and not run.choices and name != last and name == "grasp cup: close":
+                commands = (away, *commands)
+            last = name
+            state = stage.session.step(state, commands, state.t + TICK)
+            state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
+        assert (run.phase, run.why) == (Phase.DONE, "")
+        assert run.choices == ((2, not missed),)
+        assert state.held is not None
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import numpy as np
 from katana450.arm.control.state import State
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.actions import Action, FollowPlan
-from katana450.extensions.programs.conditions import Condition, ProgramTime
+from katana450.extensions.programs.conditions import Condition, Held, ProgramTime
 from katana450.extensions.programs.located_step import (
     Conditional,
     LocatedStep,
@@ -254,14 +254,19 @@ class Compiler:
             list(numbered(step.otherwise, number + 1 + count(step.then))),
         )
         before = self._place
+        starts = [before, before]
+        if isinstance(condition, Held) and predicted:
+            # Otherwise `else` could not even grasp the object again.
+            self._builder.assume_missed()
+            starts[1] = self._place
         used = 0
         for used in sorted({min(most, len(rest)) for most in (*JOIN_AFTER, len(rest))}):
             copies = before.copies * (2 if used else 1)
             if copies > MAX_COPIES:
                 raise _at(located, InputError(TOO_MANY_COPIES))
-            start = before._replace(copies=copies)
             lines = [
-                self._line_from(start, [*inner, *rest], len(inner) + used) for inner in alternatives
+                self._line_from(start._replace(copies=copies), [*inner, *rest], len(inner) + used)
+                for start, inner in zip(starts, alternatives, strict=True)
             ]
             ends = _different(end for line in lines for end in line.ends)
             if len(ends) == 1:

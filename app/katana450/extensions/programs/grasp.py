@@ -172,7 +172,8 @@ class Grasp:
         if held.grip is None:
             raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
         builder.note(f"grasp {self.name}: close", MoveFingers(closed), held)
-        builder.taken = GraspInfo(builder.at, approach if self.pitch is None else None)
+        chosen = approach if self.pitch is None else None
+        builder.taken = GraspInfo(builder.at, chosen, scene_object)
 
 
 def approaches(builder: PlanBuilder, scene_object: SceneObject) -> dict[str, tuple[Approach, ...]]:

@@ -106,10 +106,17 @@ class Approach(NamedTuple):
 
 @dataclass(frozen=True)
 class GraspInfo:
-    """The tool pose of a grasp, and its approach if that was chosen by the compiler."""
+    """A grasp.
+
+    Attributes:
+        at: pose of the tool.
+        chosen: the approach if the compiler has chosen it, else None.
+        before: the object as it stood before.
+    """
 
     at: ToolTarget
     chosen: Approach | None
+    before: SceneObject
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,6 +281,19 @@ class PlanBuilder:
         return self._with_still_water(
             replace(self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE)
         )
+
+    def assume_missed(self) -> None:
+        """Continue as if the last grasp had missed: the fingers are closed, the object stands."""
+        if self.taken is None:
+            return
+        before, closed = self.taken.before, self.plan_context.arm.gripper.lower
+        objects = tuple(before if each.name == before.name else each for each in self.state.objects)
+        missed = replace(
+            self.state, objects=objects, grip=None,
+            gripper=closed, gripper_setpoint=closed, gripper_goal=closed,
+        )  # fmt: skip
+        self.state = self._with_still_water(missed)
+        self.taken, self.given_up = None, ()
 
     def predict_water(self, volume: float) -> None:
         """Continue with ``volume`` [m^3] of water in the cup."""
