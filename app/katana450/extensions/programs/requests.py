@@ -37,6 +37,9 @@ class Program(Request, frozen=True, kw_only=True):
     speed. The state reports the progress of the planning, its end, or the errors of the script by
     line. The last plan is kept: the same script is ready at once while posture, gripper, tool,
     scene and water are the same.
+
+    The text stands alone: it holds the texts of the files that it names. A script with a ``scene``
+    is refused unless that is the present one.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
