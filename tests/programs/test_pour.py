@@ -14,11 +14,12 @@ from katana450.extensions.programs.pour import PourDemo, Spot
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.score import score
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
 from katana450.maths.water.flow import Water
-from katana450.maths.water.score import score
-from katana450.maths.water.units import MILLILITRE
+from katana450.maths.water.liquid import LIQUIDS
+from katana450.maths.water.units import MILLILITRE, ML, counted
 from tests.programs.conftest import Stage
 
 
@@ -34,7 +35,8 @@ def check_poured(stage: Stage, program: Program) -> None:
     end, pouring = states[-1], stage.session.pouring
     assert end.poured is not None
     found = score(end.poured.water, end.poured.course)
-    assert found.emptied_percent >= 99.0
+    # A film of water stays on the wall of the cup.
+    assert 99.5 <= found.emptied_percent <= 99.95
     assert found.spilled_ml == 0.0
     # The water surface stays below the lip until the cup is turned over to pour.
     (turned,) = (task.action for task in program.tasks if task.name == POURING)
@@ -95,8 +97,15 @@ steps:
 """A script that fills the cup [ml] and has steps in which it is poured."""
 
 
-def poured(stage: Stage, full: float, *parts: float) -> Water:
-    """Pour parts of a cup [ml] into the basin; return the water at the end."""
+ORDINARY = ("water", 60.0)
+"""Case of the ordinary run; examples/programs has one with honey."""
+
+
+def poured(stage: Stage, full: float | str, *parts: float) -> Water:
+    """Pour parts of a cup [ml] into the basin; return the water at the end.
+
+    ``full``: value of `fill`.
+    """
     pours = "".join(f"- pour: {{into: basin, ml: {part:g}}}\n" for part in parts)
     program = compiled(parse(PART.format(full, pours)), stage.plan_context, stage.begin())
     run, states = stage.play(program, stage.begin(), most=20_000)
@@ -106,13 +115,34 @@ def poured(stage: Stage, full: float, *parts: float) -> Water:
 
 
 @pytest.mark.parametrize(
-    "full",
-    [60.0, *(pytest.param(full, marks=pytest.mark.long) for full in (100.0, 140.0, 180.0, 220.0))],
+    ("liquid", "full"),
+    [
+        pytest.param(liquid, full, marks=[] if (liquid, full) == ORDINARY else [pytest.mark.long])
+        for liquid in LIQUIDS
+        for full in (60.0, 100.0, 140.0, 180.0, 220.0)
+    ],
 )
-def test_half_of_the_water_is_poured(stage: Stage, full: float) -> None:
-    water = poured(stage, full, 0.5 * full)
-    assert water.basin / MILLILITRE == pytest.approx(0.5 * full, rel=0.02)
-    assert water.spilled == 0
+def test_half_of_the_liquid_is_poured(stage: Stage, liquid: str, full: float) -> None:
+    water = poured(stage, f"{{ml: {full:g}, of: {liquid}}}", 0.5 * full)
+    assert water.basin / MILLILITRE == pytest.approx(0.5 * full, rel=0.005)
+    assert (water.spilled, water.liquid.name) == (0, liquid)
+    assert water.total == counted(full * ML)
+
+
+@pytest.mark.long
+def test_thicker_liquids_leave_more_in_the_cup(stage: Stage) -> None:
+    left = []
+    for liquid in LIQUIDS:
+        text = PART.format(f"{{ml: 200, of: {liquid}}}", "- pour: {into: basin, shake: 3}\n")
+        program = compiled(parse(text), stage.plan_context, stage.begin())
+        run, states = stage.play(program, stage.begin(), most=20_000)
+        assert run.phase is Phase.DONE
+        assert states[-1].poured is not None
+        left.append(states[-1].poured.water.kept / MILLILITRE)
+    water, oil, honey = left
+    assert 0.1 < water < 1.0
+    assert 2.0 < oil < 8.0
+    assert 10.0 < honey < 50.0
 
 
 @pytest.mark.long

@@ -9,8 +9,10 @@ import numpy as np
 
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.units import GRAVITY
 
 Step = tuple[FloatArray, FloatArray]
 """Pose (4, 4) [m] of the cup, and acceleration (3,) [m/s^2] of its middle, in the base frame."""
@@ -67,3 +69,12 @@ def poured(
 def turned_to(final: float, rate: float) -> Callable[[float], float]:
     """Return a tilt over time [s] that rises at ``rate`` [rad/s] to ``final`` [rad] and stays."""
     return lambda t: min(rate * t, final)
+
+
+def steady_acceleration(cup: Cylinder, volume: float) -> float:
+    """Return the maximum steady horizontal acceleration [m/s^2] without a spill.
+
+    The cup is upright with ``volume`` [m^3] of water, and its surface has come to rest. A sudden
+    acceleration makes the surface swing to nearly twice the lean.
+    """
+    return GRAVITY * math.tan(cup.spills_at(volume))

@@ -16,11 +16,19 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.lip import DROP_VOLUME
 from katana450.maths.water.parcel import Parcel
-from katana450.maths.water.slosh import steady_acceleration
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, counted
 from tests.geometry.strategies import points, repeatable, rotation_vectors
-from tests.water.motions import NO_ACCELERATION, carried, over_basin, placed, poured, turned_to
+from tests.water.motions import (
+    NO_ACCELERATION,
+    carried,
+    over_basin,
+    placed,
+    poured,
+    steady_acceleration,
+    turned_to,
+)
 
 FULL = 2e-4
 """A filling [m^3]."""
@@ -69,18 +77,23 @@ def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     for after in poured(flow, water, turned_to(final, rate), final / rate + 2.5, dt):
         checked(water, after, flow)
-        assert after.cup <= water.cup
+        assert after.kept <= water.kept
         water = after
-    held = flow.water_environment.cup.inside.holds(final)
-    assert water.cup == min(counted(FULL), counted(held))
-    assert not water.parcels
+    over = water.cup - counted(flow.water_environment.cup.inside.holds(final))
+    # A film stays on the wall, and less than a drop hangs at the lip.
+    assert over < DROP_VOLUME
+    assert over >= 0 or water.kept == counted(FULL) or water.film > -over
+    assert water.film < MILLILITRE
     assert water.spilled == 0
 
 
 def test_inverted_cup_is_emptied_into_the_basin(flow: WaterFlow) -> None:
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(math.radians(120.0), 1.0), 4.0, 0.01)
-    assert (water.cup, water.basin, water.spilled) == (0, water.total, 0)
+    assert (water.basin + water.kept, water.spilled, water.air) == (water.total, 0, 0)
+    # A part of a millilitre of water stays on the wall, and less than a drop at the lip.
+    assert 0 <= water.cup < DROP_VOLUME
+    assert 0.1 * MILLILITRE < water.film < 0.6 * MILLILITRE
 
 
 def test_stopped_pour_flows_down_to_the_lip(flow: WaterFlow) -> None:
@@ -94,10 +107,12 @@ def test_stopped_pour_flows_down_to_the_lip(flow: WaterFlow) -> None:
     assert flowing[0] > 0
     assert all(a >= b for a, b in pairwise(flowing[:100]))
     after = runs[at_stop + 200]
-    assert (after.cup, after.parcels) == (held, ())
-    assert flow.margin_to_rim(after) == pytest.approx(0.0, abs=1e-9)
+    assert 0 <= after.cup - held < DROP_VOLUME
+    assert after.parcels == ()
+    assert flow.margin_to_rim(after) == pytest.approx(0.0, abs=2e-5)
     last = runs[-1]
-    assert (last.cup, last.basin, last.spilled) == (held, last.total - held, 0)
+    assert 0 <= last.cup - held < DROP_VOLUME
+    assert (last.basin, last.spilled) == (last.total - last.kept, 0)
 
 
 def test_the_size_of_the_steps_hardly_matters(flow: WaterFlow) -> None:
@@ -130,7 +145,7 @@ def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: WaterFlow) -> 
     water, least = carry(flow, 0.4, 0.45)
     assert least < 0.0
     assert water.spilled > MILLILITRE
-    assert water.cup + water.spilled == water.total
+    assert water.kept + water.spilled == water.total
 
 
 def test_the_steady_acceleration_is_where_spilling_begins(flow: WaterFlow) -> None:
@@ -195,7 +210,7 @@ def test_a_full_basin_spills_onto_the_table(environment: WaterEnvironment) -> No
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     assert water.basin == counted(small.capacity)
-    assert water.basin + water.spilled == water.total
+    assert water.basin + water.spilled + water.kept == water.total
     x, y, _ = small.at
     for puddle in water.puddles:
         assert math.hypot(puddle.at[0] - x, puddle.at[1] - y) < 0.08
@@ -208,7 +223,7 @@ def test_water_stays_in_free_fall_but_not_upside_down(flow: WaterFlow) -> None:
         water = flow.step(water, T, (0.0, 0.0, -9.81), 0.01)
     assert water.cup == water.total
     *_, water = poured(flow, water, lambda _: math.pi, 3.0, 0.01)
-    assert (water.cup, water.air) == (0, 0)
+    assert water.kept < MILLILITRE
 
 
 def test_water_at_rest_stays_at_rest(flow: WaterFlow) -> None:

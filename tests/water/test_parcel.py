@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.parcel import Ground, Parcel, landing
+from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.parcel import SPREAD, Ground, Parcel, landing, overlap
 from katana450.maths.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
+from tests.water.motions import NO_ACCELERATION
 
 speeds = st.floats(-2.0, 2.0)
 velocities = st.tuples(speeds, speeds, speeds)
@@ -75,4 +80,59 @@ def test_water_beside_the_table_lands_on_the_floor(environment: WaterEnvironment
     assert end.age == pytest.approx(math.sqrt(2.0 * (0.3 - floor) / GRAVITY))
     # The start is below all surfaces.
     sunk = Parcel(1, (west - 0.1, 0.0, -0.4), (0.0, 0.0, -1.0), 0.0, 0.01)
-    assert landing(sunk, environment, 0.0) == (Ground.FLOOR, 0.0, (west - 0.1, 0.0, floor))
+    assert landing(sunk, environment, 0.0)[:3] == (Ground.FLOOR, 0.0, (west - 0.1, 0.0, floor))
+
+
+def test_falling_water_keeps_its_energy(environment: WaterEnvironment) -> None:
+    """The potential energy that a parcel loses is its kinetic energy at the landing."""
+    x, y, _ = environment.basin.at
+    for height, velocity in ((0.3, (0.2, -0.1, 0.4)), (0.15, (0.0, 0.3, -0.2)), (0.5, (0, 0, 0))):
+        parcel = Parcel(10**12, (x, y, height), velocity, 0.0, 0.01)
+        end = landing(parcel, environment, 0.01)
+        # The path is a parabola, so a central difference of any width is its velocity.
+        before, after = parcel.at(end.age - 0.05), parcel.at(end.age + 0.05)
+        speed = math.dist(before, after) / 0.1
+        lost = GRAVITY * (height - end.point[2])
+        gained = 0.5 * speed**2 - 0.5 * sum(v * v for v in velocity)
+        assert gained == pytest.approx(lost, rel=1e-9)
+
+
+@repeatable
+@given(st.floats(0.0, 0.3), st.floats(0.001, 0.1), st.floats(0.01, 0.15))
+def test_overlap_is_the_common_part_of_two_discs(distance: float, a: float, b: float) -> None:
+    r = a * np.sqrt((np.arange(300) + 0.5) / 300.0)
+    turn = (np.arange(300) + 0.5) * (math.tau / 300.0)
+    inside = np.hypot(distance + np.outer(r, np.cos(turn)), np.outer(r, np.sin(turn))) < b
+    assert overlap(distance, a, b) == pytest.approx(float(inside.mean()), abs=8e-3)
+
+
+def test_stream_near_the_rim_is_divided(environment: WaterEnvironment) -> None:
+    basin = environment.basin
+    x, y, _ = basin.at
+
+    def fraction(offset: float) -> float:
+        parcel = Parcel(10**11, (x + offset, y, 0.4), (0.0, 0.0, -0.1), 0.0, 0.01)
+        end = landing(parcel, environment, 0.0)
+        return end.fraction if end.ground is Ground.BASIN else 0.0
+
+    assert fraction(0.0) == fraction(basin.rim_radius - 0.03) == 1.0
+    assert 0.4 < fraction(basin.rim_radius) < 0.5
+    assert fraction(basin.rim_radius + 0.03) == 0.0
+    # The disc grows with the fall.
+    parcel = Parcel(10**11, (x, y, 0.4), (0.0, 0.0, -0.1), 0.0, 0.01)
+    radii = [parcel.radius_at(0.05 * k) for k in range(5)]
+    assert all(a < b for a, b in pairwise(radii))
+    fallen = math.dist(parcel.start, parcel.at(0.2))
+    assert radii[4] - radii[0] == pytest.approx(SPREAD * fallen)
+
+
+def test_divided_stream_keeps_its_volume(flow: WaterFlow) -> None:
+    basin = flow.water_environment.basin
+    x, y, _ = basin.at
+    edge = Parcel(10**11 + 1, (x + basin.rim_radius, y, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01)
+    water = replace(flow.begin(0.0, np.eye(4)), parcels=(edge,))
+    for _ in range(40):
+        water = flow.step(water, np.eye(4), NO_ACCELERATION, 0.01)
+    assert water.total == edge.volume
+    assert 0.3 * edge.volume < water.basin < 0.5 * edge.volume
+    assert water.spilled == edge.volume - water.basin

@@ -6,18 +6,19 @@ import math
 
 import pytest
 
+from katana450.extensions.programs.score import score
+from katana450.maths.water.course import Course
 from katana450.maths.water.flow import WaterFlow
-from katana450.maths.water.score import Course, score
 from tests.water.motions import NO_ACCELERATION, over_basin, poured, turned_to
 
 
-def test_pour_into_the_basin_has_the_full_score(flow: WaterFlow) -> None:
+def test_pour_into_the_basin_leaves_a_film(flow: WaterFlow) -> None:
     water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     result = score(water, Course())
-    assert result.emptied_percent == 100.0
-    assert result.in_basin_ml == pytest.approx(200.0)
-    assert (result.in_cup_ml, result.in_air_ml, result.spilled_ml) == (0.0, 0.0, 0.0)
+    assert 99.7 < result.emptied_percent < 99.95
+    assert result.in_basin_ml + result.in_cup_ml == pytest.approx(200.0)
+    assert (result.in_air_ml, result.spilled_ml) == (0.0, 0.0)
 
 
 def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:

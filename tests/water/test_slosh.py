@@ -11,18 +11,22 @@ from hypothesis import strategies as st
 
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.liquid import HONEY, OIL, WATER
 from katana450.maths.water.slosh import (
-    DAMPING,
     FIRST_MODE,
     REST_TOLERANCE,
     Slosh,
+    damping,
     frequency,
-    steady_acceleration,
 )
 from katana450.maths.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
+from tests.water.motions import steady_acceleration
 
 CUP = Cylinder(0.03, 0.087)
+ZETA = damping(CUP, WATER)
+"""Damping [1] of water."""
+
 numbers = st.floats(-3.0, 3.0)
 vectors = st.tuples(numbers, numbers, numbers)
 pairs = st.tuples(numbers, numbers)
@@ -38,15 +42,17 @@ def apart(a: Slosh, b: Slosh) -> float:
 def test_one_long_step_is_many_short_ones(
     slosh: Slosh, acceleration: tuple[float, float, float], omega: float, dt: float
 ) -> None:
-    whole = slosh.after(acceleration, omega, dt)
-    halves = slosh.after(acceleration, omega, 0.5 * dt).after(acceleration, omega, 0.5 * dt)
+    whole = slosh.after(acceleration, omega, ZETA, dt)
+    halves = slosh.after(acceleration, omega, ZETA, 0.5 * dt).after(
+        acceleration, omega, ZETA, 0.5 * dt
+    )
     assert apart(whole, halves) < 2.0 * REST_TOLERANCE * omega
     # The equation itself, by Runge's midpoint rule.
     rest = np.array(acceleration[:2]) / GRAVITY
     x, v = np.array(slosh.lean), np.array(slosh.rate)
 
     def pulled(x: FloatArray, v: FloatArray) -> FloatArray:
-        return -(omega**2) * (x - rest) - 2.0 * DAMPING * omega * v
+        return -(omega**2) * (x - rest) - 2.0 * ZETA * omega * v
 
     n = 200
     h = dt / n
@@ -61,23 +67,23 @@ def test_surface_swings_to_nearly_twice_the_lean_and_comes_to_rest() -> None:
     omega = frequency(CUP, 2e-4)
     slosh, leans = Slosh(), []
     for _ in range(4000):
-        slosh = slosh.after((2.0, 0.0, 0.0), omega, 0.01)
+        slosh = slosh.after((2.0, 0.0, 0.0), omega, ZETA, 0.01)
         leans.append(slosh.up[0] * GRAVITY / 2.0)
-    assert max(leans) == pytest.approx(1.0 + math.exp(-math.pi * DAMPING), abs=0.01)
+    assert max(leans) == pytest.approx(1.0 + math.exp(-math.pi * ZETA), abs=0.01)
     assert slosh == Slosh((2.0 / GRAVITY, 0.0))
 
 
 def test_vertical_acceleration_acts_at_once() -> None:
-    slosh = Slosh().after((0.0, 0.0, -GRAVITY), 24.0, 0.01)
+    slosh = Slosh().after((0.0, 0.0, -GRAVITY), 24.0, ZETA, 0.01)
     assert slosh == Slosh(weight=0.0)
-    assert Slosh().after((0.0, 0.0, 3.0), 24.0, 0.01).up == (0.0, 0.0, 1.0 + 3.0 / GRAVITY)
+    assert Slosh().after((0.0, 0.0, 3.0), 24.0, ZETA, 0.01).up == (0.0, 0.0, 1.0 + 3.0 / GRAVITY)
 
 
 @pytest.mark.parametrize("dt", [1e-6, 0.05, 10.0, 1e4])
 def test_slosh_is_stable_for_any_step(dt: float) -> None:
     slosh = Slosh((1.0, -0.5), (3.0, 0.0))
     for _ in range(50):
-        slosh = slosh.after((0.0, 0.0, 0.0), 24.0, dt)
+        slosh = slosh.after((0.0, 0.0, 0.0), 24.0, ZETA, dt)
         assert math.hypot(*slosh.up, *slosh.rate) < 40.0
 
 
@@ -106,3 +112,15 @@ def test_a_steady_acceleration_lifts_the_surface_to_the_rim() -> None:
     # More than half full: g times the ratio of the free height of the wall to the radius.
     free = CUP.depth - 2e-4 / (math.pi * CUP.radius**2)
     assert steady_acceleration(CUP, 2e-4) == pytest.approx(GRAVITY * free / CUP.radius)
+
+
+def test_thicker_liquids_swing_less() -> None:
+    # The viscous part is 0.006 for water, and in proportion to the root of nu.
+    assert damping(CUP, WATER) == pytest.approx(0.02, abs=5e-4)
+    assert damping(CUP, WATER) < damping(CUP, OIL) < damping(CUP, HONEY) < 1.0
+    omega = frequency(CUP, 2e-4)
+    leans = [
+        Slosh().after((2.0, 0.0, 0.0), omega, damping(CUP, HONEY), 0.01 * k).lean[0]
+        for k in range(200)
+    ]
+    assert max(leans) < 1.2 * 2.0 / GRAVITY

@@ -10,9 +10,10 @@ import numpy as np
 from katana450.arm.control.scene_objects import Environment, SceneObject, named
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.vectors import Vector, scale, sub, vector
+from katana450.maths.water.course import Course
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
-from katana450.maths.water.score import Course
+from katana450.maths.water.liquid import WATER, Liquid
 
 CUP, BASIN = "cup", "basin"
 
@@ -33,7 +34,7 @@ class MotionWithWater:
 
     @property
     def still(self) -> bool:
-        """True if the water is at rest as long as the cup does not move."""
+        """True if the water is at rest as long as the cup does not move, except for its film."""
         slosh = self.water.slosh
         return not self.water.parcels and slosh.lean == slosh.rate == (0.0, 0.0)
 
@@ -56,16 +57,17 @@ class Pouring:
         self._flow(()).begin(volume, np.eye(4))
 
     def fill(
-        self, volume: float, objects: Sequence[SceneObject], x: FloatArray
+        self, volume: float, objects: Sequence[SceneObject], x: FloatArray, liquid: Liquid = WATER
     ) -> MotionWithWater | None:
-        """Return water of ``volume`` [m^3] in the cup and none elsewhere; None if there is no cup.
+        """Return ``volume`` [m^3] of ``liquid`` in the cup and none elsewhere; None without a cup.
 
         x: (k,) joints and finger joint [rad]. Raises InputError for more than the cup holds.
         """
         T = self._pose(objects, x)
         if T is None:
             return None
-        return MotionWithWater(self._flow(objects).begin(volume, T), Course(), self._middle(T))
+        water = self._flow(objects).begin(volume, T, liquid)
+        return MotionWithWater(water, Course(), self._middle(T))
 
     def step(
         self, poured: MotionWithWater, objects: Sequence[SceneObject], x: FloatArray, dt: float
@@ -78,9 +80,10 @@ class Pouring:
         if T is None:
             return None
         at_rest = bool((poured.water.T_base_cup == T).all())
-        if dt <= 0.0 or (at_rest and poured.still and poured.velocity == NO_VELOCITY):
-            return poured
         flow, middle = self._flow(objects), self._middle(T)
+        still = at_rest and poured.still and poured.velocity == NO_VELOCITY
+        if dt <= 0.0 or (still and flow.film_rests(poured.water)):
+            return poured
         if not at_rest and not _object(objects, CUP).carried:
             # The cup was moved by a command, which does not accelerate the water.
             moved = flow.step(poured.water, T, NO_VELOCITY, 0.0)

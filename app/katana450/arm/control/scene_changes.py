@@ -19,6 +19,7 @@ from katana450.arm.control.scene_objects import (
     with_replaced,
 )
 from katana450.arm.control.state import State
+from katana450.maths.water.liquid import Liquid
 
 
 def with_scene_change(
@@ -41,20 +42,22 @@ def with_scene_change(
                 for each in state.objects
             )
             return replace(state, objects=mounted)
-        case cmd.ReplaceScene(objects=objects, volume=volume):
+        case cmd.ReplaceScene(objects=objects, volume=volume, liquid=liquid):
             replaced = replace(state, objects=with_replaced(state.objects, objects))
-            return with_water(pouring, replaced, volume)
-        case cmd.Fill(volume=volume):
-            return with_water(pouring, state, volume)
+            return with_water(pouring, replaced, volume, liquid)
+        case cmd.Fill(volume=volume, liquid=liquid):
+            return with_water(pouring, state, volume, liquid)
     raise AssertionError(f"The table of transitions has no rule for {command!r}.")
 
 
-def with_water(pouring: Pouring | None, state: State, volume: float | None) -> State:
-    """Return ``state`` with ``volume`` [m^3] of water in the cup; None for no water."""
+def with_water(
+    pouring: Pouring | None, state: State, volume: float | None, liquid: Liquid
+) -> State:
+    """Return ``state`` with ``volume`` [m^3] of ``liquid`` in the cup; None for no water."""
     if volume is None:
         return replace(state, poured=None)
     assert pouring is not None
-    return replace(state, poured=pouring.fill(volume, state.objects, state.x_setpoint))
+    return replace(state, poured=pouring.fill(volume, state.objects, state.x_setpoint, liquid))
 
 
 def removed(state: State, name: str) -> State:

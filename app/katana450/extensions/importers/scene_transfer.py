@@ -9,6 +9,7 @@ from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import LeaseError
 from katana450.extensions.importers.scene_file import StoredScene, scene_zip
 from katana450.extensions.programs.scene_draft import Scene
+from katana450.maths.water.liquid import WATER
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers
 from katana450.server.service.hub import Hub
@@ -34,7 +35,9 @@ def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmInterface) ->
     """Store ``stored``, read from ``data``, so that it can be loaded. Raises InputError."""
     key = hashlib.sha256(data).hexdigest()[:32]
     scene = stored.scene
-    hub.scenes.keep(key, cmd.ReplaceScene(scene.objects, scene.water), stored.meshes, arm)
+    hub.scenes.keep(
+        key, cmd.ReplaceScene(scene.objects, scene.water, scene.liquid), stored.meshes, arm
+    )
     names = [scene_object.name for scene_object in scene.objects]
     text = f"{len(names)} object{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
     if scene.joints is not None:
@@ -55,9 +58,10 @@ def _stored(hub: Hub, arm: ArmInterface) -> StoredScene:
         raise LeaseError(
             f"{held.name!r} is held. Set it down first: a scene cannot have held objects."
         )
-    water = None
+    water, liquid = None, WATER
     if state.poured is not None:
-        water = ML * state.poured.water.cup / MILLILITRE
+        water = ML * state.poured.water.kept / MILLILITRE
+        liquid = state.poured.water.liquid
     keys = dict.fromkeys(t.solid.key for t in state.objects if t.solid is not None)
     meshes = tuple(hub.meshes.need(key) for key in keys)
-    return StoredScene(Scene(state.objects, water, state.q), meshes)
+    return StoredScene(Scene(state.objects, water, state.q, liquid), meshes)

@@ -17,6 +17,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.score import score
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.simulation import Trace
 from katana450.maths.collision.clearance import STOP
@@ -28,7 +29,6 @@ from katana450.maths.planning.curve import ToolCoordinates
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.tool_path import ToolPath
-from katana450.maths.water.score import score
 
 PATH_SAMPLES = 2000
 """Number of intervals of each path at whose ends the kinematics are compared."""

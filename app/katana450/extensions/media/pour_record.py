@@ -15,7 +15,9 @@ from katana450.maths.water.units import MILLILITRE
 FLOW_TICKS = 10
 """Number of ticks over which the flow is averaged."""
 
-COLUMNS = ("cup_ml", "basin_ml", "air_ml", "spilled_ml", "cup_tilt_deg", "lip_above_water_mm")
+COLUMNS = (
+    "cup_ml", "film_ml", "basin_ml", "air_ml", "spilled_ml", "cup_tilt_deg", "lip_above_water_mm",
+)  # fmt: skip
 """Columns of the water in the table of a run."""
 
 
@@ -25,13 +27,14 @@ class PourRecord:
 
     Attributes:
         t: (N,) [s].
-        cup, basin, air, spilled: (N,) volumes [ml].
+        cup, film, basin, air, spilled: (N,) volumes [ml].
         tilt: (N,) tilt of the cup [rad].
         lip: (N,) height of the lip above the water [m]; NaN for an empty cup.
     """
 
     t: FloatArray
     cup: FloatArray
+    film: FloatArray
     basin: FloatArray
     air: FloatArray
     spilled: FloatArray
@@ -42,19 +45,20 @@ class PourRecord:
     def of(trace: Trace) -> PourRecord | None:
         """Return the record of ``trace``; None for a run without water."""
         rows = np.array([_row(poured) for poured in trace.water])
-        if not (np.nan_to_num(rows[:, :4]) > 0.0).any():
+        if not (np.nan_to_num(rows[:, :5]) > 0.0).any():
             return None
-        cup, basin, air, spilled, tilt = rows.T
+        cup, film, basin, air, spilled, tilt = rows.T
         lip = np.where(np.isfinite(trace.margin) & (cup > 0.0), trace.margin, math.nan)
-        return PourRecord(trace.t, cup, basin, air, spilled, tilt, lip)
+        return PourRecord(trace.t, cup, film, basin, air, spilled, tilt, lip)
 
     @property
     def flow(self) -> FloatArray:
         """The flow out of the cup (N,) [ml/s], the mean of FLOW_TICKS ticks."""
-        before = np.roll(self.cup, FLOW_TICKS)
+        kept = self.cup + self.film
+        before = np.roll(kept, FLOW_TICKS)
         before[:FLOW_TICKS] = math.nan
         passed = self.t - np.roll(self.t, FLOW_TICKS)
-        found = (before - self.cup) / np.where(passed > 0.0, passed, math.nan)
+        found = (before - kept) / np.where(passed > 0.0, passed, math.nan)
         # The filling of the cup is no flow.
         return np.maximum(np.nan_to_num(found), 0.0)
 
@@ -62,6 +66,7 @@ class PourRecord:
         """Return the values of COLUMNS at ``tick`` as text; what is not known is empty."""
         values = (
             self.cup[tick],
+            self.film[tick],
             self.basin[tick],
             self.air[tick],
             self.spilled[tick],
@@ -72,9 +77,12 @@ class PourRecord:
 
 
 def _row(poured: MotionWithWater | None) -> tuple[float, ...]:
-    """Return the volumes [ml] in cup, basin and air and those spilled, and the tilt [rad]."""
+    """Return the volumes of ``COLUMNS`` [ml] and the tilt [rad]."""
     if poured is None:
-        return (math.nan,) * 5
+        return (math.nan,) * 6
     water = poured.water
-    volumes = (each / MILLILITRE for each in (water.cup, water.basin, water.air, water.spilled))
-    return (*volumes, math.acos(min(max(float(water.T_base_cup[2, 2]), -1.0), 1.0)))
+    volumes = (water.cup, water.film, water.basin, water.air, water.spilled)
+    return (
+        *(each / MILLILITRE for each in volumes),
+        math.acos(min(max(float(water.T_base_cup[2, 2]), -1.0), 1.0)),
+    )

@@ -296,7 +296,7 @@ class PlanBuilder:
         self.taken, self.given_up = None, ()
 
     def predict_water(self, volume: float) -> None:
-        """Continue with ``volume`` [m^3] of water in the cup."""
+        """Continue with ``volume`` [m^3] of the liquid in the cup."""
         self.state = self._with_still_water(self.state, volume)
 
     def _with_still_water(self, state: State, volume: float | None = None) -> State:
@@ -304,8 +304,10 @@ class PlanBuilder:
         pouring = self.plan_context.session.pouring
         if pouring is None or state.poured is None:
             return state
-        water = state.poured.water.cup * FEMTOLITRE if volume is None else volume
-        return replace(state, poured=pouring.fill(water, state.objects, state.x_setpoint))
+        water = state.poured.water
+        volume = water.kept * FEMTOLITRE if volume is None else volume
+        still = pouring.fill(volume, state.objects, state.x_setpoint, water.liquid)
+        return replace(state, poured=still)
 
     def joints_at(self, place: StepTarget) -> FloatArray:
         """Return the joints (5,) [rad] for ``place``. Raises InputError if it cannot be reached."""

@@ -45,7 +45,7 @@ steps:
   - set_down:
   - home
 expect:
-  emptied_percent: {{at_least: 99}}
+  emptied_percent: {{at_least: 99.5, at_most: 99.99}}
   spilled_ml: {{at_most: 0}}
   carried_margin_to_rim_mm: {{at_least: 1}}
   max_speed_fraction: {{at_most: 1.000001}}

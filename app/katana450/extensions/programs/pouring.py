@@ -14,8 +14,10 @@ from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import SetSpeed, Wait
 from katana450.extensions.programs.carry import carry
+from katana450.extensions.programs.drain import Drain
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.pour_tilt import film_after, tilt_for
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -23,7 +25,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import ToolLine
 from katana450.maths.water.flow import Water
-from katana450.maths.water.units import FEMTOLITRE, ML
+from katana450.maths.water.units import FEMTOLITRE, ML, counted
 
 POUR_TURN = math.radians(165.0)
 """[rad] Roll of a pour: with any tilt of the tool, the cup then lies past its side."""
@@ -44,7 +46,16 @@ SHAKE_ANGLE = math.radians(25.0)
 """[rad] Amplitude of a shake."""
 
 DRAIN_TIME = 1.5
-"""[s] Time for the last water to run out."""
+"""[s] Minimum time for the last water to run out."""
+
+PART_FLOW = 0.5 * ML
+"""[m^3/s] Flow with which the pour of a part ends: slow enough to end it in time."""
+
+REACTION_TIME = 0.25
+"""[s] Time in which a cup that turns back still pours at the same flow."""
+
+PART_TIME = 10.0
+"""[s] Duration of the pour of a part, for an estimate of the film on the wall."""
 
 SHAKES = 3
 """Number of shakes after all is poured, unless given."""
@@ -62,8 +73,8 @@ class Pour:
     Attributes:
         into: name of the object.
         shake: number of shakes.
-        volume: how much to pour [m^3]; None for all. The cup is then tilted as far as it holds the
-            rest, and kept so until no more water flows.
+        volume: how much to pour [m^3]; None for all. The cup is tilted until the flow is PART_FLOW
+            when the rest is left, kept so until then, and turned back.
     """
 
     into: str
@@ -100,14 +111,14 @@ class Pour:
             )
         try:
             turn = self._turn(builder, level, rest)
-            builder.first((turn, -turn), lambda turn: self._pour(builder, basin, level, turn))
+            builder.first((turn, -turn), lambda turn: self._pour(builder, basin, level, turn, rest))
         except InputError as error:
             raise InputError(f"The cup cannot be emptied into {self.into}: {error}") from error
         builder.predict_water(rest)
 
     def _rest(self, water: Water) -> float:
         """Return the volume [m^3] that stays in the cup. Raises InputError for too little water."""
-        held = water.cup * FEMTOLITRE
+        held = water.kept * FEMTOLITRE
         if self.volume is None:
             return 0.0
         if self.volume > held:
@@ -118,21 +129,24 @@ class Pour:
         return held - self.volume
 
     def _turn(self, builder: PlanBuilder, level: ToolTarget, rest: float) -> float:
-        """Return the roll [rad] at which the cup holds just ``rest`` [m^3]; POUR_TURN for all."""
-        pouring = builder.plan_context.session.pouring
-        if self.volume is None or pouring is None:
+        """Return the roll [rad] of the tilted cup; ``rest`` [m^3] is what stays in it."""
+        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
+        if self.volume is None or pouring is None or poured is None:
             return POUR_TURN
         inside = pouring.water_environment(builder.state.objects).cup.inside
+        liquid = poured.water.liquid
+        film = film_after(self.volume, rest, PART_TIME, liquid, inside)
+        tilt = tilt_for(PART_FLOW, rest - film, liquid, inside)
         # Rolling by phi about an axis with this pitch tilts the cup by
         # cos(tilt) = cos(phi) + (1 - cos(phi)) sin(pitch)^2.
         steep = math.sin(level.pitch) ** 2
-        cosine = (math.cos(inside.spills_at(rest)) - steep) / (1.0 - steep)
+        cosine = (math.cos(tilt) - steep) / (1.0 - steep)
         if cosine <= math.cos(POUR_TURN):
             raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
         return math.acos(cosine)
 
     def _pour(
-        self, builder: PlanBuilder, basin: SceneObject, level: ToolTarget, turn: float
+        self, builder: PlanBuilder, basin: SceneObject, level: ToolTarget, turn: float, rest: float
     ) -> None:
         chain = builder.chain
         # The turn is limited to the range of the wrist.
@@ -156,7 +170,11 @@ class Pour:
         back = replace(at, roll=level.roll + turn - math.copysign(SHAKE_ANGLE, turn))
         if self.shake:
             builder.lead([ToolLine(down, back), ToolLine(back, down)] * self.shake, "shake")
-        builder.note("drain", Wait(DRAIN_TIME), builder.state)
+        if self.volume is None:
+            builder.note("drain", Wait(DRAIN_TIME), builder.state)
+            builder.note("drain", Drain(), builder.state)
+        else:
+            builder.note("drain", Drain(counted(rest + PART_FLOW * REACTION_TIME)), builder.state)
         builder.note("full speed", SetSpeed(1.0), builder.state)
         builder.lead([ToolLine(down, at)], "turn back")
 

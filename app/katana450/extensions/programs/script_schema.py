@@ -33,6 +33,7 @@ from katana450.extensions.programs.schema_parts import (
 )
 from katana450.extensions.programs.script import MAX_NAME_LENGTH
 from katana450.extensions.programs.settings_steps import MAX_PAUSE
+from katana450.maths.water.liquid import LIQUIDS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -162,7 +163,18 @@ STEP_VALUES: dict[str, Schema] = {
         "object x y",
         {"object": OBJECT, "x": LENGTH, "y": LENGTH},
     ),
-    "fill": number_or_text(0.0, 1000.0, "Fill the cup with water, ml"),
+    "fill": any_of(
+        "Fill the cup with water, ml, or with another liquid",
+        number_or_text(0.0, 1000.0, "Volume of water, ml"),
+        mapping(
+            "A volume, and of which liquid",
+            "ml",
+            {
+                "ml": number_or_text(0.0, 1000.0, "Volume, ml"),
+                "of": {"enum": list(LIQUIDS), "description": "The liquid, water unless given"},
+            },
+        ),
+    ),
     "grasp": _grasp("Open, approach an object, and close the fingers on it"),
     "pick": _grasp("Grasp an object, and lift it"),
     "place": {

@@ -24,24 +24,25 @@ class Situation:
         fingers: the finger joint, and the angle at which it grips, None with an empty hand [rad].
         tool: the tool frame.
         scene: the scene objects.
-        water: water in the cup [fl]; None without a cup.
+        water: volume in the cup [fl], and its liquid; None without a cup.
     """
 
     posture: FloatArray
     fingers: tuple[float, float | None]
     tool: str
     scene: Scene
-    water: int | None
+    water: tuple[int, str] | None
 
     @staticmethod
     def of(state: State) -> Situation:
         """Return the situation of an arm at rest in ``state``."""
+        water = None if state.poured is None else state.poured.water
         return Situation(
             state.setpoint,
             (state.gripper_setpoint, state.grip),
             state.tool,
             tuple(map(_shape, state.objects)),
-            None if state.poured is None else state.poured.water.cup,
+            None if water is None else (water.kept, water.liquid.name),
         )
 
     @property

@@ -21,25 +21,35 @@ from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.maths.geometry import se3
+from katana450.maths.water.liquid import LIQUIDS, WATER, Liquid
 from katana450.maths.water.units import ML
 
 
 @dataclass(frozen=True)
 class Fill:
-    """Fill the cup with ``volume`` [m^3] of water."""
+    """Fill the cup with ``volume`` [m^3] of ``liquid``."""
 
     volume: float
+    liquid: Liquid = WATER
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read a volume [ml]. Raises ScriptError."""
-        return cls(ML * read.number(0.0, 1000.0, "ml")(value))
+        """Read a volume [ml], or {ml, of}. Raises ScriptError."""
+        volume = read.number(0.0, 1000.0, "ml")
+        if value.kind != "mapping":
+            return cls(ML * volume(value))
+        fields = Fields(value, "a fill")
+        ml = fields.need("ml", volume, 0.0)
+        name = fields.take("of", read.choice(*LIQUIDS), WATER.name)
+        fields.done()
+        return cls(ML * ml, LIQUIDS[name])
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the filling. Raises InputError if the cup is absent or too small."""
-        command = cmd.Fill(self.volume)
+        command = cmd.Fill(self.volume, self.liquid)
         builder.plan_context.session.check(command)
-        builder.note("fill", FillCup(self.volume), builder.after(command, ticks=1))
+        filled = FillCup(self.volume, self.liquid)
+        builder.note("fill", filled, builder.after(command, ticks=1))
 
 
 @dataclass(frozen=True)

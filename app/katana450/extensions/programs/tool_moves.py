@@ -18,10 +18,11 @@ from katana450.extensions.programs.roomiest_pitch import roomiest
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
+from katana450.extensions.programs.tool_curves import ToolLines, ToolScrew
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Linear, ToolArc, ToolLine, ToolLines, ToolScrew
+from katana450.maths.planning.curve import Linear, ToolArc, ToolLine
 from katana450.maths.planning.tool_path import ToolPath
 
 LEVEL_TOLERANCE = 1e-6

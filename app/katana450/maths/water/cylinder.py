@@ -14,6 +14,7 @@ every plane: through the wall only, the floor, the rim, or both.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,7 +51,7 @@ class Cylinder:
     @property
     def capacity(self) -> float:
         """The volume [m^3] that the upright cylinder holds."""
-        return math.pi * self.radius**2 * self.depth
+        return self.radius**2 * self.depth * math.pi
 
     def span(self, tilt: float) -> tuple[float, float]:
         """Return the levels [m] at which the cylinder is empty, and full."""
@@ -70,20 +71,35 @@ class Cylinder:
 
     def volume(self, tilt: float, level: float) -> float:
         """Return the volume [m^3] below the plane."""
+        return self.radius**2 * self.depth * self._mean(tilt, level, _mean_segment)
+
+    def wetted(self, tilt: float, level: float) -> float:
+        """Return the area [m^2] of wall and floor below the plane.
+
+        A slice wets the wall on the arc 2 r phi.
+        """
+        floor = _segment(_half_angle(level, self.radius * math.sin(tilt)))
+        wall = 2.0 * self.depth * self._mean(tilt, level, _mean_half_angle)
+        return self.radius * (wall + self.radius * floor)
+
+    def _mean(self, tilt: float, level: float, cut: Callable[[float, float], float]) -> float:
+        """Return the mean over all slices of a function of phi that is pi in a wet slice.
+
+        ``cut`` is its mean over the slices between two half angles.
+        """
         across = self.radius * math.sin(tilt)
         floor, rim = level, level - self.depth * math.cos(tilt)
         low, high = min(floor, rim), max(floor, rim)
         if low >= across:
-            return self.capacity
+            return math.pi
         if high <= -across:
             return 0.0
         base, top = max(low, -across), min(high, across)
-        cut = _mean_segment(_half_angle(base, across), _half_angle(top, across))
+        mean = cut(_half_angle(base, across), _half_angle(top, across))
         if high == low:
-            return self.radius**2 * self.depth * cut
+            return mean
         # Slices that are wet all over, and slices that the plane cuts.
-        fraction = (math.pi * (high - top) + cut * (top - base)) / (high - low)
-        return self.radius**2 * self.depth * fraction
+        return (math.pi * (high - top) + mean * (top - base)) / (high - low)
 
     def level(self, tilt: float, volume: float) -> float:
         """Return the level [m] below which there is ``volume`` [m^3], to rounding.
@@ -181,6 +197,16 @@ def _mean_segment(a: float, b: float) -> float:
         return _segment(m)
     spread = _one_less_cotangent(d) + math.sin(d) ** 2 * (1.0 - 4.0 / 3.0 * cosine**2)
     return _segment(m) + cosine / sine * spread
+
+
+def _mean_half_angle(a: float, b: float) -> float:
+    """Return the mean of the half angle as its height changes from half angle ``a`` to ``b``.
+
+    The integral of phi over the height -cos phi, divided by the change of height.
+    """
+    m, d = 0.5 * (a + b), 0.5 * abs(b - a)
+    sine = math.sin(m)
+    return m if sine <= 0.0 or d == 0.0 else m + math.cos(m) / sine * _one_less_cotangent(d)
 
 
 def _one_less_cotangent(d: float) -> float:

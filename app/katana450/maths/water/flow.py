@@ -1,8 +1,9 @@
 """The flow of the water: where it is, and where it is one time step later.
 
-Water that a tilted cup cannot hold leaves over the lip as over a weir, flies in parcels and lands
-in the basin, in the cup again, on the table or on the floor. Volumes are whole femtolitres that are
-only moved, so their sum is constant.
+Water that a tilted cup cannot hold leaves over the lip, flies in parcels and lands in the basin, in
+the cup again, on the table or on the floor. A film stays on the wall where the surface has fallen,
+and drains into the rest. Volumes are whole femtolitres that are only moved, so their sum is
+constant. "Water" stands for any liquid here.
 """
 
 from __future__ import annotations
@@ -18,21 +19,16 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.geometry.vectors import Vector, add, norm, scale, sub, vector
 from katana450.maths.water.environment import WaterEnvironment
+from katana450.maths.water.film import drained_film, withdrawn_thickness
+from katana450.maths.water.lip import DROP_VOLUME, left_over, lip_speed, viscous_flow, weir_flow
+from katana450.maths.water.liquid import WATER, Liquid
 from katana450.maths.water.parcel import Ground, Parcel, landing
 from katana450.maths.water.puddle import Puddle, spill
-from katana450.maths.water.slosh import Slosh, frequency
-from katana450.maths.water.units import FEMTOLITRE, GRAVITY, MILLILITRE, counted
+from katana450.maths.water.slosh import Slosh, damping, frequency
+from katana450.maths.water.units import FEMTOLITRE, GRAVITY, counted
 
-DISCHARGE = 0.61
-"""Discharge coefficient [1] in Poleni's rule for a sharp edge: Kirchhoff's pi / (pi + 2)."""
-
-FILM_TIME = 0.25
-"""Time [s] in which the film left over the lip thins to a third. For so thin a film a weir's rule
-would give an endless trickle.
-"""
-
-DROP_VOLUME = MILLILITRE // 20
-"""Volume [fl] over the lip below which it falls at once."""
+MAX_FILM = 0.25
+"""Maximum thickness of the film where it is left, relative to the radius of the cup."""
 
 LEVEL_SINE = 1e-9
 """Sine of a tilt below which no side of the rim is the lower one."""
@@ -46,11 +42,14 @@ class Water:
     """The state of all water. Volumes in femtolitres.
 
     Attributes:
-        cup, basin: volume in cup and basin.
+        cup, basin: volume in cup and basin, without the film.
         parcels: water in the air, the oldest first.
         puddles: spilled water.
         slosh: lean of the surface in the cup.
         T_base_cup: pose (4, 4) of the cup [m].
+        film: volume on the wall of the cup.
+        wetted: area [m^2] of wall and floor below the surface in the cup.
+        liquid: the liquid.
     """
 
     cup: int
@@ -59,6 +58,14 @@ class Water:
     puddles: tuple[Puddle, ...]
     slosh: Slosh
     T_base_cup: FloatArray
+    film: int = 0
+    wetted: float = 0.0
+    liquid: Liquid = WATER
+
+    @property
+    def kept(self) -> int:
+        """The volume in the cup with its film."""
+        return self.cup + self.film
 
     @property
     def air(self) -> int:
@@ -73,7 +80,7 @@ class Water:
     @property
     def total(self) -> int:
         """The volume of all water; a step never changes it."""
-        return self.cup + self.basin + self.air + self.spilled
+        return self.kept + self.basin + self.air + self.spilled
 
 
 @dataclass(frozen=True)
@@ -99,9 +106,11 @@ class WaterFlow:
         self.water_environment = water_environment
         self._cup_holds = counted(water_environment.cup.inside.capacity)
         self._basin_holds = counted(water_environment.basin.capacity)
+        inside = water_environment.cup.inside
+        self._wall = math.pi * inside.radius * (2.0 * inside.depth + inside.radius)
 
-    def begin(self, volume: float, T_base_cup: npt.ArrayLike) -> Water:
-        """Return ``volume`` [m^3] of water at rest in the cup, and none elsewhere.
+    def begin(self, volume: float, T_base_cup: npt.ArrayLike, liquid: Liquid = WATER) -> Water:
+        """Return ``volume`` [m^3] of ``liquid`` at rest in the cup, and none elsewhere.
 
         Raises InputError when the upright cup does not hold it, or the pose is invalid.
         """
@@ -111,7 +120,8 @@ class WaterFlow:
                 f"The cup cannot hold {volume * 1e6:g} ml; give 0 to {maximum:.1f} ml."
             )
         T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
-        return Water(counted(volume), 0, (), (), Slosh(), T)
+        water = Water(counted(volume), 0, (), (), Slosh(), T, liquid=liquid)
+        return replace(water, wetted=self._wetted(water))
 
     def step(
         self, water: Water, T_base_cup: npt.ArrayLike, acceleration: npt.ArrayLike, dt: float
@@ -127,10 +137,18 @@ class WaterFlow:
             raise InputError(f"The time step is {dt} s; give 0 or more seconds.")
         if dt == 0.0:
             return replace(water, T_base_cup=T)
-        omega = frequency(self.water_environment.cup.inside, water.cup * FEMTOLITRE)
-        slosh = water.slosh.after(pull, omega, dt)
+        inside = self.water_environment.cup.inside
+        omega = frequency(inside, water.cup * FEMTOLITRE)
+        slosh = water.slosh.after(pull, omega, damping(inside, water.liquid), dt)
         flown = self._fly(replace(water, slosh=slosh), T, dt)
-        return self._pour(flown, T, dt)
+        return self._drain(self._pour(flown, T, dt), _along_wall(T, pull), dt)
+
+    def film_rests(self, water: Water) -> bool:
+        """Return True if no film drains while the cup rests."""
+        width, length = self._film_size(water.wetted)
+        film = water.film * FEMTOLITRE
+        g = _along_wall(water.T_base_cup, (0.0, 0.0, 0.0))
+        return drained_film(film, water.liquid, width, length, g, 1.0) == film
 
     def surface(self, water: Water) -> WaterSurface:
         """Return the surface in the cup."""
@@ -149,12 +167,15 @@ class WaterFlow:
         tilt, downhill = _lean(water.slosh, T)
         weight = norm(water.slosh.up)
         over = water.cup - counted(cup.holds(tilt))
-        if over <= 0 or weight < MIN_GRAVITY:
+        if over < DROP_VOLUME or weight < MIN_GRAVITY:
             return replace(water, T_base_cup=T)
         head = max(-cup.margin(tilt, cup.level(tilt, water.cup * FEMTOLITRE)), 0.0)
         g = GRAVITY * weight
-        left = _left_over(over, _discharge(cup.radius, tilt, head, g), dt)
-        gone = over - left
+        weir = weir_flow(cup.radius, tilt, head, g)
+        viscous = viscous_flow(water.liquid, cup.radius, tilt, head, g)
+        gone = over - left_over(over, weir, viscous, water.liquid, dt)
+        if gone == 0:
+            return replace(water, T_base_cup=T)
         point = (
             cup.radius * downhill[0],
             cup.radius * downhill[1],
@@ -162,7 +183,7 @@ class WaterFlow:
         )
         lip = _moved(T, point)
         carried = scale(1.0 / dt, sub(lip, _moved(water.T_base_cup, point)))
-        speed = 2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head)
+        speed = lip_speed(water.liquid, head, g)
         velocity = add(carried, scale(speed, _outwards(T, tilt, downhill)))
         return replace(
             water,
@@ -170,6 +191,39 @@ class WaterFlow:
             parcels=(*water.parcels, Parcel(gone, lip, velocity, 0.0, dt)),
             T_base_cup=T,
         )
+
+    def _drain(self, water: Water, g: float, dt: float) -> Water:
+        """Leave a film where the surface fell, cover it where it rose, and let it drain.
+
+        ``g`` [m/s^2] is gravity along the wall. The film drains into the water of the cup.
+        """
+        wetted = self._wetted(water)
+        fallen = water.wetted - wetted
+        if (water.film == 0 and fallen <= 0.0) or g < MIN_GRAVITY:
+            return replace(water, wetted=wetted)
+        inside, film = self.water_environment.cup.inside, water.film
+        if fallen > 0.0:
+            speed = fallen / (math.tau * inside.radius * dt)
+            thickness = withdrawn_thickness(water.liquid, speed, g)
+            film += min(counted(fallen * min(thickness, MAX_FILM * inside.radius)), water.cup)
+        else:
+            dry = self._wall - water.wetted
+            film -= min(int(film * -fallen / dry), film) if dry > 0.0 else film
+        width, length = self._film_size(wetted)
+        volume = film * FEMTOLITRE
+        left = drained_film(volume, water.liquid, width, length, g, dt)
+        film = film if left == volume else min(counted(left), film)
+        return replace(water, cup=water.kept - film, film=film, wetted=wetted)
+
+    def _film_size(self, wetted: float) -> tuple[float, float]:
+        """Return width and length [m] of the wall outside the ``wetted`` area [m^2]."""
+        width = math.tau * self.water_environment.cup.inside.radius
+        return width, max(self._wall - wetted, 0.0) / width
+
+    def _wetted(self, water: Water) -> float:
+        """Return the area [m^2] of wall and floor below the surface in the cup."""
+        surface = self.surface(water)
+        return self.water_environment.cup.inside.wetted(surface.tilt, surface.level)
 
     def _fly(self, water: Water, T: FloatArray, dt: float) -> Water:
         """Move the parcels by ``dt`` [s], and let those land that reach a surface."""
@@ -181,7 +235,7 @@ class WaterFlow:
         catches = after[2][2] > 0.0
         flying = []
         for parcel in water.parcels:
-            room = self._cup_holds - cup
+            room = self._cup_holds - cup - water.film
             if catches and parcel.volume <= room and self._caught(parcel, before, after, dt):
                 cup += parcel.volume
                 continue
@@ -190,7 +244,8 @@ class WaterFlow:
             if end.age > aged.age:
                 flying.append(aged)
             elif end.ground is Ground.BASIN:
-                stays = min(parcel.volume, self._basin_holds - basin)
+                caught = int(parcel.volume * end.fraction)
+                stays = min(caught, self._basin_holds - basin)
                 basin += stays
                 if stays < parcel.volume:
                     puddles = spill(puddles, self._beside_basin(end.point), parcel.volume - stays)
@@ -232,32 +287,6 @@ def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
     return math.atan2(sine, z), (-x / sine, -y / sine, 0.0)
 
 
-def _discharge(radius: float, tilt: float, head: float, g: float) -> float:
-    """Return the flow over the lip [m^3/s] when the surface is ``head`` [m] above it.
-
-    Poleni's rule, (2/3) C sqrt(2 g) head^(3/2) per metre of edge (Chow, Open-Channel Hydraulics,
-    1959), summed over the part of the rim below the surface, which is a parabola near its lowest
-    point. The result is at most the flow over the whole rim at that head.
-    """
-    rule = 2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head) * head
-    whole = math.tau * radius
-    sine = math.sin(tilt)
-    wet = 0.375 * math.pi * math.sqrt(2.0 * radius * head / sine) if sine > 0.0 else whole
-    return rule * min(wet, whole)
-
-
-def _left_over(over: int, discharge: float, dt: float) -> int:
-    """Return the part of ``over`` [fl] that is still above the lip after ``dt`` [s].
-
-    The discharge falls with the square of the volume above the lip, and the remaining film falls
-    exponentially. Together they follow E' = -k E^2 - E / FILM_TIME, a Bernoulli equation with this
-    solution.
-    """
-    decay = math.exp(-dt / FILM_TIME)
-    left = over * decay / (1.0 + discharge / FEMTOLITRE / over * FILM_TIME * (1.0 - decay))
-    return int(left) if left > DROP_VOLUME else 0
-
-
 def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:
     """Return the unit vector in the base frame along which water leaves.
 
@@ -266,6 +295,17 @@ def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:
     steep = min(tilt, 0.5 * math.pi)
     local = (math.cos(steep) * downhill[0], math.cos(steep) * downhill[1], math.sin(steep))
     return vector(T[:3, :3] @ local)
+
+
+def _along_wall(T: FloatArray, pull: Vector) -> float:
+    """Return the apparent gravity [m/s^2] along the wall of a cup that accelerates by ``pull``.
+
+    It is the root mean square round the cup: the component along the axis, and that along the
+    circumference, which is down on the sides of a lying cup.
+    """
+    apparent = sub((0.0, 0.0, -GRAVITY), pull)
+    along = float(T[0, 2] * apparent[0] + T[1, 2] * apparent[1] + T[2, 2] * apparent[2])
+    return math.sqrt(0.5 * (norm(apparent) ** 2 + along**2))
 
 
 def _moved(T: FloatArray, point: Vector) -> Vector:

@@ -13,16 +13,19 @@ from dataclasses import dataclass
 
 from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.liquid import Liquid
 from katana450.maths.water.units import GRAVITY
 
 FIRST_MODE = 1.8412
 """The first zero of J1', the derivative of the Bessel function."""
 
-DAMPING = 0.02
-"""Damping [1] relative to critical damping. Viscosity alone gives a cup of 3 cm radius 0.006 (4.98
-nu^1/2 r^-3/4 g^-1/4 over 2 pi: Abramson, NASA SP-106, 1966); the rest is an allowance for the wall,
-which is wetted again in every swing.
+WALL_DAMPING = 0.014
+"""Damping [1] relative to critical damping: an allowance for the wall, which is wetted again in
+every swing.
 """
+
+MAX_DAMPING = 0.95
+"""Maximum damping [1]. Abramson's rule is for light damping; with honey the surface creeps."""
 
 SHALLOWEST = 0.25
 """Depth [radius] below which the frequency falls no more: so little water lies in a corner of a
@@ -54,18 +57,18 @@ class Slosh:
         """The direction of the surface's normal."""
         return (*self.lean, self.weight)
 
-    def after(self, acceleration: Vector, omega: float, dt: float) -> Slosh:
+    def after(self, acceleration: Vector, omega: float, zeta: float, dt: float) -> Slosh:
         """Return the slosh after ``dt`` [s] under a steady ``acceleration`` [m/s^2], exactly.
 
-        ``omega`` is the frequency of the mode [rad/s]. The vertical acceleration has no part in the
-        mode and acts at once.
+        ``omega`` is the frequency of the mode [rad/s], ``zeta`` its damping [1]. The vertical
+        acceleration has no part in the mode and acts at once.
         """
         rest = (acceleration[0] / GRAVITY, acceleration[1] / GRAVITY)
         weight = 1.0 + acceleration[2] / GRAVITY
-        damped = omega * math.sqrt(1.0 - DAMPING**2)
-        decay = math.exp(-DAMPING * omega * dt)
+        damped = omega * math.sqrt(1.0 - zeta**2)
+        decay = math.exp(-zeta * omega * dt)
         cosine, sine = decay * math.cos(damped * dt), decay * math.sin(damped * dt)
-        lag = DAMPING * omega / damped * sine
+        lag = zeta * omega / damped * sine
         (x, u), (y, v) = (
             (
                 (cosine + lag) * (lean - end) + sine / damped * rate,
@@ -88,10 +91,12 @@ def frequency(cup: Cylinder, volume: float) -> float:
     return math.sqrt(GRAVITY * k * math.tanh(k * depth))
 
 
-def steady_acceleration(cup: Cylinder, volume: float) -> float:
-    """Return the maximum steady horizontal acceleration [m/s^2] without a spill.
+def damping(cup: Cylinder, liquid: Liquid) -> float:
+    """Return the damping [1] of the first mode relative to critical damping.
 
-    The cup is upright with ``volume`` [m^3] of water, and its surface has come to rest. A sudden
-    acceleration makes the surface swing to nearly twice the lean.
+    The viscosity gives 4.98 nu^1/2 r^-3/4 g^-1/4 over 2 pi (Abramson, NASA SP-106, 1966): 0.006 for
+    water in a cup of 3 cm radius.
     """
-    return GRAVITY * math.tan(cup.spills_at(volume))
+    nu = liquid.viscosity / liquid.density
+    viscous: float = 4.98 / math.tau * math.sqrt(nu) * cup.radius**-0.75 * GRAVITY**-0.25
+    return min(WALL_DAMPING + viscous, MAX_DAMPING)

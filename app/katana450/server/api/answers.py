@@ -116,17 +116,21 @@ class Margins(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Water(msgspec.Struct, frozen=True, kw_only=True):
-    """Water by its place.
+    """Water, or another liquid, by its place.
 
     Attributes:
-        cup_ml: Volume in the cup [ml].
+        liquid: Name of the liquid.
+        cup_ml: Volume in the cup, without the film on its wall [ml].
+        film_ml: Volume of the film on the wall of the cup [ml].
         basin_ml: Volume in the basin [ml].
         air_ml: Volume in free flight [ml].
         spilled_ml: Volume elsewhere [ml].
         margin_to_rim: Height of the cup's lip above the water [m]; negative while water flows out.
     """
 
+    liquid: str
     cup_ml: float
+    film_ml: float
     basin_ml: float
     air_ml: float
     spilled_ml: float

@@ -14,6 +14,7 @@ from katana450.arm.control.solid import PLAIN, ObjectAppearance
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
+from katana450.maths.water.liquid import LIQUIDS
 from katana450.maths.water.units import ML
 from katana450.server.api import requests
 from katana450.server.service.hub import Hub
@@ -37,8 +38,8 @@ class ObjectRequests:
                 return self._attached(request)
             case requests.Load(scene=key):
                 return self._hub.scenes.load_command(key, self._hub.present())
-            case requests.Fill(ml=ml):
-                return cmd.Fill(ML * ml)
+            case requests.Fill(ml=ml, of=name):
+                return cmd.Fill(ML * ml, LIQUIDS[name])
             case requests.Remove(name=name):
                 self._known(name)
                 return cmd.Remove(name)

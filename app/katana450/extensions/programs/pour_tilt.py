@@ -1,0 +1,56 @@
+"""The tilt at which a cup pours a given flow: the inverse of the flow over its lip.
+
+The surface is level and at rest. See ``maths/water/lip.py`` for the rules.
+"""
+
+from __future__ import annotations
+
+import math
+
+from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.film import withdrawn_thickness
+from katana450.maths.water.lip import thinning_time, viscous_flow, weir_flow
+from katana450.maths.water.liquid import Liquid
+from katana450.maths.water.units import GRAVITY
+
+HALVINGS = 40
+"""Number of halvings of the interval that contains the tilt: to 3e-12 rad."""
+
+
+def flow_at(tilt: float, volume: float, liquid: Liquid, cup: Cylinder) -> float:
+    """Return the flow [m^3/s] out of a cup with ``volume`` [m^3] at ``tilt`` [rad]."""
+    over = volume - cup.holds(tilt)
+    head = -cup.margin(tilt, cup.level(tilt, volume))
+    if over <= 0.0 or head <= 0.0:
+        return 0.0
+    weir = weir_flow(cup.radius, tilt, head, GRAVITY)
+    thick = viscous_flow(liquid, cup.radius, tilt, head, GRAVITY)
+    return min(weir, thick) + over / thinning_time(liquid)
+
+
+def tilt_for(flow: float, volume: float, liquid: Liquid, cup: Cylinder) -> float:
+    """Return the tilt [rad] at which a cup with ``volume`` [m^3] pours ``flow`` [m^3/s].
+
+    The flow grows with the tilt. The result is pi if the flow is not reached.
+    """
+    low, high = 0.0, math.pi
+    for _ in range(HALVINGS):
+        tilt = 0.5 * (low + high)
+        if flow_at(tilt, volume, liquid, cup) < flow:
+            low = tilt
+        else:
+            high = tilt
+    return high
+
+
+def film_after(poured: float, rest: float, time: float, liquid: Liquid, cup: Cylinder) -> float:
+    """Return the volume [m^3] of the film when ``poured`` [m^3] has flowed out in ``time`` [s].
+
+    ``rest`` [m^3] stays in the cup. The surface falls evenly from that of the upright cup to that
+    at the tilt that holds the rest.
+    """
+    full = cup.wetted(0.0, (poured + rest) / (math.pi * cup.radius**2))
+    tilt = cup.spills_at(rest)
+    bared = max(full - cup.wetted(tilt, cup.level(tilt, rest)), 0.0)
+    speed = bared / (math.tau * cup.radius * time)
+    return 2.0 / 3.0 * bared * withdrawn_thickness(liquid, speed, GRAVITY)

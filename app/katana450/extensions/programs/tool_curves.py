@@ -1,0 +1,160 @@
+"""Curves of the tool that only scripts use; see ``maths/planning/curve.py``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Linear, ToolArc, ToolCoordinates, ToolLine
+from katana450.maths.planning.jet import Jet, atan2, sin_cos
+from katana450.maths.planning.polyline import Polyline
+from katana450.maths.planning.posture import facing
+
+TURN_LENGTH = 0.25
+"""Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
+
+VIA_TOLERANCE = 1e-9
+"""Vias nearer to each other than this [m] are the same."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """An angle that follows a circle: mean + sine sin(t) + cosine cos(t) [rad].
+
+    t runs from `begin` through `angle` [rad], as along the arc that the angle belongs to.
+    """
+
+    mean: float
+    sine: float
+    cosine: float
+    begin: float
+    angle: float
+
+    def __post_init__(self) -> None:
+        numbers = (self.mean, self.sine, self.cosine, self.begin, self.angle)
+        finite_array(numbers, (5,), "The numbers of an angle's profile")
+
+    def __call__(self, sigma: Jet) -> Jet:
+        """Return the angle [rad] at `sigma`."""
+        s, c = sin_cos(self.begin + self.angle * sigma)
+        return self.mean + self.sine * s + self.cosine * c
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLines:
+    """Straight lines from target to target with rounded corners; pitch and roll turn evenly.
+
+    Corners are those of `Polyline`.
+
+    Attributes:
+        vias: two or more targets, the first and last are start and end.
+        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
+            1.
+    """
+
+    vias: tuple[ToolTarget, ...]
+    blend: FloatArray
+    _line: Polyline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        rows = [(*via.position.tolist(), via.pitch, via.roll) for via in self.vias]
+        numbers = finite_array(rows, (len(rows), 5), "The vias of lines")
+        legs = np.diff(numbers, axis=0)
+        distances = np.linalg.norm(legs[:, :3], axis=1)
+        lengths = np.maximum(distances, TURN_LENGTH * np.abs(legs[:, 3:]).max(axis=1, initial=0.0))
+        if len(rows) < 2 or (lengths <= VIA_TOLERANCE).any():
+            raise InputError("Lines need at least two vias, each different from the one before.")
+        line = Polyline(frozen(numbers), lengths, self.blend)
+        object.__setattr__(self, "blend", line.blend)
+        object.__setattr__(self, "_line", line)
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places where legs and corners meet."""
+        return self._line.joins
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        return ToolCoordinates(*self._line.at(sigma))
+
+
+@dataclass(frozen=True, eq=False)
+class ToolScrew:
+    """A motion of the tool along a twist (omega, v) in {S} from its pose at `q`, for five axes.
+
+    The tool point follows exp(twist sigma) exactly. The tool turns to the orientation nearest to
+    that motion that the arm's plane allows; yaw follows from the arm. Sources: Lynch & Park (2017),
+    ch. 3.3; for the nearest orientation maths/kinematics/orientation.py. Raises InputError for a
+    tool point beside the roll axis: the plane then depends on the turn, and the turn on the plane.
+    """
+
+    chain: Chain
+    branch: Branch
+    q: FloatArray
+    twist: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", frozen(self.chain.check_q(self.q)))
+        twist = finite_array(self.twist, (6,), "The twist of a screw")
+        object.__setattr__(self, "twist", frozen(twist))
+        if arm_of(self.chain).off_axis > 0.0:
+            raise InputError(
+                "A screw path needs a tool point on the roll axis; this one is "
+                f"{1e3 * arm_of(self.chain).off_axis:.3g} mm beside it. Give pitch and roll "
+                "along an arc instead."
+            )
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """No joins: the screw is one formula."""
+        return ()
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        arm = arm_of(self.chain)
+        x, y, z, _, _ = self._point_path.at(sigma)
+        # The orientation of {K} in {C} as a quaternion, turned by the twist.
+        (w0, x0, y0, z0), (a, b, c), turn = self._turning
+        s, k = sin_cos((0.5 * turn) * sigma)
+        W = k * w0 - s * (a * x0 + b * y0 + c * z0)
+        X = k * x0 + s * (a * w0 + b * z0 - c * y0)
+        Y = k * y0 + s * (b * w0 + c * x0 - a * z0)
+        Z = k * z0 + s * (c * w0 + a * y0 - b * x0)
+        # In the arm's plane.
+        alpha1, _, _ = facing(arm, self.branch.shoulder, x, y, z)
+        s, k = sin_cos(0.5 * alpha1)
+        W, X, Y, Z = k * W + s * Z, k * X + s * Y, k * Y - s * X, k * Z - s * W
+        total, difference = atan2(X + Y, W + Z), atan2(Y - X, W - Z)
+        return ToolCoordinates(x, y, z, total + difference, total - difference)
+
+    @cached_property
+    def _point_path(self) -> ToolLine | ToolArc:
+        """The path of the tool point."""
+        p = forward(self.chain, self.q)[:3, 3]
+        omega, v = self.twist[:3], self.twist[3:]
+        turn = math.hypot(*omega)
+        if turn == 0.0:
+            return ToolLine(ToolTarget(p, 0.0, 0.0), ToolTarget(p + v, 0.0, 0.0))
+        centre, climb = np.cross(omega, v) / turn**2, float(omega @ v) / turn
+        return ToolArc(p, centre, omega, turn, Linear(0.0, 0.0), Linear(0.0, 0.0), climb)
+
+    @cached_property
+    def _turning(self) -> tuple[list[float], list[float], float]:
+        """The quaternion of {K} in {C} at the start, the axis in {C}, and the angle."""
+        arm = arm_of(self.chain)
+        R = arm.pose(forward(self.chain, self.q))[:3, :3]
+        omega = self.twist[:3]
+        turn = math.hypot(*omega)
+        axis = arm.T_C_S[:3, :3] @ omega / (turn or 1.0)
+        return so3.to_quaternion(R).tolist(), axis.tolist(), turn
