@@ -20,7 +20,7 @@ from katana450.extensions.programs.source import ScriptError
 from katana450.maths.water.flow import Water
 from katana450.maths.water.liquid import LIQUIDS
 from katana450.maths.water.units import MILLILITRE, ML, counted
-from tests.programs.conftest import Stage
+from tests.programs.conftest import TICK, Stage
 
 
 def planned(stage: Stage, cup: Spot | None = None, basin: Spot | None = None) -> Program:
@@ -145,6 +145,47 @@ def test_thicker_liquids_leave_more_in_the_cup(stage: Stage) -> None:
     assert 10.0 < honey < 50.0
 
 
+@pytest.mark.parametrize(
+    ("liquid", "ml", "rate", "tolerance"),
+    [
+        ("water", 50.0, 10.0, 0.05),
+        pytest.param("water", 100.0, 5.0, 0.05, marks=pytest.mark.long),
+        pytest.param("oil", 100.0, 10.0, 0.05, marks=pytest.mark.long),
+        pytest.param("honey", 100.0, 10.0, 0.12, marks=pytest.mark.long),
+    ],
+)
+def test_flow_follows_the_rate(
+    stage: Stage, liquid: str, ml: float, rate: float, tolerance: float
+) -> None:
+    pour = f"- pour: {{into: basin, ml: {ml:g}, rate: {rate:g} ml/s}}\n"
+    text = PART.format(f"{{ml: 200, of: {liquid}}}", pour)
+    program = compiled(parse(text), stage.plan_context, stage.begin())
+    run, states = stage.play(program, stage.begin(), most=20_000)
+    assert run.phase is Phase.DONE
+    kept = np.array([0 if s.poured is None else s.poured.water.kept for s in states]) / MILLILITRE
+    # The mean flow over half a second, while the middle half of the part flows out.
+    flow = (kept[:-50] - kept[50:]) / (50 * TICK)
+    out = 200.0 - 0.5 * (kept[:-50] + kept[50:])
+    middle = flow[(kept[:-50] > 0.0) & (out > 0.25 * ml) & (out < 0.75 * ml)]
+    assert len(middle) > 0.4 * ml / rate / TICK
+    assert middle == pytest.approx(np.full(len(middle), rate), rel=tolerance)
+    assert states[-1].poured is not None
+    water = states[-1].poured.water
+    assert water.basin / MILLILITRE == pytest.approx(ml, rel=0.005)
+    assert water.spilled == 0
+    assert stage.loads(states).max() <= 1.0 + 1e-6
+
+
+@pytest.mark.long
+def test_all_is_poured_at_a_rate(stage: Stage) -> None:
+    text = PART.format(200, "- pour: {into: basin, rate: 10}\n")
+    program = compiled(parse(text), stage.plan_context, stage.begin())
+    run, states = stage.play(program, stage.begin(), most=20_000)
+    assert run.phase is Phase.DONE
+    assert states[-1].poured is not None
+    assert states[-1].poured.water.basin > 199 * MILLILITRE
+
+
 @pytest.mark.long
 def test_water_is_poured_in_parts(stage: Stage) -> None:
     water = poured(stage, 180.0, 50.0, 60.0)
@@ -159,6 +200,8 @@ def test_water_is_poured_in_parts(stage: Stage) -> None:
         ("- pour: basin\n- pour: {into: basin, ml: 5}\n", "The cup holds 0.0 ml at this step"),
         ("- pour: {into: basin, ml: 50, shake: 2}\n", "leave out `shake` or `ml`"),
         ("- pour: {into: basin, ml: 0}\n", "0 is not between 1 and 1000 ml"),
+        ("- pour: {into: basin, rate: 99}\n", "99 is not between 1 and 50 ml/s"),
+        ("- pour: {into: basin, rate: 5 ml}\n", "Expected a number from 1 to 50 ml/s"),
     ],
 )
 def test_part_that_cannot_be_poured_is_refused(stage: Stage, pour: str, message: str) -> None:

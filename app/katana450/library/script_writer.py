@@ -288,9 +288,16 @@ class ScriptWriter:
         """Open the fingers on the held object where it is."""
         self._steps.append("release")
 
-    def pour(self, into: str, *, ml: Number | None = None, shake: int | None = None) -> None:
-        """Pour the water of the cup in the hand into an object: all of it, or some [ml]."""
-        more = _given(ml=ml, shake=shake)
+    def pour(
+        self,
+        into: str,
+        *,
+        ml: Number | None = None,
+        shake: int | None = None,
+        rate: Number | None = None,
+    ) -> None:
+        """Pour the cup in the hand into an object: all of it or some [ml], at a rate [ml/s]."""
+        more = _given(ml=ml, shake=shake, rate=rate)
         self._add("pour", {"into": into, **more} if more else into)
 
     def set_down(self) -> None:

@@ -144,6 +144,30 @@ class UntimedPath:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class PacedPath(UntimedPath):
+    """One path on which the place grows evenly with time, in ``duration`` [s] without the ramps."""
+
+    duration: float
+
+    def timed(self) -> FollowPlan:
+        """Return the timed plan. Raises InputError if the arm cannot move that fast."""
+        plan = super().timed().plan
+        (segment,) = plan.segments
+        fastest = segment.scaling
+        if fastest.span > self.duration:
+            raise InputError(
+                f"It takes at least {fastest.span:.2g} s, so {self.duration:.2g} s are too short."
+            )
+        even = replace(fastest, coefficients=np.full_like(fastest.coefficients, self.duration))
+        nearest = plan.nearest
+        if nearest is not None:
+            nearest = replace(nearest, tau=even.tau(fastest.pace(nearest.tau).sigma))
+        return FollowPlan(
+            replace(plan, segments=(replace(segment, scaling=even),), nearest=nearest)
+        )
+
+
 class PlanBuilder:
     """The builder of a program: predicts the arm from step to step and records the actions."""
 
@@ -215,6 +239,17 @@ class PlanBuilder:
             paths.append(path)
             q = path.end
         self.follow(paths, name)
+
+    def pace(self, curve: Curve, duration: float, name: str) -> None:
+        """Append the tool's motion along ``curve``, evenly in ``duration`` [s].
+
+        Raises as ``follow``.
+        """
+        self.lead([curve], name)
+        _, untimed = self.actions[-1]
+        assert isinstance(untimed, UntimedPath)
+        paced = PacedPath(untimed.arm, untimed.world, untimed.state, untimed.paths, duration)
+        self.actions[-1] = name, paced
 
     def follow(self, paths: Sequence[Path], name: str) -> None:
         """Append the motion along ``paths``, the first of which begins at the present posture.

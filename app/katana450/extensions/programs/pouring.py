@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
+from numpy.polynomial.polynomial import polyfit, polyval
 
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject
@@ -15,13 +18,16 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import SetSpeed, Wait
 from katana450.extensions.programs.carry import carry
 from katana450.extensions.programs.drain import Drain
+from katana450.extensions.programs.expression import PLAIN
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.pour_rate import RatePlan
 from katana450.extensions.programs.pour_tilt import film_after, tilt_for
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.extensions.programs.tool_curves import ToolTurn
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import ToolLine
 from katana450.maths.water.flow import Water
@@ -51,6 +57,15 @@ DRAIN_TIME = 1.5
 PART_FLOW = 0.5 * ML
 """[m^3/s] Flow with which the pour of a part ends: slow enough to end it in time."""
 
+LAST_FRACTION = 0.1
+"""[1] Fraction of all that is not poured at a given rate: so little flows as it can."""
+
+ROLL_DEGREE = 14
+"""Degree of the polynomial that gives the roll over time for a rate."""
+
+RATE_UNIT = "ml/s"
+"""Unit of a rate in a script."""
+
 REACTION_TIME = 0.25
 """[s] Time in which a cup that turns back still pours at the same flow."""
 
@@ -75,25 +90,29 @@ class Pour:
         shake: number of shakes.
         volume: how much to pour [m^3]; None for all. The cup is tilted until the flow is PART_FLOW
             when the rest is left, kept so until then, and turned back.
+        rate: flow while pouring [m^3/s]; None to turn the cup evenly. Of all, the last
+            LAST_FRACTION flows faster.
     """
 
     into: str
     shake: int
     volume: float | None = None
+    rate: float | None = None
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of an object, or {into, shake, ml}. Raises ScriptError."""
+        """Read the name of an object, or {into, shake, ml, rate}. Raises ScriptError."""
         if value.kind == "text":
             return cls(read.text(value), SHAKES)
         fields = Fields(value, "a pour")
         into = fields.need("into", read.text, "")
         ml = fields.take("ml", read.number(1.0, 1000.0, "ml"), None)
         shake = fields.take("shake", read.whole(0, 20), SHAKES if ml is None else 0)
+        rate = fields.take("rate", _rate, None)
         fields.done()
         if ml is not None and shake:
             raise value.wrong("A shaken cup does not keep the rest: leave out `shake` or `ml`.")
-        return cls(into, shake, None if ml is None else ML * ml)
+        return cls(into, shake, None if ml is None else ML * ml, rate)
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the pour, turning either way. Raises InputError if it is not possible."""
@@ -137,13 +156,38 @@ class Pour:
         liquid = poured.water.liquid
         film = film_after(self.volume, rest, PART_TIME, liquid, inside)
         tilt = tilt_for(PART_FLOW, rest - film, liquid, inside)
-        # Rolling by phi about an axis with this pitch tilts the cup by
-        # cos(tilt) = cos(phi) + (1 - cos(phi)) sin(pitch)^2.
-        steep = math.sin(level.pitch) ** 2
-        cosine = (math.cos(tilt) - steep) / (1.0 - steep)
-        if cosine <= math.cos(POUR_TURN):
+        roll = float(_roll_of(tilt, level.pitch))
+        if roll >= POUR_TURN:
             raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
-        return math.acos(cosine)
+        return roll
+
+    def _pour_at_rate(
+        self, builder: PlanBuilder, rate: float, at: ToolTarget, turn: float, rest: float
+    ) -> ToolTarget:
+        """Turn the cup from ``at`` so that it pours at ``rate`` [m^3/s]; return the last target."""
+        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
+        assert pouring is not None
+        assert poured is not None
+        inside = pouring.water_environment(builder.state.objects).cup.inside
+        held = poured.water.kept * FEMTOLITRE
+        out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
+        plan = RatePlan.of(out, rate)
+        times, tilts = plan.tilts(held, poured.water.liquid, inside)
+        rolls = _roll_of(tilts, at.pitch)
+        if rolls.max() > abs(turn) and rolls.max() >= POUR_TURN:
+            raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
+        s = 2.0 * times / plan.duration - 1.0
+        fitted = polyfit(s, at.roll + math.copysign(1.0, turn) * rolls, ROLL_DEGREE)
+        first, last = (replace(at, roll=float(polyval(end, fitted))) for end in (-1, 1))
+        builder.lead([ToolLine(at, first)], POURING)
+        builder.note("at the rate", SetSpeed(1.0), builder.state)
+        builder.pace(ToolTurn(at, frozen(fitted)), plan.duration, "pour at the rate")
+        if self.volume is not None:
+            return last
+        builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
+        down = replace(at, roll=at.roll + turn)
+        builder.lead([ToolLine(last, down)], "pour the last")
+        return down
 
     def _pour(
         self, builder: PlanBuilder, basin: SceneObject, level: ToolTarget, turn: float, rest: float
@@ -166,7 +210,10 @@ class Pour:
         pace = POUR_PACE if self.volume is None else PART_PACE
         builder.note("slowly", SetSpeed(pace), builder.state)
         down = replace(at, roll=level.roll + turn)
-        builder.lead([ToolLine(at, down)], POURING)
+        if self.rate is None:
+            builder.lead([ToolLine(at, down)], POURING)
+        else:
+            down = self._pour_at_rate(builder, self.rate, at, turn, rest)
         back = replace(at, roll=level.roll + turn - math.copysign(SHAKE_ANGLE, turn))
         if self.shake:
             builder.lead([ToolLine(down, back), ToolLine(back, down)] * self.shake, "shake")
@@ -177,6 +224,25 @@ class Pour:
             builder.note("drain", Drain(counted(rest + PART_FLOW * REACTION_TIME)), builder.state)
         builder.note("full speed", SetSpeed(1.0), builder.state)
         builder.lead([ToolLine(down, at)], "turn back")
+
+
+def _rate(value: YamlValue) -> float:
+    """Read a flow in ml/s, as a number or a text such as 10 ml/s; return it in m^3/s."""
+    if isinstance(value.held, str) and value.held.endswith(RATE_UNIT):
+        with suppress(ValueError):
+            number = float(value.held.removesuffix(RATE_UNIT))
+            value = replace(value, kind="number", number=number, unit=PLAIN)
+    return ML * read.number(1.0, 50.0, RATE_UNIT)(value)
+
+
+def _roll_of(tilt: npt.ArrayLike, pitch: float) -> FloatArray:
+    """Return the roll [rad] of a tool with ``pitch`` [rad] at which a cup has ``tilt`` [rad].
+
+    Rolling by phi tilts it by cos(tilt) = cos(phi) + (1 - cos(phi)) sin(pitch)^2. The result is pi
+    where no roll tilts it that far.
+    """
+    steep = math.sin(pitch) ** 2
+    return np.arccos(np.clip((np.cos(tilt) - steep) / (1.0 - steep), -1.0, 1.0))
 
 
 def _lip(builder: PlanBuilder, q: FloatArray) -> FloatArray:

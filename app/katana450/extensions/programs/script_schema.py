@@ -216,6 +216,9 @@ STEP_VALUES: dict[str, Schema] = {
             {
                 "into": OBJECT,
                 "ml": number_or_text(1.0, 1000.0, "How much to pour, ml; all unless given"),
+                "rate": number_or_text(
+                    1.0, 50.0, "Flow while pouring, ml/s, or a text such as 10 ml/s"
+                ),
                 "shake": number_or_text(
                     0, 20, "Number of shakes after all is poured, 3 unless given"
                 ),

@@ -158,3 +158,34 @@ class ToolScrew:
         turn = math.hypot(*omega)
         axis = arm.T_C_S[:3, :3] @ omega / (turn or 1.0)
         return so3.to_quaternion(R).tolist(), axis.tolist(), turn
+
+
+@dataclass(frozen=True, eq=False)
+class ToolTurn:
+    """A turn of the tool about its own axis by a polynomial, at one point and with one pitch.
+
+    Attributes:
+        target: point and pitch; its roll is not used.
+        rolls: coefficients (n,) of the roll [rad], of the powers of 2 sigma - 1.
+    """
+
+    target: ToolTarget
+    rolls: FloatArray
+
+    def __post_init__(self) -> None:
+        rolls = finite_array(self.rolls, (np.size(self.rolls),), "The coefficients of a roll")
+        object.__setattr__(self, "rolls", frozen(rolls))
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """No joins: the turn is one formula."""
+        return ()
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        x, y, z = (place + 0.0 * sigma for place in self.target.position.tolist())
+        *lower, highest = self.rolls.tolist()
+        s, roll = 2.0 * sigma - 1.0, highest + 0.0 * sigma
+        for coefficient in reversed(lower):
+            roll = roll * s + coefficient
+        return ToolCoordinates(x, y, z, self.target.pitch + 0.0 * sigma, roll)

@@ -233,13 +233,17 @@ class WaterFlow:
         level = self.water_environment.basin.level(basin * FEMTOLITRE)
         before, after = water.T_base_cup.tolist(), T.tolist()
         catches = after[2][2] > 0.0
-        flying = []
+        over, flying = max(self.water_environment.basin.rim, 0.0), []
         for parcel in water.parcels:
             room = self._cup_holds - cup - water.film
             if catches and parcel.volume <= room and self._caught(parcel, before, after, dt):
                 cup += parcel.volume
                 continue
             aged = parcel._replace(age=parcel.age + dt)
+            if aged.at(aged.age)[2] > over:
+                # Above all surfaces: most of the water, so its landing is not computed.
+                flying.append(aged)
+                continue
             end = landing(aged, self.water_environment, level)
             if end.age > aged.age:
                 flying.append(aged)
