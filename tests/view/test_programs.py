@@ -31,6 +31,7 @@ from katana450.extensions.programs.timeline import Timeline
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api.answers import Progress
+from katana450.server.view.water import WORTH_SHOWING
 from katana450.settings import Settings
 from tests.browser.server import free_port
 from tests.view.gestures import ANNA, RecordedGestures
@@ -260,7 +261,8 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
         T = session.environment.pose(cup, seen.x)
         assert nodes(server)["/path/objects/0"].position == pytest.approx(T[:3, 3])
         assert seen.poured is not None
-        assert filled() == (seen.poured.water.cup > 0, seen.poured.water.basin > 0)
+        water = seen.poured.water
+        assert filled() == (water.cup >= WORTH_SHOWING, water.basin >= WORTH_SHOWING)
     assert filled() == (False, True)
     look(carried)
     assert filled() == (True, False)

@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 
 from katana450.maths.water.liquid import Liquid
+from katana450.maths.water.units import REST_FLOW
 
 LANDAU_LEVICH = 0.944
 """Factor [1] of the law of Landau and Levich; times the sixth root of the capillary number it is
 their thickness over Derjaguin's.
 """
-
-REST_AGE = 300.0
-"""Age [s] from which a film is taken as at rest. Until it is twice as old, it loses 30 %."""
 
 
 def withdrawn_thickness(liquid: Liquid, speed: float, g: float) -> float:
@@ -43,7 +41,7 @@ def drained_film(
     distance z from its upper edge (Jeffreys, The draining of a vertical plate, Proc. Camb. Phil.
     Soc. 26, 1930). Integrated over the wall, its volume is (2/3) width length^(3/2)
     (mu / (rho g t))^(1/2). The volume gives t, the age of the film; so any number of steps gives
-    the same as one. A film of REST_AGE stays.
+    the same as one. A film that loses less than REST_FLOW stays.
 
     ``width`` and ``length`` [m] of the wall across and along the flow, ``g`` [m/s^2] along it.
     """
@@ -51,4 +49,4 @@ def drained_film(
     if rate == 0.0 or length == 0.0:
         return 0.0 if length == 0.0 else volume
     age = 4.0 / 9.0 * width**2 * length**3 * liquid.viscosity / rate
-    return volume if age >= REST_AGE else volume / math.sqrt(1.0 + dt / age)
+    return volume if volume < 2.0 * age * REST_FLOW else volume / math.sqrt(1.0 + dt / age)

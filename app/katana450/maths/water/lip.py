@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from katana450.maths.water.liquid import WATER, Liquid
-from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
+from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, REST_FLOW
 
 DISCHARGE = 0.61
 """Discharge coefficient [1] in Poleni's rule for a sharp edge: Kirchhoff's pi / (pi + 2)."""
@@ -15,9 +15,6 @@ THINNING_TIME = 0.25
 would give an endless trickle. For another liquid the time is in proportion to the kinematic
 viscosity, as that in which a film thins.
 """
-
-REST_FLOW = 1e-9
-"""Flow [m^3/s] below which a viscous liquid is at rest at the lip: 3.6 ml in an hour."""
 
 DROP_VOLUME = MILLILITRE // 20
 """Volume [fl] of a drop: what is over the lip falls once it is as much, and the last drop at once.

@@ -13,6 +13,9 @@ water. A basin holds 2e15 of them, which a float still represents exactly.
 ML = 1e-6
 """A millilitre [m^3], the unit that is displayed."""
 
+REST_FLOW = 1e-9
+"""Flow [m^3/s] below which a liquid is taken as at rest: 3.6 ml in an hour."""
+
 MILLILITRE = 1_000_000_000_000
 """A millilitre [fl], the unit that is counted."""
 
