@@ -48,6 +48,9 @@ def check_poured(stage: Stage, program: Program) -> None:
     assert len(margins) > 300
     assert min(margins) > 0.005
     assert stage.loads(states).max() <= 1.0 + 1e-6
+    chain, q = stage.plan_context.arm.chain, np.array([state.setpoint for state in states])
+    room = np.degrees(np.minimum(q - chain.lower, chain.upper - q)).min()
+    assert room >= 2.0
     (cup,) = (each for each in end.objects if each.name == "cup")
     stood = [t for s in carried for t in s.objects if t.name == "cup" and not t.held][-1]
     assert not cup.held

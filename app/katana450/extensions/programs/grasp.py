@@ -56,6 +56,10 @@ PALM_CLEARANCE = MARGIN + 5e-4
 """[m] Minimum distance between the palm and the grasped object."""
 
 
+JOINT_ROOM = math.radians(2.0)
+"""[rad] Distance to the joint limits that a grasp keeps, if one of its pitches can."""
+
+
 @dataclass(frozen=True)
 class Grasp:
     """Grasp an object: open the fingers, approach it, close until both fingers touch.
@@ -103,10 +107,11 @@ class Grasp:
         opened = builder.plan_context.arm.gripper.upper
         builder.note("open", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
         try:
-            builder.first(
-                self._approaches(builder, scene_object),
-                lambda approach: self._plan(builder, scene_object, approach),
-            )
+            chosen = self._approaches(builder, scene_object)
+            try:
+                builder.first(chosen, lambda it: self._plan(builder, scene_object, it, JOINT_ROOM))
+            except InputError:
+                builder.first(chosen, lambda it: self._plan(builder, scene_object, it, 0.0))
         except InputError as error:
             raise InputError(f"{self.name} cannot be grasped at its place: {error}") from error
 
@@ -146,22 +151,38 @@ class Grasp:
         fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
         return [fraction * scene_object.height for fraction in fractions]
 
-    def _plan(self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach) -> None:
-        """Plan approach and closing. Raises InputError if it is not possible."""
+    def _plan(
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, room: float
+    ) -> None:
+        """Plan approach and closing, ``room`` [rad] from the joint limits.
+
+        Raises InputError if it is not possible.
+        """
         builder.first(
             self._heights(scene_object, approach),
-            lambda height: self._plan_at(builder, scene_object, approach, height),
+            lambda height: self._plan_at(builder, scene_object, approach, height, room),
         )
 
     def _plan_at(
-        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, height: float
+        self,
+        builder: PlanBuilder,
+        scene_object: SceneObject,
+        approach: Approach,
+        height: float,
+        room: float,
     ) -> None:
         """Plan the grasp at ``height`` [m] over the underside of the object."""
         point = _point(builder, scene_object, height)
         distance, q = _smallest_distance(builder, point, approach)
-        start = builder.first(
-            APPROACHES, lambda away: builder.joints_of(before(point, approach, distance + away))
-        )
+
+        def start_at(away: float) -> FloatArray:
+            start = builder.joints_of(before(point, approach, distance + away))
+            left = min(_joint_room(builder, start), _joint_room(builder, q))
+            if left < room:
+                raise InputError(f"a joint would come within {math.degrees(left):.1f} deg.")
+            return start
+
+        start = builder.first(APPROACHES, start_at)
         builder.move_to(start, f"grasp {self.name}: approach")
         goal = before(point, approach, distance)
         builder.lead([ToolLine(builder.at, goal)], f"grasp {self.name}")
@@ -199,6 +220,12 @@ def approaches(builder: PlanBuilder, scene_object: SceneObject) -> dict[str, tup
 def _point(builder: PlanBuilder, scene_object: SceneObject, height: float) -> FloatArray:
     """Return the point (3,) [m] in {S} at ``height`` [m] over the underside of the object."""
     return builder.point(scene_object.T[:3, 3] + (0.0, 0.0, height), in_base=True)
+
+
+def _joint_room(builder: PlanBuilder, q: FloatArray) -> float:
+    """Return the smallest distance [rad] of the joints ``q`` (5,) [rad] to their limits."""
+    chain = builder.chain
+    return float(np.minimum(q - chain.lower, chain.upper - q).min())
 
 
 def _why_not_held(state: State) -> str:
