@@ -41,7 +41,7 @@ def viscous_flow(liquid: Liquid, radius: float, tilt: float, head: float, g: flo
     """Return the maximum flow over the lip [m^3/s] that the viscosity of ``liquid`` allows.
 
     A film as thick as the head runs down the outside of the lip: rho g head^3 / (3 mu) per metre of
-    edge (Nusselt, 1916; Bird, Stewart and Lightfoot, Transport Phenomena, 2nd ed., eq. 2.2-22),
+    edge (Nusselt, 1916; Bird, Stewart and Lightfoot, Transport Phenomena, 2nd ed., ch. 2.2),
     summed as for ``weir_flow``.
     """
     rule = liquid.density * g * head**3 / (3.0 * liquid.viscosity)
