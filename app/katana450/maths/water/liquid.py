@@ -35,8 +35,7 @@ which range from 31e-3 to 35e-3 N/m.
 HONEY = Liquid("honey", 1421.0, 19.0, 55.0e-3)
 """Clover honey with 16 % of water, 190 poise at 20 degrees C in tables for beekeepers, and the
 density between 1417 (18 %) and 1423 (15 %) of these. Surface tension: the middle of 50e-3 to 60e-3
-N/m (Bogdanov, Book of Honey, ch. 4). By these tables it halves with 6.5 degrees
-or 2 % of water more.
+N/m (Bogdanov, Book of Honey, ch. 4). The viscosity halves with 6.5 degrees or 2 % of water more.
 """
 
 LIQUIDS = {each.name: each for each in (WATER, OIL, HONEY)}
