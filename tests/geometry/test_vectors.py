@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 
-from katana450.maths.geometry import so3, vectors
+from katana450.maths.geometry import vectors
 from katana450.maths.geometry.arrays import FloatArray
-from tests.geometry.strategies import angles, directions, points, repeatable
+from tests.geometry.strategies import directions, points, repeatable
 
 
 @repeatable
@@ -26,12 +26,3 @@ def test_perpendicular_removes_the_part_along_the_axis(a: FloatArray, omega: Flo
     left = np.array(vectors.perpendicular(vectors.vector(a), vectors.vector(omega)))
     np.testing.assert_allclose(left @ omega, 0.0, atol=1e-14)
     np.testing.assert_allclose(np.cross(a - left, omega), 0.0, atol=1e-14)
-
-
-@repeatable
-@given(points, directions, points, angles)
-def test_rotate_is_the_exponential_about_a_point(
-    p: FloatArray, omega: FloatArray, r: FloatArray, theta: float
-) -> None:
-    got = vectors.rotate(vectors.vector(p), vectors.vector(omega), vectors.vector(r), theta)
-    np.testing.assert_allclose(got, r + so3.exp(omega * theta) @ (p - r), atol=1e-14)

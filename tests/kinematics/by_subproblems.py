@@ -6,11 +6,13 @@ follows the paper's eq. (12) to (29) with both shoulders and both elbows.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.vectors import Vector, add, dot, norm, rotate, scale, sub, vector
+from katana450.maths.geometry.vectors import Vector, add, cross, dot, norm, scale, sub, vector
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.subproblems import subproblem1, subproblem3, subproblem4
 
@@ -22,6 +24,14 @@ def _foot(p: Vector, line: Line) -> Vector:
     """Return the point of the line nearest to `p`."""
     omega, r = line
     return add(r, scale(dot(sub(p, r), omega), omega))
+
+
+def rotate(p: Vector, omega: Vector, r: Vector, theta: float) -> Vector:
+    """Return `p` turned by `theta` [rad] about the axis through `r` along the unit `omega`."""
+    u = sub(p, r)
+    c, s = math.cos(theta), math.sin(theta)
+    along = scale((1.0 - c) * dot(omega, u), omega)
+    return add(r, add(scale(c, u), add(scale(s, cross(omega, u)), along)))
 
 
 def solve(chain: Chain, T: FloatArray) -> list[FloatArray]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from katana450.extensions.programs.pour_tilt import spill_tilt
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
@@ -77,4 +78,4 @@ def steady_acceleration(cup: Cylinder, volume: float) -> float:
     The cup is upright with ``volume`` [m^3] of water, and its surface has come to rest. A sudden
     acceleration makes the surface swing to nearly twice the lean.
     """
-    return GRAVITY * math.tan(cup.spills_at(volume))
+    return GRAVITY * math.tan(spill_tilt(cup, volume))

@@ -11,6 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
+from katana450.extensions.programs.pour_tilt import spill_tilt
 from katana450.maths.water.cylinder import Cylinder
 from tests.geometry.strategies import repeatable
 
@@ -179,14 +180,14 @@ def test_capacity_at_a_tilt_ends_at_the_lip() -> None:
 @given(cylinders, st.floats(0.001, 0.999))
 def test_spilling_begins_where_the_capacity_ends(c: Cylinder, fraction: float) -> None:
     volume = fraction * c.capacity
-    tilt = c.spills_at(volume)
+    tilt = spill_tilt(c, volume)
     assert c.holds(tilt) == pytest.approx(volume, rel=1e-9)
     assert c.margin(tilt, c.level(tilt, volume)) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_full_and_empty_cups_spill_at_once_and_never() -> None:
-    assert CUP.spills_at(CUP.capacity) == pytest.approx(0.0, abs=1e-12)
-    assert CUP.spills_at(0.0) == pytest.approx(0.5 * math.pi, abs=1e-9)
+    assert spill_tilt(CUP, CUP.capacity) == pytest.approx(0.0, abs=1e-12)
+    assert spill_tilt(CUP, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-9)
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])

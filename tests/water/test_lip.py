@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from katana450.extensions.programs.pour_rate import RatePlan
-from katana450.extensions.programs.pour_tilt import flow_at, tilt_for
+from katana450.extensions.programs.pour_tilt import flow_at, spill_tilt, tilt_for
 from katana450.maths.water.flow import WaterFlow
 from katana450.maths.water.lip import DISCHARGE, left_over, viscous_flow, weir_flow
 from katana450.maths.water.liquid import HONEY, LIQUIDS, OIL, Liquid
@@ -74,7 +74,7 @@ def test_tilt_for_a_flow_has_that_flow(
     cup = flow.water_environment.cup.inside
     tilt = tilt_for(rate * ML, volume * ML, liquid, cup)
     assert flow_at(tilt, volume * ML, liquid, cup) == pytest.approx(rate * ML, rel=1e-5)
-    assert tilt > cup.spills_at(volume * ML) - 1e-9
+    assert tilt > spill_tilt(cup, volume * ML) - 1e-9
 
 
 @repeatable

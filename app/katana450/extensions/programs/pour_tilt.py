@@ -43,6 +43,24 @@ def tilt_for(flow: float, volume: float, liquid: Liquid, cup: Cylinder) -> float
     return high
 
 
+def spill_tilt(cup: Cylinder, volume: float) -> float:
+    """Return the tilt [rad] from which ``cup`` no longer holds ``volume`` [m^3].
+
+    Down to half of its capacity the floor stays covered and the answer is an arc tangent.
+    """
+    rise = cup.depth - volume / (math.pi * cup.radius**2)
+    if rise <= 0.5 * cup.depth:
+        return math.atan2(max(rise, 0.0), cup.radius)
+    low, high = math.atan2(0.5 * cup.depth, cup.radius), 0.5 * math.pi
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if cup.holds(middle) > volume:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
 def film_after(poured: float, rest: float, time: float, liquid: Liquid, cup: Cylinder) -> float:
     """Return the volume [m^3] of the film when ``poured`` [m^3] has flowed out in ``time`` [s].
 
@@ -50,7 +68,7 @@ def film_after(poured: float, rest: float, time: float, liquid: Liquid, cup: Cyl
     at the tilt that holds the rest.
     """
     full = cup.wetted(0.0, (poured + rest) / (math.pi * cup.radius**2))
-    tilt = cup.spills_at(rest)
+    tilt = spill_tilt(cup, rest)
     bared = max(full - cup.wetted(tilt, cup.level(tilt, rest)), 0.0)
     speed = bared / (math.tau * cup.radius * time)
     return 2.0 / 3.0 * bared * withdrawn_thickness(liquid, speed, GRAVITY)

@@ -47,11 +47,3 @@ def norm(a: Vector) -> float:
 def perpendicular(a: Vector, omega: Vector) -> Vector:
     """Return the part of `a` perpendicular to the unit vector `omega`."""
     return sub(a, scale(dot(a, omega), omega))
-
-
-def rotate(p: Vector, omega: Vector, r: Vector, theta: float) -> Vector:
-    """Return `p` turned by `theta` [rad] about the axis through `r` along the unit `omega`."""
-    u = sub(p, r)
-    c, s = math.cos(theta), math.sin(theta)
-    along = scale((1.0 - c) * dot(omega, u), omega)
-    return add(r, add(scale(c, u), add(scale(s, cross(omega, u)), along)))

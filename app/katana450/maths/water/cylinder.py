@@ -143,25 +143,6 @@ class Cylinder:
         """Return the maximum volume [m^3] at ``tilt``: the volume below the lip."""
         return self.volume(tilt, self.lip(tilt)) if math.cos(tilt) > 0.0 else 0.0
 
-    def spills_at(self, volume: float) -> float:
-        """Return the tilt [rad] from which the cylinder no longer holds ``volume`` [m^3].
-
-        Down to half of its capacity the floor stays covered and the answer is an arc tangent.
-        """
-        rise = self.depth - volume / (math.pi * self.radius**2)
-        if rise <= 0.5 * self.depth:
-            return math.atan2(max(rise, 0.0), self.radius)
-        low, high = math.atan2(0.5 * self.depth, self.radius), 0.5 * math.pi
-        for _ in range(ROUNDS):
-            middle = 0.5 * (low + high)
-            if middle in (low, high):
-                break
-            if self.holds(middle) > volume:
-                low = middle
-            else:
-                high = middle
-        return low
-
     def margin(self, tilt: float, level: float) -> float:
         """Return the distance [m] of the plane below the lip, negative above it."""
         return self.lip(tilt) - level
