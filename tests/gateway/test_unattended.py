@@ -174,7 +174,7 @@ def test_a_running_program_does_not_become_unattended(table: Staged) -> None:
     owner = table.join(PAGES[0])
     run(table, owner, unattended=False)
     for order in (ProgramOrder.RUN, ProgramOrder.RESUME, ProgramOrder.END):
-        with pytest.raises(LeaseError, match="Only `run` and `step`"):
+        with pytest.raises(LeaseError, match="Only `run`, `step` and `continue`"):
             table.programs.handle(owner, Steer(order=order, unattended=True))
 
 

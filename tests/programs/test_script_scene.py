@@ -101,7 +101,7 @@ def test_present_scene_is_accepted(stage: Stage, scene: ScriptScene, begun: Stat
         ("- {name: post", "- {name: pole", "there is no post"),
         ("objects:", f"objects:\n- {{name: ball, shape: sphere, size: [20], {AT}}}",
          "there is also ball"),
-        ("water: 50", "water: 70", "the cup has 70.0 ml of water, not 50.0 ml"),
+        ("water: 50", "water: 70", "the cup has 70.0 ml of water, not 50.0 ml of water"),
     ],
 )  # fmt: skip
 def test_first_difference_is_named(

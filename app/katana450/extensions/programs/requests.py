@@ -95,3 +95,7 @@ class AllowUnattended(Request, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = ADMIN
 
     allowed: bool
+
+
+REQUESTS = (Program, Steer, Breakpoints, AllowUnattended)
+"""All requests of this module."""

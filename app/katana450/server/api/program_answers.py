@@ -25,7 +25,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         unattended: Whether it runs without heartbeats of its owner.
         began: Time at which the run began, in UTC, in ISO 8601; null before that.
         breakpoints: Numbers of the steps before which it pauses.
-        can_continue: Whether it was interrupted, and the order continue may be given.
+        can_continue: Whether it was interrupted, and nothing has changed that prevents continue.
     """
 
     name: str

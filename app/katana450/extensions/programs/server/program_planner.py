@@ -44,6 +44,11 @@ class ProgramPlanner:
         """The planned program."""
         return None if self.planning is None else self.planning.program
 
+    @property
+    def text(self) -> str:
+        """The script that was planned last; "" before the first one."""
+        return "" if self.planning is None else self.planning.text
+
     def script(self, participant: Participant, text: str, *, more: bool, speed: float) -> bool:
         """Take a part of a script; after the last part, plan it from the present state of the arm.
 

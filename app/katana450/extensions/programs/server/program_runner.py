@@ -44,12 +44,7 @@ log = logging.getLogger(__name__)
 class ProgramRunner(Runner):
     """The runner of at most one program at a time."""
 
-    request_types = (
-        requests.Program,
-        requests.Steer,
-        requests.Breakpoints,
-        requests.AllowUnattended,
-    )
+    request_types = requests.REQUESTS
     controls = ("Script", "Program", "Look at")
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
@@ -118,11 +113,10 @@ class ProgramRunner(Runner):
         """
         if not more and self.running:
             raise LeaseError("A program is running. End it first.")
-        before = self._planner.planning
+        before = self._planner.text
         if self._planner.script(participant, text, more=more, speed=speed):
             self._run = None
-            now = self._planner.planning
-            if before is None or now is None or before.text != now.text:
+            if self._planner.text != before:
                 self._interruption = None
 
     def set_breakpoints(self, participant: Participant, steps: Sequence[int]) -> None:
@@ -272,10 +266,11 @@ class ProgramRunner(Runner):
 
     @property
     def _may_continue(self) -> bool:
-        """True if the program was interrupted and nothing runs or is planned."""
-        planning = self._planner.planning
-        idle = not self.running and planning is not None and not planning.busy
-        return idle and self._interruption is not None
+        """True if the program was interrupted, and nothing runs, is planned or has changed."""
+        planning, arm = self._planner.planning, self.hub.arm
+        if self._interruption is None or self.running or planning is None or planning.busy:
+            return False
+        return arm is not None and not self._interruption.changed_to(arm.state)
 
     def status_line(self, state: State, line: StatusLine) -> StatusLine:
         """Return the line for the program in place of ``line``."""
@@ -283,7 +278,10 @@ class ProgramRunner(Runner):
 
     def orders(self, participant: Participant) -> tuple[str, ...]:
         """Return the orders that the page of ``participant`` offers; none if not the owner."""
-        return state_line.orders(self.progress()) if self.owns(participant) else ()
+        if not self.owns(participant):
+            return ()
+        free = self.hub.stopped is None and self.hub.lease.holder in (None, participant.person)
+        return state_line.orders(self.progress(), may_begin=free)
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
@@ -350,9 +348,8 @@ class ProgramRunner(Runner):
         """Run the program of ``planning``, which fits the present situation."""
         assert planning.program is not None
         planning.refused, planning.note = None, ""
-        program = planning.program
+        program, began = planning.program, self.hub.clock()
         self._runs_as = ProgramParticipant(self.hub, program.name, participant)
-        began = self.hub.clock()
         self._owner.begin(participant, began, unattended=unattended)
         self._interruption = None
         self._run = replace(

@@ -76,10 +76,13 @@ def _unattended(program: Progress) -> str:
     return f"Unattended: started by {program.by}{at}."
 
 
-def orders(program: Progress | None) -> tuple[str, ...]:
-    """Return the orders that the page offers to the owner of ``program``."""
+def orders(program: Progress | None, *, may_begin: bool) -> tuple[str, ...]:
+    """Return the orders that the page offers to the owner of ``program``.
+
+    ``may_begin``: whether the arm is not stopped, and free for the owner.
+    """
     if program is None:
         return ()
     if program.status in (PlanningPhase.PLANNING.value, *RUNS):
         return (ProgramOrder.END.value,)
-    return (ProgramOrder.CONTINUE.value,) if program.can_continue else ()
+    return (ProgramOrder.CONTINUE.value,) if program.can_continue and may_begin else ()
