@@ -92,6 +92,7 @@ def moves(server: AppServer) -> bool:
     return bool(state["moving"])
 
 
+@pytest.mark.long
 def test_click_on_a_ghost_takes_its_branch(
     page: ViserPage, server: AppServer, artefacts: Path
 ) -> None:

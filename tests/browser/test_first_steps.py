@@ -151,6 +151,7 @@ def test_pouring_leaves_another_program_paused(server: AppServer, open_page: Ope
     page.wait_until(lambda: status() == "Mine stopped", "the end")
 
 
+@pytest.mark.long
 def test_planning_is_shown_and_a_stop_ends_it(visit: ViserPage, server: AppServer) -> None:
     # A failed look is repeated.
     visit.page.route("**/api/v1/state", lambda route: route.abort(), times=1)

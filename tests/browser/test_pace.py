@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from katana450.client import connect
 from katana450.server.api import requests
 from tests.browser.conftest import OpenPage
@@ -16,6 +18,7 @@ def slider(page: ViserPage) -> str:
     return page.page.locator("#speed input").input_value()
 
 
+@pytest.mark.long
 def test_motion_by_hand_is_paused_resumed_and_slowed_in_the_bar(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:

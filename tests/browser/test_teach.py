@@ -161,6 +161,7 @@ def test_step_and_go_move_to_one_pose_and_never_past_a_stop(sheet: ViserPage, tr
     assert at(-25.0)()
 
 
+@pytest.mark.long
 def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> None:
     """A press that waits on its way while the arm is stopped and cleared moves nothing."""
     teach(sheet, truth, (20.0, -25.0))

@@ -72,6 +72,7 @@ def test_cube_shows_how_the_scene_is_seen(page: ViserPage) -> None:
             assert float(shown @ seen) / across > 0.97, (position, name)
 
 
+@pytest.mark.long
 def test_faces_turn_the_camera_by_mouse_and_by_keys(page: ViserPage, artefacts: Path) -> None:
     turn(page, "3D")
     wait_from(page, Preset.FREE)

@@ -131,7 +131,9 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         ("- pick: far\n", r"far cannot be grasped at its place: The tool grasp cannot be at"),
         ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
         ("- release\n", "The hand holds nothing to release"),
-        ("- pick: part\n- pick: low\n", "already holds an object"),
+        pytest.param(
+            "- pick: part\n- pick: low\n", "already holds an object", marks=pytest.mark.long
+        ),
         ("- pick: part\n- release\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         ("- pick: part\n- place: {at: {x: 230, y: 720}}\n", "nothing carries it there"),
         pytest.param(
@@ -147,7 +149,11 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
             "far cannot carry part",
             marks=pytest.mark.long,
         ),
-        ("- pick: part\n- place: {at: {x: 180, y: 150}}\n", "cannot be placed there: .*low"),
+        pytest.param(
+            "- pick: part\n- place: {at: {x: 180, y: 150}}\n",
+            "cannot be placed there: .*low",
+            marks=pytest.mark.long,
+        ),
         ("- pick: {object: part, side: front}\n", "its sides are skew, so the fingers"),
     ],
 )
