@@ -20,24 +20,31 @@ class CancelledError(KatanaError):
     """A calculation was cancelled before it had a result."""
 
 
-class BlockedError(InputError):
-    """The requested path brings two bodies too close together."""
-
-
 class PathError(InputError):
     """A path cannot be followed at one of its points.
 
     Attributes:
-        text: the text, with ``{point}`` where the point stands.
-        point: (3,) the point [m].
+        text: the text, with ``{point}`` where the point stands, and ``{parts}`` for the bodies.
+        point: (3,) the tool point there [m]; empty if the text has none.
+        parts: names of the two bodies that meet; empty if the text names none.
     """
 
-    def __init__(self, text: str, point: Sequence[float], frame: str = "{S}") -> None:
-        """Name ``point`` in ``text``; ``frame``: name of the frame in which it is given."""
-        x, y, z = (1e3 * each for each in point)
-        super().__init__(text.replace("{point}", f"({x:.1f}, {y:.1f}, {z:.1f}) mm in {frame}"))
-        self.text = text
-        self.point = point
+    def __init__(
+        self,
+        text: str,
+        point: Sequence[float] = (),
+        frame: str = "{S}",
+        parts: Sequence[str] = (),
+    ) -> None:
+        """Name ``point`` and ``parts`` in ``text``; ``frame``: name of the frame of the point."""
+        self.text, self.point, self.parts = text, point, parts
+        shown = ", ".join(f"{1e3 * each:.1f}" for each in point)
+        text = text.replace("{point}", f"({shown}) mm in {frame}")
+        super().__init__(text.replace("{parts}", " and ".join(parts)))
+
+
+class BlockedError(PathError):
+    """The requested path brings two bodies too close together."""
 
 
 class RobotDescriptionError(KatanaError):

@@ -1,4 +1,4 @@
-"""``katana450 run`` at a terminal: watch a file, begin at a step, continue after a stop."""
+"""``katana450 run`` at a terminal: watch a file, begin at a step, pause, slow down, continue."""
 
 from __future__ import annotations
 
@@ -109,6 +109,13 @@ def program_that(
     raise AssertionError(program)
 
 
+def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+    due = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < due
+        time.sleep(0.02)
+
+
 def test_saved_file_is_planned_again_and_run_by_enter(
     server: AppServer, watcher: Client, script: Path
 ) -> None:
@@ -130,12 +137,21 @@ def test_saved_file_is_planned_again_and_run_by_enter(
         assert shown.process.wait(10.0) == 130
 
 
-def test_terminal_continues_after_a_stop(server: AppServer, watcher: Client, script: Path) -> None:
+def test_terminal_pauses_slows_and_continues(
+    server: AppServer, watcher: Client, script: Path
+) -> None:
     with terminal(server, script, "--from-step", "2", "--pause-before", "3") as shown:
         running = program_that(watcher, lambda each: each.status == "running")
         assert running.step == 2
         assert running.breakpoints == (3,)
-        program_that(watcher, lambda each: each.fraction > 0.1)
+        shown.type("\n")
+        program_that(watcher, lambda each: each.status == "paused")
+        shown.type("fast\n")
+        shown.wait_for("a number sets the speed")
+        shown.type("40 %\n")
+        until(lambda: watcher.query(answers.State).speed == 0.4)
+        shown.type("\n")
+        program_that(watcher, lambda each: each.status == "running")
         watcher.stop()
         shown.wait_for("Enter continues at step 2")
         shown.type("\n")
@@ -146,10 +162,6 @@ def test_terminal_continues_after_a_stop(server: AppServer, watcher: Client, scr
         shown.type("\n")
         paused = program_that(watcher, lambda each: each.status == "paused")
         assert paused.step == 3
-        watcher.ask(requests.Take())
-        watcher.ask(requests.Resume())
-        watcher.ask(requests.ReleaseLease())
-        shown.wait_for("Enter continues at step 3")
         shown.type("\n")
         shown.wait_for("Done.")
         assert shown.process.wait(10.0) == 0

@@ -45,14 +45,7 @@ from katana450.arm.control.outcome import outcome, take_all
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_changes import with_scene_change
 from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
-from katana450.arm.control.state import (
-    ACCEPTED,
-    ActiveStop,
-    Finding,
-    Outcome,
-    Reason,
-    State,
-)
+from katana450.arm.control.state import ACCEPTED, ActiveStop, Finding, Outcome, Reason, State
 from katana450.arm.control.stopping import stopped_again, with_presses
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError

@@ -115,10 +115,7 @@ def with_branch(arm: ArmModel, state: State, branch: Branch) -> State:
     elif isinstance(state.target, ToolTarget):
         target = target_on_branch(arm, state, branch)
     findings = of_projection(
-        arm.chain_to(state.tool),
-        best,
-        state.priority,
-        yaw_was_given=isinstance(target, PoseTarget),
+        arm.chain_to(state.tool), best, state.priority, yaw_was_given=isinstance(target, PoseTarget)
     )
     return with_goal(replace(state, branch=branch), best.q, findings, Positioning(target))
 

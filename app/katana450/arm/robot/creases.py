@@ -73,9 +73,7 @@ def drawn(vertices: FloatArray, faces: IntArray, colours: Colours | None = None)
     )
     kept, number = np.unique(label, return_inverse=True)
     return Drawn(
-        vertices[flat[kept]],
-        number.reshape(-1, 3),
-        None if colours is None else colours[kept // 3],
+        vertices[flat[kept]], number.reshape(-1, 3), None if colours is None else colours[kept // 3]
     )
 
 
@@ -108,12 +106,7 @@ def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
     for number, (values, kind, component, shaped, target) in enumerate(blocks):
         packed = np.ascontiguousarray(values, dtype=kind)
         views.append(
-            {
-                "buffer": 0,
-                "byteOffset": len(data),
-                "byteLength": packed.nbytes,
-                "target": target,
-            }
+            {"buffer": 0, "byteOffset": len(data), "byteLength": packed.nbytes, "target": target}
         )
         accessor: dict[str, Any] = {
             "bufferView": number,

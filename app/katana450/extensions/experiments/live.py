@@ -13,14 +13,17 @@ from urllib.parse import urlsplit
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
+from katana450.extensions.experiments.keyboard import Keyboard
 from katana450.extensions.programs.attached_files import without_scene
 from katana450.extensions.programs.requests import Breakpoints, Program, ProgramOrder, Steer
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
-from katana450.server.api import answers
+from katana450.server.api import answers, requests
 
 NAME = "Terminal"
 """Name of this client, which others see as the owner of the program."""
+
+HELP = "Enter pauses and resumes, a number sets the speed in percent, Ctrl-C ends."
 
 PART_CHARACTERS = 150
 """Maximum number of characters of a script per request."""
@@ -46,7 +49,7 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
             if options.from_step is None:
                 planned_program(arm)
             begin(arm, options)
-            return _follow(arm)
+            return _follow(arm, Keyboard())
         except KeyboardInterrupt:
             if options.unattended and _runs(arm):
                 print(
@@ -99,20 +102,22 @@ def planned_program(arm: Client) -> None:
     print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
 
 
-def _follow(arm: Client) -> int:
+def _follow(arm: Client, keyboard: Keyboard) -> int:
     """Print the progress of the program until it ends; return 0. Raises KatanaError if it fails.
 
-    A person at a terminal may continue it after a stop.
+    A person at a terminal may pause and slow it, and continue it after a stop.
     """
-    while (end := _to_end(arm)).status != "done":
-        if not (end.can_continue and sys.stdin.isatty() and _continued(arm, end)):
+    if keyboard.present:
+        print(HELP, file=sys.stderr)
+    while (end := _to_end(arm, keyboard)).status != "done":
+        if not (end.can_continue and keyboard.present and _continued(arm, keyboard, end)):
             raise KatanaError(end.why)
     print("Done.")
     return 0
 
 
-def _to_end(arm: Client) -> answers.Progress:
-    """Print the progress of the program until it ends; return the last one."""
+def _to_end(arm: Client, keyboard: Keyboard) -> answers.Progress:
+    """Print the progress of the program until it ends, and steer it; return the last progress."""
     shown = ""
     terminal = sys.stderr.isatty()
     for state in arm.states(STATE_RATE):
@@ -131,17 +136,33 @@ def _to_end(arm: Client) -> answers.Progress:
             if terminal:
                 print(file=sys.stderr)
             return now
+        if (typed := keyboard.line()) is not None:
+            _steer(arm, typed, paused=now.status == "paused")
     raise LostError("The server closed the connection.")
 
 
-def _continued(arm: Client, ended: answers.Progress) -> bool:
+def _steer(arm: Client, typed: str, *, paused: bool) -> None:
+    """Pause or resume the program, or set its speed, as ``typed``; print a refusal."""
+    try:
+        if not typed:
+            arm.ask(Steer(order=ProgramOrder.RESUME if paused else ProgramOrder.PAUSE))
+        elif typed.removesuffix("%").strip().isdecimal():
+            arm.ask(requests.Speed(value=int(typed.removesuffix("%")) / 100.0))
+        else:
+            print(HELP, file=sys.stderr)
+    except (RefusedError, InputError) as error:
+        print(f"katana450: {error}", file=sys.stderr)
+
+
+def _continued(arm: Client, keyboard: Keyboard, ended: answers.Progress) -> bool:
     """Ask the person whether the program shall continue; return whether it does."""
     print(f"katana450: {ended.why}", file=sys.stderr)
-    ask = f"Enter continues at step {ended.step}, Ctrl-C ends: "
     while True:
+        print(f"Enter continues at step {ended.step}, Ctrl-C ends.", file=sys.stderr, flush=True)
         try:
-            input(ask)
-        except (KeyboardInterrupt, EOFError):
+            if keyboard.wait() is None:
+                return False
+        except KeyboardInterrupt:
             print(file=sys.stderr)
             return False
         try:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import queue
 import sys
-import threading
 import time
 from argparse import Namespace
 from pathlib import Path
 
 from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError, KatanaError
+from katana450.extensions.experiments.keyboard import Keyboard
 from katana450.extensions.experiments.live import (
     END_STATUSES,
     begin,
@@ -34,7 +33,7 @@ HELP = "Save the file to plan it again. Enter runs it, Ctrl-C ends."
 def watch(path: Path, script: Script, options: Namespace) -> int:
     """Watch the script at ``path`` until Ctrl-C; return the exit status. Raises KatanaError."""
     with server_at(script, options) as url, connect(url, "Terminal", options.token) as arm:
-        keys = _keys()
+        keyboard = Keyboard()
         print(HELP, flush=True)
         seen, ready = "", False
         try:
@@ -42,8 +41,7 @@ def watch(path: Path, script: Script, options: Namespace) -> int:
                 text = _read(path, seen)
                 if text != seen and not _runs(arm):
                     seen, ready = text, _plan(arm, path, options)
-                if not keys.empty():
-                    keys.get()
+                if keyboard.line() is not None:
                     _run(arm, options, ready=ready)
                 time.sleep(EVERY)
         except KeyboardInterrupt:
@@ -94,16 +92,3 @@ def _run(arm: Client, options: Namespace, *, ready: bool) -> None:
         begin(arm, options)
     except RefusedError as error:
         print(f"katana450: {error}", file=sys.stderr)
-
-
-def _keys() -> queue.Queue[str]:
-    """Return a queue of the lines that are typed; empty for ever without a terminal."""
-    found: queue.Queue[str] = queue.Queue()
-
-    def read() -> None:
-        for line in sys.stdin:
-            found.put(line)
-
-    if sys.stdin is not None and sys.stdin.isatty():
-        threading.Thread(target=read, name="keys", daemon=True).start()
-    return found

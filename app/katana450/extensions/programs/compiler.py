@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from katana450.arm.control.messages import part
 from katana450.arm.control.state import State
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.actions import Action, FollowPlan
@@ -301,19 +302,21 @@ class Compiler:
         try:
             step.build(builder)
         except InputError as error:
-            raise _at(located, self._in_frame(error)) from error
+            raise _at(located, self._for_people(error)) from error
         compiled_step = CompiledStep(builder.actions, builder.state, builder.taken)
         if any(isinstance(action, UntimedPath) for _, action in compiled_step.actions):
             self._known[key] = compiled_step
         return compiled_step
 
-    def _in_frame(self, error: InputError) -> InputError:
-        """Return ``error`` with its point in the frame of the script."""
-        if not (isinstance(error, PathError) and self._script.in_base):
+    def _for_people(self, error: InputError) -> InputError:
+        """Return ``error`` with its point in the frame of the script, and names for people."""
+        if not isinstance(error, PathError):
             return error
-        T = self._builder.plan_context.T_base_shoulder
-        point = T[:3, :3] @ error.point + T[:3, 3]
-        return PathError(error.text, point.tolist(), "the base frame")
+        point, frame = error.point, "{S}"
+        if self._script.in_base and point:
+            T = self._builder.plan_context.T_base_shoulder
+            point, frame = (T[:3, :3] @ point + T[:3, 3]).tolist(), "the base frame"
+        return PathError(error.text, point, frame, tuple(map(part, error.parts)))
 
     def _timed(self, line: Sequence[_Untimed]) -> PlannedSteps:
         """Return the steps of ``line`` with all paths timed."""

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.messages import part
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import Reason, State
@@ -232,7 +233,7 @@ def _why_not_held(state: State) -> str:
     """Return why the closed fingers do not hold an object."""
     for finding in state.findings:
         if finding.reason is Reason.CONTACT and finding.parts:
-            return f"{' and '.join(finding.parts)} would touch first"
+            return f"{' and '.join(map(part, finding.parts))} would touch first"
         if finding.reason is Reason.LOPSIDED:
             return "only one of them would touch it"
     return "they close without touching it"
@@ -260,7 +261,7 @@ def _smallest_distance(
         q = builder.joints_of(before(point, approach, distance))
         nearest = None if world is None else world.nearest(np.append(q, fingers))
         if nearest is not None and nearest.distance < PALM_CLEARANCE:
-            one, other = nearest.parts
+            one, other = map(part, nearest.parts)
             raise InputError(
                 f"{one} and {other} would be {1e3 * nearest.distance:.1f} mm apart; the minimum is "
                 f"{1e3 * PALM_CLEARANCE:.1f} mm."

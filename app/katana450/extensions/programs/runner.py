@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.messages import part
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan, SetSpeed, Wait
@@ -179,7 +180,7 @@ def skipped(program: Program, run: Run) -> tuple[int, ...]:
 def _met(state: State) -> str:
     """Return the two parts that would collide."""
     met = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
-    return " and ".join(met[0]) if met and met[0] else "something"
+    return " and ".join(map(part, met[0])) if met and met[0] else "something"
 
 
 def stopped(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:

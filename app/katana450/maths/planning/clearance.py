@@ -104,6 +104,13 @@ class SweptClearance:
                 pieces += [(middle, high), (low, middle)]
         return None
 
+    def worst(self, x: FloatArray) -> Contact:
+        """Return the contact at `x` (k,), where some pair is too near, that violates most."""
+        placed = self.world.at(x)
+        pairs = placed.nearer_than(self.minimum)[0]
+        beyond = [placed.distance(pair) - self.minimum[pair] for pair in pairs.tolist()]
+        return placed.contact(int(pairs[np.argmin(beyond)]))
+
     def blocked_line(self, start: FloatArray, end: FloatArray) -> Clearance | None:
         """Check the straight line from `start` (k,) to `end` (k,) [rad or m], as `blocked`."""
         line = end - start

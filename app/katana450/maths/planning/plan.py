@@ -207,16 +207,18 @@ def _clearance(
     met = sweep.blocked(room, fingers)
     if met is None:
         return sweep.nearest(room, fingers) if with_nearest else None
-    one, other = met.contact.parts
-    x, y, z = (1e3 * forward(path.chain, sweep.at(met.sigma, fingers)[:5])[:3, 3]).tolist()
+    x = sweep.at(met.sigma, fingers)
+    worst = room.worst(x)
     raise BlockedError(
-        f"The path is blocked {100.0 * met.sigma:.0f} % along it, with the tool at ({x:.0f}, "
-        f"{y:.0f}, {z:.0f}) mm: {one} and {other} would {_apart(met.contact.distance)}, and "
-        f"{1e3 * margin:g} mm are required. Lead the path around the obstacle, or move it."
+        f"The path is blocked {100.0 * met.sigma:.0f} % along it, with the tool at {{point}}: "
+        f"{{parts}} would {apart(worst.distance)}, and {1e3 * margin:g} mm are required. Lead the "
+        "path around the obstacle, or move it.",
+        forward(path.chain, x[:5])[:3, 3].tolist(),
+        parts=worst.parts,
     )
 
 
-def _apart(distance: float) -> str:
+def apart(distance: float) -> str:
     """Return a distance [m] in words, for an error message."""
     if distance < 0.0:
         return f"overlap by {-1e3 * distance:.1f} mm"

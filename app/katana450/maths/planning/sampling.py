@@ -25,7 +25,7 @@ from katana450.maths.planning.branch_region import BranchRegion
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.clearance import SweptClearance
 from katana450.maths.planning.joint_path import JointPath
-from katana450.maths.planning.plan import MARGIN, check_clear
+from katana450.maths.planning.plan import MARGIN, apart, check_clear
 
 TREE_STEP: Final = 0.3
 """Duration [s] of the motion at full speed from one posture of a tree to the next."""
@@ -106,6 +106,11 @@ class _Search:
             return None
         found = self.room.blocked_line(np.append(a, self.fingers), np.append(b, self.fingers))
         return None if found is None else found.contact
+
+    def worst(self, q: FloatArray) -> Contact | None:
+        """Return the contact at `q` that violates its minimum most; None when it is clear."""
+        met, room = self.met(q, q), self.room
+        return None if met is None or room is None else room.worst(np.append(q, self.fingers))
 
     def connected(self, random: np.random.Generator) -> list[FloatArray] | None:
         """Return the vias of a clear path; None when MAX_POSTURES were not enough."""
@@ -222,23 +227,21 @@ def collision_free_paths(
     region = None if branch is None else BranchRegion(chain, branch)
     search = _Search(chain, world, fingers, start, end, region)
     for name, q in (("start", start), ("end", end)):
-        met = search.met(q, q)
-        if met is not None:
-            one, other = met.parts
+        if (met := search.worst(q)) is not None:
             raise BlockedError(
-                f"At the {name}, the clearance between {one} and {other} is "
-                f"{1e3 * met.distance:.1f} mm, which is too small. Choose another posture."
+                f"At the {name}, {{parts}} would {apart(met.distance)}, and {1e3 * MARGIN:g} mm "
+                "are required. Choose another posture.",
+                parts=met.parts,
             )
     random = np.random.default_rng(seed)
     vias = search.connected(random)
     if vias is None:
         straight = search.met(start, end)
-        between = (
-            "" if straight is None else f" The straight path meets {' and '.join(straight.parts)}."
-        )
+        between = "" if straight is None else " On the straight path {parts} would meet."
         raise BlockedError(
             f"No path around the obstacles was found in {MAX_POSTURES} tries from seed {seed}."
-            f"{between} Try another seed, or add a posture in between."
+            f"{between} Try another seed, or add a posture in between.",
+            parts=() if straight is None else straight.parts,
         )
     vias = search.taut(vias, random)
     blends = [

@@ -15,13 +15,7 @@ from katana450.arm.control.messages import signed
 from katana450.arm.control.state import State
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
-from katana450.server.view.controls import (
-    GestureGate,
-    Listen,
-    ends,
-    listener,
-    set_slider,
-)
+from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
 from katana450.server.view.display_options import add_themes
 from katana450.server.view.event_list import EventList
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
@@ -38,11 +32,7 @@ class MachinePanel:
     """The panel. Its sliders show the goal, and its read-out shows the joint values."""
 
     def __init__(
-        self,
-        gui: viser.GuiApi,
-        robot: Robot,
-        gestures: GestureGate,
-        state: State,
+        self, gui: viser.GuiApi, robot: Robot, gestures: GestureGate, state: State
     ) -> None:
         """Add the tabs to ``gui``; they show ``state`` first."""
         self._gui = gui
