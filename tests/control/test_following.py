@@ -12,6 +12,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.plan_follower import MAX_UNCHECKED_PATH
 from katana450.arm.control.plans import path_to, plan_along, plan_to
 from katana450.arm.control.session import TOOL_SPEED, Session
 from katana450.arm.control.state import JointTarget, Reason, State, Status
@@ -343,7 +344,8 @@ def test_obstacle_added_after_planning_is_met_at_rest(
     states = run(guarded, start, [cmd.Follow(plan)])
     assert states[-1].status is Status.BLOCKED
     assert "cup" in (states[-1].findings[0].parts or ())
-    assert min(clearance(world, each) for each in states) >= STOP - SLIGHTLY
+    # Where the plan is not known to be clear, no shorter piece of the path is checked.
+    assert min(clearance(world, each) for each in states) >= STOP - MAX_UNCHECKED_PATH
     assert off_path(states, plan) <= 1e-15
     # The path back is clear, and so is the path onwards without the cup.
     back = run(guarded, states[-1], [cmd.GoAlong(0.0)])
@@ -357,7 +359,7 @@ def test_goal_in_the_table_is_refused(
     arm: ArmModel, world: CollisionWorld, guarded: Session
 ) -> None:
     state = guarded.begin(LOW, 0.0, 0.0)
-    with pytest.raises(BlockedError, match=r"table.*too small"):
+    with pytest.raises(BlockedError, match=r"table would overlap by .* are required"):
         plan_to(arm, world, state, LOW + np.radians([0.0, 23.0, 0.0, 0.0, 0.0]))
 
 

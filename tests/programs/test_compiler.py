@@ -100,7 +100,7 @@ def test_a_repeated_step_is_planned_again_after_objects_have_moved(stage: Stage)
         "        - put: {object: basin, x: 420, y: 0}\n"
     )
     assert compiled(parse(once), stage.plan_context, stage.begin()).steps == 5
-    with pytest.raises(ScriptError, match=r"line 7.* and basin is .* too small"):
+    with pytest.raises(ScriptError, match=r"line 7.* and basin would overlap by .* are required"):
         compiled(parse(once.replace("times: 1", "times: 2")), stage.plan_context, stage.begin())
 
 

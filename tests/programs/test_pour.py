@@ -127,7 +127,7 @@ def poured(stage: Stage, full: float | str, *parts: float) -> Water:
 )
 def test_half_of_the_liquid_is_poured(stage: Stage, liquid: str, full: float) -> None:
     water = poured(stage, f"{{ml: {full:g}, of: {liquid}}}", 0.5 * full)
-    assert water.basin / MILLILITRE == pytest.approx(0.5 * full, rel=0.005)
+    assert water.basin / MILLILITRE == pytest.approx(0.5 * full, rel=0.01)
     assert (water.spilled, water.liquid.name) == (0, liquid)
     assert water.total == counted(full * ML)
 
@@ -174,7 +174,7 @@ def test_flow_follows_the_rate(
     assert middle == pytest.approx(np.full(len(middle), rate), rel=tolerance)
     assert states[-1].poured is not None
     water = states[-1].poured.water
-    assert water.basin / MILLILITRE == pytest.approx(ml, rel=0.005)
+    assert water.basin / MILLILITRE == pytest.approx(ml, rel=0.01)
     assert water.spilled == 0
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
