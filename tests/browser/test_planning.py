@@ -128,7 +128,7 @@ def test_pause_during_planning_lasts_until_resume(
     assert page.page.locator("header").bounding_box() == height
     page.keep(artefacts / "planning-paused.png")
     until(page, r"Paused by you, \S+( [AP]M)?")
-    assert "Square: " in page.page.inner_text("#why")
+    page.wait_until(lambda: "Square: " in page.page.inner_text("#why"), "the program to begin")
     before = arm.query(answers.State)
     page.page.wait_for_timeout(1500)
     after = arm.query(answers.State)
@@ -140,6 +140,8 @@ def test_pause_during_planning_lasts_until_resume(
     # The same controls change the pace of the program.
     page.press_in_bar("Pause")
     until(page, r"Paused by you, .*", 5.0)
+    # A press just after the button changed may have meant Pause, and is ignored.
+    page.page.wait_for_timeout(600)
     page.press_in_bar("Resume")
     until(page, r"Square: .*", 5.0)
     page.page.get_by_role("slider", name="Speed in percent").fill("30")
