@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
 from katana450.errors import InputError
 from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import files_in
-from katana450.maths.geometry.arrays import FloatArray
-
-Number = float | str
-"""A number in the unit of its place (mm, deg, s, ml), or a text with a unit, such as "4 cm"."""
-
-Point = Sequence[Number] | FloatArray | Mapping[str, Number] | str
-"""A point: three numbers, {x, y, z}, or the name of a pose."""
-
-Place = Mapping[str, Any] | str
-"""A place: the name of a pose, {"joints": [...]}, or {x, y, z, pitch, roll, branch}."""
+from katana450.library.script_values import (
+    Number,
+    Place,
+    Point,
+    given,
+    object_value,
+    place_value,
+    plain,
+)
 
 
 class ScriptWriter:
@@ -64,7 +61,7 @@ class ScriptWriter:
 
     def scene(self, scene: str | Sequence[Mapping[str, Any]] | Mapping[str, Any]) -> None:
         """Name the scene that it needs: a file, its objects, or a mapping as in a scene file."""
-        self._head["scene"] = _plain(scene)
+        self._head["scene"] = plain(scene)
 
     def include(self, *files: str) -> None:
         """Take poses, values and definitions from files beside the script."""
@@ -81,14 +78,14 @@ class ScriptWriter:
         branch: str | None = None,
     ) -> str:
         """Name a place, by a point or by five joint angles, and return its name."""
-        self._poses[name] = _place(at, joints, pitch, roll, branch)
+        self._poses[name] = place_value(at, joints, pitch, roll, branch)
         return name
 
     def expect(
         self, measure: str, *, at_least: float | None = None, at_most: float | None = None
     ) -> None:
         """Let a simulation end with an error if a measure is beyond its bounds."""
-        self._expected[measure] = _given(at_least=at_least, at_most=at_most)
+        self._expected[measure] = given(at_least=at_least, at_most=at_most)
 
     @contextmanager
     def repeat(self, times: int) -> Iterator[None]:
@@ -152,15 +149,15 @@ class ScriptWriter:
         if isinstance(to, str) and (by, pitch, roll, branch) == (None,) * 4:
             self._add("move", to)
         elif by is not None and to is None:
-            self._add("move", {"by": by, **_given(pitch=pitch, roll=roll, branch=branch)})
+            self._add("move", {"by": by, **given(pitch=pitch, roll=roll, branch=branch)})
         elif by is None:
-            self._add("move", _place(to, None, pitch, roll, branch))
+            self._add("move", place_value(to, None, pitch, roll, branch))
         else:
             raise InputError("A move takes `to` or `by`, not both.")
 
     def via(self, *places: Place, blend: float | None = None) -> None:
         """Move the joints through places with rounded corners."""
-        self._add("via", {"through": list(places), **_given(blend=blend)})
+        self._add("via", {"through": list(places), **given(blend=blend)})
 
     def line(
         self,
@@ -171,11 +168,11 @@ class ScriptWriter:
         roll: Number | None = None,
     ) -> None:
         """Move the tool point on a straight line, to a point or by an offset [mm]."""
-        self._add("line", _given(to=to, by=by, pitch=pitch, roll=roll))
+        self._add("line", given(to=to, by=by, pitch=pitch, roll=roll))
 
     def lines(self, *places: Place, blend: float | None = None) -> None:
         """Move the tool point on straight lines through places with rounded corners."""
-        self._add("lines", {"through": list(places), **_given(blend=blend)})
+        self._add("lines", {"through": list(places), **given(blend=blend)})
 
     def arc(
         self,
@@ -189,7 +186,7 @@ class ScriptWriter:
     ) -> None:
         """Move the tool point round an axis through ``centre`` [mm] by an angle [deg]."""
         value = {"centre": centre, "axis": axis, "angle": angle}
-        self._add("arc", {**value, **_given(climb=climb, pitch=pitch, roll=roll)})
+        self._add("arc", {**value, **given(climb=climb, pitch=pitch, roll=roll)})
 
     def circle(
         self,
@@ -204,7 +201,7 @@ class ScriptWriter:
     ) -> None:
         """Move to the highest point of a circle [mm], then round it."""
         value = {"centre": centre, "normal": normal, "radius": radius}
-        more = _given(turns=turns, pitch=pitch, roll=roll, branch=branch)
+        more = given(turns=turns, pitch=pitch, roll=roll, branch=branch)
         self._add("circle", {**value, **more})
 
     def screw(
@@ -216,7 +213,7 @@ class ScriptWriter:
         climb: Number | None = None,
     ) -> None:
         """Move the tool as a rigid body about an axis [deg] and along it [mm]."""
-        self._add("screw", {"point": point, "axis": axis, **_given(angle=angle, climb=climb)})
+        self._add("screw", {"point": point, "axis": axis, **given(angle=angle, climb=climb)})
 
     def gripper(self, where: Number) -> None:
         """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide."""
@@ -228,7 +225,7 @@ class ScriptWriter:
 
     def wait_for(self, *, timeout: Number | None = None, **condition: Any) -> None:
         """Wait until a condition holds, such as ``held="cup"``; see docs/programs.md."""
-        self._add("wait_for", {**condition, **_given(timeout=timeout)})
+        self._add("wait_for", {**condition, **given(timeout=timeout)})
 
     def tool(self, name: str) -> None:
         """Use another tool frame for all later points."""
@@ -258,8 +255,7 @@ class ScriptWriter:
 
         Side, pitch [deg] and height [mm] are found unless given.
         """
-        more = _given(side=side, pitch=pitch, height=height)
-        self._add("grasp", {"object": name, **more} if more else name)
+        self._add("grasp", object_value(name, side=side, pitch=pitch, height=height))
 
     def pick(
         self,
@@ -270,15 +266,14 @@ class ScriptWriter:
         height: Number | None = None,
     ) -> None:
         """Grasp an object as ``grasp`` does, and lift it."""
-        more = _given(side=side, pitch=pitch, height=height)
-        self._add("pick", {"object": name, **more} if more else name)
+        self._add("pick", object_value(name, side=side, pitch=pitch, height=height))
 
     def place(self, at: Point | None = None, *, on: str | None = None) -> None:
         """Put the held object down, upright, at a place, or on another object.
 
         The place is x, y and, if wanted, z [mm] of its underside and its yaw [deg].
         """
-        self._add("place", _given(at=at, on=on))
+        self._add("place", given(at=at, on=on))
 
     def stack(self, name: str, *, on: str) -> None:
         """Pick an object and place it on the middle of another."""
@@ -297,7 +292,7 @@ class ScriptWriter:
         rate: Number | None = None,
     ) -> None:
         """Pour the cup in the hand into an object: all of it or some [ml], at a rate [ml/s]."""
-        more = _given(ml=ml, shake=shake, rate=rate)
+        more = given(ml=ml, shake=shake, rate=rate)
         self._add("pour", {"into": into, **more} if more else into)
 
     def set_down(self) -> None:
@@ -309,7 +304,7 @@ class ScriptWriter:
         self._add("call", {"name": name, "with": parameters} if parameters else name)
 
     def _add(self, name: str, value: Any) -> None:
-        self._steps.append({name: _plain(value)})
+        self._steps.append({name: plain(value)})
 
 
 @contextmanager
@@ -360,44 +355,6 @@ def program(
     <BLANKLINE>
     """
     head = {"name": name, "about": about, "gripper": gripper, "frame": frame, "tool": tool}
-    script = ScriptWriter({**head, "speed": _plain(speed)})
+    script = ScriptWriter({**head, "speed": plain(speed)})
     yield script
     script.check()
-
-
-def _given(**values: Any) -> dict[str, Any]:
-    """Return the values that are not None."""
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def _place(
-    at: Point | None,
-    joints: Sequence[Number] | None,
-    pitch: Number | None,
-    roll: Number | None,
-    branch: str | None,
-) -> dict[str, Any]:
-    """Return a place as a mapping. Raises InputError for a point that is none."""
-    angles = _given(pitch=pitch, roll=roll, branch=branch)
-    if joints is not None:
-        return {"joints": _plain(list(joints)), **angles}
-    point = _plain(at)
-    if isinstance(point, list) and len(point) == 3:
-        point = dict(zip("xyz", point, strict=True))
-    if not isinstance(point, dict):
-        raise InputError(f"A place needs three numbers x, y and z, not {at!r}.")
-    return {**point, **angles}
-
-
-def _plain(value: Any) -> Any:
-    """Return ``value`` as YAML writes it; numbers of numpy become those of Python."""
-    match value:
-        case np.ndarray() | np.generic():
-            return _plain(value.tolist())
-        case Mapping():
-            return {str(name): _plain(each) for name, each in value.items()}
-        case list() | tuple():
-            return [_plain(each) for each in value]
-        case float() if not math.isfinite(value):
-            raise InputError(f"A number of a script must be finite, not {value}.")
-    return value

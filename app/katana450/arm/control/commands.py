@@ -33,10 +33,7 @@ from katana450.arm.control.object_commands import (
 from katana450.arm.control.state import Finding
 from katana450.arm.control.step_tool import StepTool
 from katana450.arm.control.stop_commands import ClearStop, Stop
-from katana450.arm.control.traits import (
-    BaseCommand,
-    CommandTraits,
-)
+from katana450.arm.control.traits import BaseCommand, CommandTraits
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
