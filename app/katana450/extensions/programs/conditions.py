@@ -224,10 +224,7 @@ class FingerPlace:
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read {at_least, at_most}. Raises ScriptError."""
-        fields = Fields(value, "a gripper")
-        found = cls(ValueBounds.read(fields, read.number(-180.0, 180.0, "deg or mm")))
-        fields.done()
-        return found
+        return cls(_bounds(value, "a gripper", read.number(-180.0, 180.0, "deg or mm")))
 
     @property
     def awaited(self) -> str:
@@ -296,8 +293,13 @@ class ToolPlace:
 
 
 def _length_bounds(value: YamlValue) -> ValueBounds:
-    fields = Fields(value, "a coordinate")
-    found = ValueBounds.read(fields, read.millimetres())
+    return _bounds(value, "a coordinate", read.millimetres())
+
+
+def _bounds(value: YamlValue, what: str, number: Callable[[YamlValue], float]) -> ValueBounds:
+    """Read a mapping with bounds alone; ``what`` names it in messages. Raises ScriptError."""
+    fields = Fields(value, what)
+    found = ValueBounds.read(fields, number)
     fields.done()
     return found
 
@@ -311,10 +313,7 @@ class ProgramTime:
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read {at_least, at_most}. Raises ScriptError."""
-        fields = Fields(value, "a time")
-        found = cls(ValueBounds.read(fields, read.number(0.0, MAX_TIME, "s")))
-        fields.done()
-        return found
+        return cls(_bounds(value, "a time", read.number(0.0, MAX_TIME, "s")))
 
     @property
     def awaited(self) -> str:

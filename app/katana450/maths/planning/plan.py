@@ -141,9 +141,9 @@ class Plan:
         number = self.segment_at(tau)
         return self.segments[number].at(tau - self.begins[number]).q
 
-    def postures(self, count: int) -> FloatArray:
-        """Return joint angles (count, 5) [rad] evenly in tau from start to end, for a preview."""
-        return np.array([self.q(tau) for tau in np.linspace(0.0, self.span, count).tolist()])
+    def postures(self, count: int, tau: float = 0.0) -> FloatArray:
+        """Return joint angles (count, 5) [rad] evenly from `tau` [s] to the end, for a preview."""
+        return np.array([self.q(each) for each in np.linspace(tau, self.span, count).tolist()])
 
 
 def plan(

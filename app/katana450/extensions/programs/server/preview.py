@@ -262,9 +262,8 @@ def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray
         if isinstance(task.action, UseTool):
             tool = task.action.name
         elif isinstance(task.action, FollowPlan):
-            chain, plan = arm.chain_to(tool), task.action.plan
-            taus = np.linspace(task.action.tau, plan.span, PATH_SAMPLES + 1).tolist()
-            postures = [plan.q(tau) for tau in taus]
+            chain = arm.chain_to(tool)
+            postures = task.action.plan.postures(PATH_SAMPLES + 1, task.action.tau)
             points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
             paths.append(np.stack((points[:-1], points[1:]), axis=1))
         tools.update(dict.fromkeys(program.next(number), tool))
