@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from katana450.client import connect
-from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, clear_stop, take
 from tests.browser.sizes import PHONE, PORTRAIT, WIDE
+from tests.gateway.test_programs import wait
 
 STEP_3 = ".steps li:nth-child(3) button"
 
@@ -47,36 +46,26 @@ def test_steps_of_a_program_are_controlled_in_the_list(
     assert panel["width"] >= 0.8 * tabs["width"]
 
     with connect(server.url, "Reader") as reader:
-
-        def program_that(is_so: Callable[[answers.Progress], bool]) -> answers.Progress:
-            due, program = time.monotonic() + 30.0, None
-            while time.monotonic() < due:
-                program = reader.query(answers.State).program
-                if program is not None and is_so(program):
-                    return program
-                time.sleep(0.02)
-            raise AssertionError(program)
-
         pause = page.frame.locator(f"{STEP_3}[name=pause]")
         pause.click()
-        program_that(lambda each: each.breakpoints == (3,))
+        wait(reader, lambda each: each.breakpoints == (3,))
         page.wait_until(lambda: pause.get_attribute("aria-pressed") == "true", "the breakpoint")
         # The list is drawn again, and the button keeps the focus.
         page.wait_until(lambda: pause.evaluate("each => each.matches(':focus')"), "the focus")
         page.keep(artefacts / f"run_control_{window[0]}.png")
         page.frame.locator(".steps li:nth-child(2) button[name=run]").click()
-        program_that(lambda each: each.status == "running" and each.step == 2)
+        wait(reader, lambda each: each.status == "running" and each.step == 2)
         page.press_in_bar("STOP")
-        program_that(lambda each: each.status == "stopped")
+        wait(reader, lambda each: each.status == "stopped")
         truth.wait(moving=False)
         time.sleep(1.0)
         clear_stop(page, truth)
         page.page.get_by_role("button", name="Continue", exact=True).click()
-        program_that(lambda each: each.status == "paused" and each.step == 3)
+        wait(reader, lambda each: each.status == "paused" and each.step == 3)
         pause.click()
-        program_that(lambda each: each.breakpoints == ())
+        wait(reader, lambda each: each.breakpoints == ())
         # A press just after the button changed may have meant Pause, and is ignored.
         page.page.wait_for_timeout(600)
         page.press_in_bar("Resume")
-        program_that(lambda each: each.status == "done")
+        wait(reader, lambda each: each.status == "done")
     assert page.errors == []

@@ -17,6 +17,7 @@ import pytest
 from katana450.client import Client, connect
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
+from tests.gateway.test_programs import wait
 
 pty = pytest.importorskip("pty", reason="Windows has no pseudo-terminals")
 
@@ -96,19 +97,6 @@ def script(tmp_path: Path) -> Path:
     return path
 
 
-def program_that(
-    watcher: Client, is_so: Callable[[answers.Progress], bool], seconds: float = 20.0
-) -> answers.Progress:
-    due = time.monotonic() + seconds
-    program = None
-    while time.monotonic() < due:
-        program = watcher.query(answers.State).program
-        if program is not None and is_so(program):
-            return program
-        time.sleep(0.02)
-    raise AssertionError(program)
-
-
 def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
     due = time.monotonic() + seconds
     while not condition():
@@ -130,7 +118,7 @@ def test_saved_file_is_planned_again_and_run_by_enter(
         # Nothing has moved it yet.
         assert not watcher.query(answers.State).moving
         shown.type("\n")
-        program_that(watcher, lambda each: each.status == "done")
+        wait(watcher, lambda each: each.status == "done")
         script.write_text(SCRIPT, encoding="utf-8")
         shown.wait_for("Three steps: 3 steps")
         shown.process.send_signal(signal.SIGINT)
@@ -141,17 +129,17 @@ def test_terminal_pauses_slows_and_continues(
     server: AppServer, watcher: Client, script: Path
 ) -> None:
     with terminal(server, script, "--from-step", "2", "--pause-before", "3") as shown:
-        running = program_that(watcher, lambda each: each.status == "running")
+        running = wait(watcher, lambda each: each.status == "running")
         assert running.step == 2
         assert running.breakpoints == (3,)
         shown.type("\n")
-        program_that(watcher, lambda each: each.status == "paused")
+        wait(watcher, lambda each: each.status == "paused")
         shown.type("fast\n")
         shown.wait_for("a number sets the speed")
         shown.type("40 %\n")
         until(lambda: watcher.query(answers.State).speed == 0.4)
         shown.type("\n")
-        program_that(watcher, lambda each: each.status == "running")
+        wait(watcher, lambda each: each.status == "running")
         watcher.stop()
         shown.wait_for("Enter continues at step 2")
         shown.type("\n")
@@ -160,7 +148,7 @@ def test_terminal_pauses_slows_and_continues(
         watcher.clear_stop()
         watcher.ask(requests.ReleaseLease())
         shown.type("\n")
-        paused = program_that(watcher, lambda each: each.status == "paused")
+        paused = wait(watcher, lambda each: each.status == "paused")
         assert paused.step == 3
         shown.type("\n")
         shown.wait_for("Done.")
