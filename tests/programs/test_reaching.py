@@ -11,6 +11,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.source import ScriptError
 from tests.programs.conftest import Stage
 
@@ -27,7 +28,10 @@ def builder(stage: Stage) -> PlanBuilder:
 def refusal(builder: PlanBuilder, frame: str, p: tuple[float, ...], pitch: float) -> str:
     """Return why the tool cannot be at ``p`` [mm] with ``pitch`` [deg]; empty if it can."""
     text = PLACE.format(frame=frame, x=p[0], y=p[1], z=p[2], pitch=pitch)
-    (step,) = parse(text).steps
+    script = parse(text)
+    (step,) = script.steps
+    T = builder.plan_context.T_base_shoulder
+    builder.frame = ScriptFrame.of(T, in_base=script.in_base)
     try:
         # Only whether it can be reached; the way there is not planned.
         builder.joints_at(step.step.place)  # type: ignore[union-attr]

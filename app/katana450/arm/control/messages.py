@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 
 from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.state import CAUSES, Finding, Reason, State, Status
@@ -34,6 +35,14 @@ def signed(value: float, digits: int) -> str:
 def axis(number: int | None) -> str:
     """Return the name of an axis; ``number`` counts from 0, the name from 1."""
     return "an axis" if number is None else f"axis {number + 1}"
+
+
+def axis_names(names: Sequence[str]) -> Sequence[str]:
+    """Return the names of the joints of an arm for people; ``names`` are those of its description.
+
+    Joints that the description only numbers have the names of a five-axis arm.
+    """
+    return AXIS_NAMES if all(re.fullmatch(r"axis_?\d+", name) for name in names) else names
 
 
 PARTS = {

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
-from katana450.arm.control.messages import AXIS_NAMES
+from katana450.arm.control.messages import axis_names
 from katana450.arm.robot.robot import Robot
 
 
@@ -14,7 +12,5 @@ def joint_labels(robot: Robot) -> tuple[str, ...]:
     Joints of an arm that the robot description only numbers have the names of a five-axis arm.
     """
     arm = robot.arm
-    names = robot.joint_group.names if arm is None else arm.chain.names
-    if arm is not None and all(re.fullmatch(r"axis_?\d+", name) for name in names):
-        names = AXIS_NAMES
+    names = robot.joint_group.names if arm is None else axis_names(arm.chain.names)
     return tuple(f"{number} {name}" for number, name in enumerate(names, start=1))

@@ -17,7 +17,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan
-from katana450.extensions.programs.reaching import branches_near, reaching, unreached
+from katana450.extensions.programs.out_of_reach import unreached
+from katana450.extensions.programs.reaching import branches_near, reaching
+from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -171,10 +173,16 @@ class PacedPath(UntimedPath):
 class PlanBuilder:
     """The builder of a program: predicts the arm from step to step and records the actions."""
 
-    def __init__(self, plan_context: PlanContext, state: State) -> None:
-        """Start from ``state``, in which the arm is at rest."""
+    def __init__(
+        self, plan_context: PlanContext, state: State, frame: ScriptFrame | None = None
+    ) -> None:
+        """Start from ``state``, in which the arm is at rest.
+
+        ``frame``: the frame of the script, which is planned; None without a script.
+        """
         self.plan_context = plan_context
         self.state = state
+        self.frame = frame
         self.actions: list[tuple[str, Action | UntimedPath]] = []
         self.taken: GraspInfo | None = None
         """The grasp of the held object; None with an empty hand."""
@@ -348,7 +356,7 @@ class PlanBuilder:
         """Return the joints (5,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
             return self.plan_context.arm.chain.check_q(place.joints)
-        return self.joints_of(self.target_at(place), place.branch, in_base=place.in_base)
+        return self.joints_of(self.target_at(place), place.branch)
 
     def target_at(self, place: StepTarget, now: ToolTarget | None = None) -> ToolTarget:
         """Return the tool pose at ``place``, which has no joints; ``now`` gives absent values."""
@@ -359,18 +367,21 @@ class PlanBuilder:
         pitch = now.pitch if place.pitch is None else place.pitch
         return ToolTarget(p, pitch, now.roll if place.roll is None else place.roll)
 
-    def joints_of(
-        self, target: ToolTarget, branch: Branch | None = None, *, in_base: bool = False
-    ) -> FloatArray:
+    def joints_of(self, target: ToolTarget, branch: Branch | None = None) -> FloatArray:
         """Return the joints (5,) [rad] for ``target``, on the present branch if possible.
 
-        Raises InputError with the nearest places; ``in_base``: it gives them in the base frame.
+        Raises InputError with the nearest places.
         """
         found = reaching(self.chain, self.q, target, branch)
         if found is None:
-            T = self.plan_context.T_base_shoulder if in_base else None
-            raise InputError(unreached(self.chain, self.q, target, branch, self.state.tool, T))
+            raise InputError(self.unreached(target, branch))
         return found
+
+    def unreached(self, target: ToolTarget, branch: Branch | None) -> str:
+        """Return why the tool cannot be at ``target``, on ``branch`` or any, and what it can do."""
+        T = self.plan_context.T_base_shoulder
+        frame = ScriptFrame.of(T, in_base=False) if self.frame is None else self.frame
+        return unreached(self.chain, self.q, target, branch, self.state.tool, frame)
 
     def branches(self, wanted: Branch | None) -> tuple[Branch, ...]:
         """Return the branches to try, in their order; only ``wanted`` if it is given."""

@@ -21,6 +21,7 @@ from katana450.extensions.programs.located_step import (
 )
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
 from katana450.extensions.programs.script import Script
+from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.task_list import task_list
 from katana450.extensions.programs.wait_for import WaitUntil
 from katana450.maths.geometry.arrays import FloatArray
@@ -166,7 +167,8 @@ def compiled(
             f"{script.name} needs an arm without its gripper (`gripper: none`). Start the server "
             "with --bare."
         )
-    builder = PlanBuilder(plan_context, state)
+    frame = ScriptFrame.of(plan_context.T_base_shoulder, in_base=script.in_base)
+    builder = PlanBuilder(plan_context, state, frame)
     builder.state = builder.standing(state.setpoint)
     tasks = task_list(Compiler(script, builder, report).all(first_step))
     total_speed = script.speed * speed

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Self
 
 import numpy as np
 
+from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.moves import through
 from katana450.extensions.programs.plan_builder import PlanBuilder, StepTarget
+from katana450.extensions.programs.reaching import reaching
 from katana450.extensions.programs.roomiest_pitch import roomiest
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.extensions.programs.tool_curves import ToolLines, ToolScrew
+from katana450.extensions.programs.unfollowed import arc_remedies, line_remedies, unfollowed
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.tool import ToolTarget
@@ -64,7 +68,15 @@ class Line:
         if self.by is not None:
             offset = builder.direction(self.by, in_base=self.in_base)
             end = ToolTarget(start.position + offset, end.pitch, end.roll)
-        builder.lead([ToolLine(start, end)], "line")
+        line = ToolLine(start, end)
+        try:
+            builder.lead([line], "line")
+        except InputError as error:
+            branch, frame = builder.branches(None)[0], builder.frame
+            if self.to is not None and frame is not None and frame.looks_like_metres(end.position):
+                raise InputError(builder.unreached(end, branch)) from error
+            remedies = line_remedies(builder, start, end)
+            raise unfollowed(builder, error, line, branch, remedies) from error
 
 
 @dataclass(frozen=True)
@@ -88,8 +100,11 @@ class Lines:
     def build(self, builder: PlanBuilder) -> None:
         """Plan the lines. Raises InputError if the tool cannot follow them."""
         vias = [builder.at]
-        for each in self.through:
+        branch = builder.branches(None)[0]
+        for number, each in enumerate(self.through, start=1):
             vias.append(builder.target_at(each, vias[-1]))
+            if reaching(builder.chain, builder.q, vias[-1], branch) is None:
+                raise InputError(f"Place {number}: {builder.unreached(vias[-1], branch)}")
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
             builder.lead([ToolLines(tuple(vias), blend)], "lines")
@@ -149,6 +164,32 @@ class ArcGeometry:
         builder.move_to(tool_path.start, f"{name}: to its start")
         builder.follow([tool_path], name)
 
+    def follow_or_advise(
+        self,
+        builder: PlanBuilder,
+        arc: Callable[[float, float], ToolArc],
+        pitch: float,
+        size: tuple[str, float],
+        branch: Branch | None = None,
+    ) -> None:
+        """Follow ``arc`` with ``pitch`` [rad]. Raises InputError with what works instead.
+
+        ``arc`` gives the arc for a pitch and a fraction of its ``size``; see ``arc_remedies``.
+        """
+        name = "circle" if size[0] == "radius" else "arc"
+
+        def build(angle: float, fraction: float) -> None:
+            self.follow(builder, arc(angle, fraction), name, branch)
+
+        try:
+            build(pitch, 1.0)
+        except InputError as error:
+            if self.pitch == places.ROOMIEST:
+                raise
+            remedies = arc_remedies(builder, pitch, build, size)
+            first = builder.branches(branch)[0]
+            raise unfollowed(builder, error, arc(pitch, 1.0), first, remedies) from error
+
 
 @dataclass(frozen=True)
 class Arc:
@@ -174,9 +215,14 @@ class Arc:
         """Plan the arc. Raises InputError if the tool cannot follow it."""
         start = builder.at
         pitch, roll = self.turn.angles(start)
-        profiles = Linear(start.pitch, pitch), Linear(start.roll, roll)
-        arc = ToolArc(start.position, *self.turn.seen(builder), self.angle, *profiles, self.climb)
-        self.turn.follow(builder, arc, "arc")
+        seen, rolls = self.turn.seen(builder), Linear(start.roll, roll)
+
+        def arc(pitch: float, fraction: float) -> ToolArc:
+            angle, climb = fraction * self.angle, fraction * self.climb
+            pitches = Linear(start.pitch, pitch)
+            return ToolArc(start.position, *seen, angle, pitches, rolls, climb)
+
+        self.turn.follow_or_advise(builder, arc, pitch, ("angle", math.degrees(self.angle)))
 
 
 @dataclass(frozen=True)
@@ -212,11 +258,15 @@ class Circle:
             # A level circle has no highest point: start at the point farthest in front.
             ahead = builder.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
             out = ahead - (ahead @ normal) * normal
-        start = centre + self.radius / math.hypot(*out) * out
         pitch, roll = self.turn.angles(builder.at)
-        profiles = Linear(pitch, pitch), Linear(roll, roll)
-        arc = ToolArc(start, centre, normal, math.tau * self.turns, *profiles)
-        self.turn.follow(builder, arc, "circle", self.branch)
+        turn, rolls = math.tau * self.turns, Linear(roll, roll)
+
+        def arc(pitch: float, fraction: float) -> ToolArc:
+            start = centre + fraction * self.radius / math.hypot(*out) * out
+            return ToolArc(start, centre, normal, turn, Linear(pitch, pitch), rolls)
+
+        size = "radius", 1e3 * self.radius
+        self.turn.follow_or_advise(builder, arc, pitch, size, self.branch)
 
 
 @dataclass(frozen=True)
@@ -251,7 +301,11 @@ class Screw:
         omega = self.angle * axis
         v = np.cross(builder.point(self.point, in_base=self.in_base), omega) + self.climb * axis
         branch = builder.branches(None)[0]
-        builder.lead([ToolScrew(builder.chain, branch, builder.q, np.append(omega, v))], "screw")
+        screw = ToolScrew(builder.chain, branch, builder.q, np.append(omega, v))
+        try:
+            builder.lead([screw], "screw")
+        except InputError as error:
+            raise unfollowed(builder, error, screw, branch, iter(())) from error
 
 
 STEPS: dict[str, type[Step]] = {

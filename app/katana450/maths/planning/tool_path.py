@@ -206,7 +206,7 @@ class ToolPath:
             sigma -= float(passed) * (sigma - float(self._sigma[place - 1]))
         raise PathError(
             f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
-            f"{_at(sigma)}, by up to {np.degrees(worst):.2g} deg later on. "
+            f"{_at(sigma)}, by up to {np.degrees(worst):.3g} deg later on. "
             "Shift the path, or give it another pitch or roll.",
             self._target(sigma).position.tolist(),
         )

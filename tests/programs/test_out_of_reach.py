@@ -1,0 +1,183 @@
+"""Test the messages about places and paths out of reach: the amount, the cause, and what works."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.messages import AXIS_NAMES
+from katana450.extensions.programs.out_of_reach import unreached
+from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_frame import ScriptFrame
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.tool import ToolTarget
+from tests.programs.conftest import Stage
+
+AMOUNT = re.compile(r"it is (\S+) mm out of reach, because (.*?)\.(?: It|$)")
+LIMIT = re.compile(r"axis (\d), ([a-z ]+), is at its limit of (\S+) deg")
+START = "  - move: {x: 400, y: 0, z: 300, pitch: 30, roll: 0}\n"
+
+
+@pytest.fixture
+def builder(stage: Stage) -> PlanBuilder:
+    T = stage.plan_context.T_base_shoulder
+    return PlanBuilder(stage.plan_context, stage.begin(), ScriptFrame.of(T, in_base=True))
+
+
+def said(builder: PlanBuilder, target: ToolTarget, chain: Chain | None = None) -> str:
+    """Return the message about ``target``, of an arm with other limits if ``chain`` is given."""
+    assert builder.frame is not None
+    chain = builder.chain if chain is None else chain
+    return unreached(chain, builder.q, target, None, "tcp", builder.frame)
+
+
+def nearest_by_search(chain: Chain, target: ToolTarget) -> float:
+    """Return the distance [m] to the nearest point with the pitch of ``target``, on a fine grid.
+
+    The arm faces the target. Axes 2 and 3 are searched on ever finer grids, and axis 4 gives the
+    pitch, which is the sum of the three.
+    """
+    facing = math.atan2(target.position[1], target.position[0])
+    low, high, best = chain.lower[1:3].copy(), chain.upper[1:3].copy(), math.inf
+    for _ in range(7):
+        a, b = np.meshgrid(*(np.linspace(low[i], high[i], 81) for i in range(2)))
+        c = target.pitch - a - b
+        q = np.stack([np.full_like(a, facing), a, b, c, np.zeros_like(a)], axis=-1).reshape(-1, 5)
+        q = q[(chain.lower[3] <= q[:, 3]) & (q[:, 3] <= chain.upper[3])]
+        p = forward_batch(chain, q)[:, :3, 3]
+        apart = np.linalg.norm(p - target.position, axis=1)
+        best, middle = min(best, float(apart.min())), q[apart.argmin(), 1:3]
+        width = (high - low) / 16.0
+        low = np.maximum(middle - width, chain.lower[1:3])
+        high = np.minimum(middle + width, chain.upper[1:3])
+    return best
+
+
+def targets(count: int) -> list[ToolTarget]:
+    """Return places in front of the arm, many of them out of reach."""
+    rng = np.random.default_rng(31)
+    rows = rng.uniform((0.35, -0.3, -0.1, -0.3), (0.75, 0.3, 0.5, 1.4), (count, 4)).tolist()
+    return [ToolTarget(np.array(row[:3]), row[3], 0.0) for row in rows]
+
+
+def test_amount_is_the_distance_to_the_nearest_point(builder: PlanBuilder) -> None:
+    stretched = limited = 0
+    for target in targets(24):
+        found = AMOUNT.search(said(builder, target))
+        by_search = nearest_by_search(builder.chain, target)
+        if found is None:
+            # Printed with one decimal: what is missed by less is not looked for here.
+            continue
+        stretched += "the arm is stretched" in found[2]
+        limited += LIMIT.search(found[2]) is not None
+        assert float(found[1]) == pytest.approx(1e3 * by_search, abs=0.1, rel=2e-3)
+    assert min(stretched, limited) >= 3
+
+
+def test_named_axis_binds(builder: PlanBuilder) -> None:
+    """Without the limit that is named the place is nearer, and without any other one it is not."""
+    chain, named = builder.chain, set()
+    for target in targets(40):
+        found = AMOUNT.search(said(builder, target))
+        limits = [] if found is None else LIMIT.findall(found[2])
+        if found is None or len(limits) != 1:
+            continue
+        ((number, name, shown),) = limits
+        axis = int(number) - 1
+        named.add(axis)
+        assert name == AXIS_NAMES[axis]
+        ends = np.degrees((chain.lower[axis], chain.upper[axis]))
+        assert float(np.abs(ends - float(shown)).min()) < 0.006
+        for other in (1, 2, 3):
+            wider = np.zeros(5)
+            wider[other] = 0.05
+            freed = replace(chain, lower=chain.lower - wider, upper=chain.upper + wider)
+            now = nearest_by_search(freed, target)
+            if other == axis:
+                assert 1e3 * now < float(found[1]) - 0.1
+            else:
+                assert 1e3 * now == pytest.approx(float(found[1]), abs=0.1, rel=2e-3)
+    assert len(named) >= 2
+
+
+def test_roll_beyond_its_limit_is_named(builder: PlanBuilder) -> None:
+    p: FloatArray = np.array((0.4, 0.0, 0.1))
+    target = ToolTarget(p, math.radians(30.0), math.radians(175.0))
+    why = said(builder, target)
+    assert "the roll is 3.5 deg beyond what the arm can have" in why
+    assert "axis 5, wrist roll, is at its limit of 171.5 deg" in why
+    found = re.search(r"`roll: (\S+)`", why)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(171.5, abs=0.1)
+
+
+def refusal(stage: Stage, steps: str, frame: str = "base") -> str:
+    with pytest.raises(ScriptError) as refused:
+        compiled(parse(f"frame: {frame}\nsteps:\n{steps}"), stage.plan_context, stage.begin())
+    return str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("step", "reason"),
+    [
+        ("line: {by: {x: 400}%s}", "the arm is stretched"),
+        pytest.param(
+            "line: {by: {x: -150, z: -150}%s}",
+            "axis 3, elbow, is at its limit",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "arc: {centre: {x: 0, y: 0, z: 300}, axis: z, angle: 300%s}",
+            "axis 1, base turn, is at its limit of 165.65 deg",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "circle: {centre: {x: 350, y: 0, z: 300}, normal: x, radius: 150%s}",
+            "axis 3, elbow, is at its limit of 127.3 deg",
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_suggestion_for_a_path_plans(stage: Stage, step: str, reason: str) -> None:
+    why = refusal(stage, f"{START}  - {step % ''}\n")
+    amount = re.search(r"Farthest out of reach is (.*?) in the base frame, .*?: (\S+) mm", why)
+    assert amount is not None
+    assert float(amount[2]) > 1.0
+    assert reason in why
+    fixes = re.findall(r"`(\w+): ([^`]+)`", why.partition("It can be followed")[2])
+    assert fixes
+    for name, value in fixes:
+        fixed = step % f", {name}: {value}" if name == "pitch" else step % ""
+        if name == "to":
+            fixed = f"line: {{to: {value}}}"
+        elif name != "pitch":
+            fixed = re.sub(rf"{name}: \d+", f"{name}: {value}", fixed)
+        text = f"frame: base\nsteps:\n{START}  - {fixed}\n"
+        assert compiled(parse(text), stage.plan_context, stage.begin()).tasks
+
+
+def test_place_of_lines_out_of_reach_is_named(stage: Stage) -> None:
+    steps = "  - lines: {through: [{x: 420, y: 0, z: 300}, {x: 730, y: 0, z: 180}]}\n"
+    why = refusal(stage, START + steps)
+    assert "Place 2: The tool tcp cannot be at (730.0, 0.0, 180.0) mm in the base frame" in why
+    assert "mm out of reach, because the arm is stretched" in why
+
+
+def test_metres_are_suspected_in_a_line(stage: Stage) -> None:
+    why = refusal(stage, START + "  - line: {to: {x: 0.4, y: 0, z: 0.3}}\n")
+    assert "Lengths are in mm here" in why
+
+
+def test_object_out_of_reach_is_reported_in_the_frame_of_the_script(stage: Stage) -> None:
+    why = refusal(stage, "  - put: {object: cup, x: 650, y: 0}\n  - pick: cup\n")
+    assert "(650.0, 0.0, " in why
+    assert "mm in the base frame" in why
