@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
+import struct
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,8 +17,10 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.water import water_environment
 from katana450.maths.geometry import so3
 from katana450.maths.water.flow import WaterFlow
-from katana450.maths.water.puddle import THICKNESS
+from katana450.maths.water.liquid import HONEY, LIQUIDS, OIL, WATER
+from katana450.maths.water.puddle import THICKNESS, Puddle
 from katana450.server.view.water import WORTH_SENDING, WaterNodes
+from katana450.srgb import to_srgb
 from tests.viser_bridge.internals import nodes, outlet
 from tests.water.motions import NO_ACCELERATION, over_basin, placed, poured, turned_to
 
@@ -125,6 +130,32 @@ def test_a_puddle_lies_where_water_fell_and_grows(recorded: Recorded) -> None:
     # After a restart the table is dry.
     recorded.nodes.show(FLOW.begin(2e-4, placed(0.3, -0.2, 0.1)))
     assert not recorded.node("puddle0").visible
+
+
+def test_each_liquid_has_its_colour(recorded: Recorded) -> None:
+    T = placed(0.3, -0.2, 0.1)
+    for liquid in (HONEY, WATER, OIL):
+        water = FLOW.begin(2e-4, T, liquid)
+        recorded.nodes.show(water)
+        assert recorded.node("cup").color == recorded.node("stream").color == liquid.colour
+        assert not recorded.node("basin").visible
+        water = replace(water, basin=10**14, puddles=(Puddle((0.3, 0.0, 0.0), 10**12),))
+        recorded.nodes.show(water)
+        for name in ("basin", "puddle0"):
+            node = recorded.node(name)
+            assert node.visible
+            assert drawn(node.glb_data) == pytest.approx(liquid.colour, abs=2.0)
+        level = FLOW.water_environment.basin.level(1e-4)
+        assert recorded.node("basin").scale[2] == pytest.approx(level)
+    assert len({each.colour for each in LIQUIDS.values()}) == len(LIQUIDS)
+
+
+def drawn(glb: bytes) -> list[float]:
+    """Return red, green and blue (0 to 255, sRGB) of the material of a GLB file."""
+    (size,) = struct.unpack("<I", glb[12:16])
+    (material,) = json.loads(glb[20 : 20 + size])["materials"]
+    factor = material["pbrMetallicRoughness"]["baseColorFactor"]
+    return [255.0 * each for each in to_srgb(factor[:3]).tolist()]
 
 
 def test_hidden_water_can_be_shown_again(recorded: Recorded) -> None:

@@ -1,4 +1,4 @@
-"""Water in the scene: in the cup, in the air, in the basin and on the table."""
+"""The liquid in the scene: in the cup, in the air, in the basin and on the table."""
 
 from __future__ import annotations
 
@@ -12,14 +12,11 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.liquid import WATER, Liquid
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
-from katana450.server.view.scene import Colour
-
-COLOUR: Colour = (74, 148, 192)
-LIGHT: Colour = (18, 75, 134)
-"""COLOUR as linear colour, not sRGB, which glTF requires."""
+from katana450.srgb import to_light
 
 IN_VESSEL, IN_AIR, ON_TABLE = 0.58, 0.5, 0.3
 """Opacity (0 to 1) of the water in each place."""
@@ -53,13 +50,12 @@ class WaterNodes:
         self, server: viser.ViserServer, water_environment: WaterEnvironment, path: str = "/water"
     ) -> None:
         """Add the hidden nodes below the new node ``path``."""
-        self._server = server
-        self._path = path
+        self._server, self._path = server, path
         self._water_environment = water_environment
         self._flow = WaterFlow(water_environment)
         self._shown: Water | None = None
         self._body: FloatArray | None = None
-        self._level = 0.0
+        self._level, self._liquid = 0.0, WATER
         inside = water_environment.cup.inside
         self._root = server.scene.add_frame(path, show_axes=False, visible=False)
         surface = self._flow.surface(self._flow.begin(inside.capacity / 2.0, np.eye(4)))
@@ -71,6 +67,17 @@ class WaterNodes:
         # Made on first use: a good run spills nothing.
         self._puddles: list[viser.GlbHandle] = []
 
+    def _use(self, liquid: Liquid) -> None:
+        """Draw in the colour of ``liquid`` from now on."""
+        self._liquid, self._level = liquid, -1.0
+        self._cup.color = self._stream.color = liquid.colour
+        # The colour of these is in their files, which are sent once.
+        for node in (self._basin, *self._puddles):
+            node.remove()
+        self._puddles.clear()
+        self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
+        self.stand(self._water_environment)
+
     def stand(self, water_environment: WaterEnvironment) -> None:
         """Use the cup and the basin of ``water_environment`` from now on."""
         self._water_environment, self._flow = water_environment, WaterFlow(water_environment)
@@ -81,6 +88,8 @@ class WaterNodes:
         """Draw ``water``."""
         last, self._shown = self._shown, water
         if water is not last:
+            if water.liquid != self._liquid:
+                self._use(water.liquid)
             if last is None or not _same_in_cup(water, last):
                 self._show_cup(water)
             self._show_stream(water)
@@ -140,7 +149,7 @@ class WaterNodes:
         """Add water of a fixed shape as GLB, which mirrors the room; viser's meshes cannot."""
         return self._server.scene.add_glb(
             f"{self._path}/{name}",
-            _glossy(corners, faces, opacity),
+            _glossy(corners, faces, (*self._liquid.colour, opacity)),
             cast_shadow=False,
             receive_shadow=False,
         )
@@ -152,7 +161,7 @@ class WaterNodes:
             f"{self._path}/{name}",
             corners,
             faces,
-            color=COLOUR,
+            color=self._liquid.colour,
             opacity=opacity,
             cast_shadow=False,
             receive_shadow=False,
@@ -169,12 +178,15 @@ def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:
         node.visible = visible
 
 
-def _glossy(corners: FloatArray, faces: Faces, opacity: float) -> bytes:
-    """Return a GLB file of a shape that mirrors and is translucent."""
-    return kept(lambda: _exported(corners, faces, opacity), corners, faces, str(opacity))
+def _glossy(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes:
+    """Return a GLB file of a shape that mirrors and is translucent.
+
+    look: red, green and blue (0 to 255, sRGB), and the opacity (0 to 1).
+    """
+    return kept(lambda: _exported(corners, faces, look), corners, faces, str(look))
 
 
-def _exported(corners: FloatArray, faces: Faces, opacity: float) -> bytes:
+def _exported(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes:
     import trimesh
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
@@ -183,7 +195,8 @@ def _exported(corners: FloatArray, faces: Faces, opacity: float) -> bytes:
     pbr: Any = PBRMaterial
     textured: Any = TextureVisuals
     material = pbr(
-        baseColorFactor=[*LIGHT, round(255 * opacity)],
+        # glTF has linear colours.
+        baseColorFactor=[*to_light(np.divide(look[:3], 255.0)), look[3]],
         metallicFactor=0.0,
         roughnessFactor=ROUGH,
         alphaMode="BLEND",
