@@ -7,15 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.errors import InputError
+from katana450.extensions.programs import runner
 from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
 from katana450.maths.geometry import se3, so3
-from tests.programs.conftest import Stage
+from katana450.maths.planning.plan import MARGIN
+from tests.programs.conftest import TICK, Stage
 
 NEAR, AT = (240.0, 90.0), (230.0, -120.0)
 """[mm] Places on the table that the arm reaches from above."""
@@ -127,7 +130,7 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
     ("steps", "message"),
     [
         ("- pick: box\n", "no object 'box'. Known objects: part, low, far"),
-        ("- pick: low\n", "low cannot be grasped.* and table would touch first"),
+        ("- pick: low\n", "low is 10.0 mm high, and the minimum is 12 mm"),
         ("- pick: far\n", r"far cannot be grasped at its place: The tool grasp cannot be at"),
         ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
         ("- release\n", "The hand holds nothing to release"),
@@ -162,12 +165,65 @@ def test_what_cannot_be_done_is_refused_with_its_reason(
 ) -> None:
     objects = (
         box("part", NEAR, yaw=60.0),
-        box("low", (170.0, 190.0), (40.0, 40.0, 15.0)),
+        box("low", (170.0, 190.0), (40.0, 40.0, 10.0)),
         box("far", (550.0, -100.0)),
         replace(box("ball", (100.0, -250.0), (20.0,), shape=Shape.SPHERE), can_be_held=False),
     )
     with pytest.raises(InputError, match=message):
         planned(stage, steps, *objects)
+
+
+@pytest.mark.parametrize(
+    ("side", "size"),
+    [
+        ("above", (40.0, 40.0, 12.0)),
+        pytest.param("above", (20.0, 60.0, 30.0), marks=pytest.mark.long),
+        pytest.param("front", (40.0, 40.0, 12.0), marks=pytest.mark.long),
+    ],
+)
+def test_low_object_is_held_by_the_fingertips(
+    stage: Stage, side: str, size: tuple[float, ...]
+) -> None:
+    """The tips keep their distance from the table, and cover a part of the object's sides."""
+    at, to = (NEAR, AT) if side == "above" else ((340.0, 0.0), (300.0, -120.0))
+    steps = (
+        f"- pick: {{object: plate, side: {side}}}\n- place: {{at: {{x: {to[0]}, y: {to[1]}}}}}\n"
+    )
+    program, start = planned(stage, steps, box("plate", at, size))
+    run, states = stage.play(program, start)
+    assert run.phase is Phase.DONE
+    assert not any(state.findings for state in states)
+    assert place(states[-1].objects[0]) == pytest.approx([*to, 0.0], abs=1e-6)
+    held = next(state for state in states if state.grip is not None)
+    world, hand = stage.session.world_at(held), stage.session.environment.hand
+    assert world is not None
+    assert hand is not None
+    for finger in hand.fingers:
+        assert MARGIN <= world.gap(held.x_setpoint, finger, "table") <= 1e-3 * (size[2] - 4.0)
+
+
+@pytest.mark.parametrize("checked", [False, True])
+def test_run_fails_if_the_fingers_close_on_nothing(stage: Stage, checked: bool) -> None:
+    """Somebody takes the object away while the arm approaches it."""
+    steps = "- grasp: part\n" + "- if: {held: part, then: [home]}\n" * checked
+    program, state = planned(stage, steps, box("part", NEAR))
+    away = box("part", (-200.0, 250.0))
+    run, last = Run(state.t), ""
+    while run.phase is Phase.RUNNING and state.t < 60.0:
+        name = program.tasks[run.number].name
+        run, commands = runner.step(program, run, state, state.t)
+        if name != last == "grasp part":
+            commands = (cmd.PlaceObject(away), *commands)
+        last = name
+        state = stage.session.step(state, commands, state.t + TICK)
+        state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
+    if checked:
+        assert (run.phase, run.choices) == (Phase.DONE, ((1, False),))
+        return
+    assert run.phase is Phase.FAILED
+    assert run.why.startswith("Line 3, grasp part: close: The fingers have closed on nothing")
+    assert "instead of part, which is not where it was when the script was planned" in run.why
+    assert not state.moving
 
 
 def test_object_held_from_the_front_is_not_turned(stage: Stage) -> None:

@@ -70,19 +70,35 @@ class FollowPlan:
 
 @dataclass(frozen=True)
 class MoveFingers:
-    """Drive the fingers to ``angle`` [rad]."""
+    """Drive the fingers to ``angle`` [rad].
+
+    ``holding``: name of the object that they must hold then; "" if they may be empty.
+    """
 
     angle: float
+    holding: str = ""
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command that sets the finger angle."""
         return (cmd.SetGripper(self.angle),)
 
     def done(self, state: State, waited: float) -> bool:
-        """Return whether the fingers are at their goal. Raises InputError after ACTION_TIMEOUT."""
+        """Return whether the fingers are at their goal.
+
+        Raises InputError after ACTION_TIMEOUT, or if they do not hold what they must.
+        """
         if waited > ACTION_TIMEOUT:
             raise InputError(f"The fingers did not reach their goal within {ACTION_TIMEOUT:g} s.")
-        return state.gripper_setpoint == state.gripper_goal
+        if state.gripper_setpoint != state.gripper_goal:
+            return False
+        held = "nothing" if state.held is None else state.held.name
+        if self.holding and held != self.holding:
+            raise InputError(
+                f"The fingers have closed on {held} instead of {self.holding}, which is not where "
+                "it was when the script was planned. Put it back, or run the script again to plan "
+                f"for its present place. `if: {{held: {self.holding}}}` lets a script react."
+            )
+        return True
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
         """Return 1 when the fingers are at their goal, else 0."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -17,12 +18,15 @@ from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, UseTool
 from katana450.extensions.programs.carry import APPROACHES, before
+from katana450.extensions.programs.conditions import Held
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.located_step import Conditional
 from katana450.extensions.programs.plan_builder import Approach, GraspInfo, PlanBuilder
 from katana450.extensions.programs.reaching import reaching
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
+from katana450.maths.collision.contact import Contact
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.turns import wrapped
 from katana450.maths.planning.curve import ToolLine
@@ -47,11 +51,24 @@ HEIGHT_FRACTIONS = {FRONT: (0.78, 0.95), ABOVE: (0.5, 0.7, 0.9, 1.05, 1.2)}
 the palm has room over the table only above the middle of the object.
 """
 
+LOW = 0.045
+"""[m] Height below which an object is also grasped by the fingertips."""
+
+MIN_HEIGHT = 0.012
+"""[m] Minimum height of an object: the tips stay MARGIN over what it stands on, at most a step of
+TIP_DISTANCES more, and cover at least 4 mm of it.
+"""
+
+TIP_DISTANCES = tuple(np.arange(0.014, 0.056, 0.002).tolist())
+"""[m] Distances between the tool frame and the middle of an object that is grasped by the tips,
+tried from the smallest. The tips move down as the fingers close.
+"""
+
 MAX_SKEW = math.radians(15.0)
 """[rad] Maximum angle between the fingers and the sides of a box: the pads yield by as much."""
 
-MIN_DISTANCE, MAX_DISTANCE, DISTANCE_STEP = 0.0, 0.03, 0.002
-"""[m] Minimum, maximum and step of the distance between the tool frame and the object's axis."""
+MAX_DISTANCE, DISTANCE_STEP = 0.03, 0.002
+"""[m] Maximum and step of what the palm adds to the distance between tool frame and object."""
 
 PALM_CLEARANCE = MARGIN + 5e-4
 """[m] Minimum distance between the palm and the grasped object."""
@@ -59,6 +76,18 @@ PALM_CLEARANCE = MARGIN + 5e-4
 
 JOINT_ROOM = math.radians(2.0)
 """[rad] Distance to the joint limits that a grasp keeps, if one of its pitches can."""
+
+
+class Grip(NamedTuple):
+    """The place of a grasp on an object.
+
+    Attributes:
+        height: over the underside of the object [m].
+        distance: between the tool frame and the axis of the object there [m], at least.
+    """
+
+    height: float
+    distance: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -102,6 +131,12 @@ class Grasp:
                 f"{self.name} cannot be held by the fingers. Set its `can_be_held` to true if they "
                 "may take it."
             )
+        if self.height is None and scene_object.height < MIN_HEIGHT:
+            raise InputError(
+                f"{self.name} is {1e3 * scene_object.height:.1f} mm high, and the minimum is "
+                f"{1e3 * MIN_HEIGHT:.0f} mm: the fingertips stay {1e3 * MARGIN:.0f} mm over what "
+                "an object stands on."
+            )
         if builder.state.tool != "grasp":
             builder.plan_context.arm.chain_to("grasp")
             builder.note("tool grasp", UseTool("grasp"), replace(builder.state, tool="grasp"))
@@ -138,19 +173,22 @@ class Grasp:
             reaching(
                 builder.chain,
                 builder.q,
-                before(_point(builder, scene_object, height), approach, 0.0),
+                before(_point(builder, scene_object, each.height), approach, each.distance),
                 None,
             )
             is not None
-            for height in self._heights(scene_object, approach)
+            for each in self._grips(scene_object, approach)
         )
 
-    def _heights(self, scene_object: SceneObject, approach: Approach) -> list[float]:
-        """Return the heights [m] of the grasp over the underside of the object, the best first."""
+    def _grips(self, scene_object: SceneObject, approach: Approach) -> list[Grip]:
+        """Return the places of the grasp on the object, the best first."""
         if self.height is not None:
-            return [self.height]
+            return [Grip(self.height)]
         fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
-        return [fraction * scene_object.height for fraction in fractions]
+        found = [Grip(fraction * scene_object.height) for fraction in fractions]
+        if scene_object.height < LOW:
+            found += [Grip(0.5 * scene_object.height, each) for each in TIP_DISTANCES]
+        return found
 
     def _plan(
         self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, room: float
@@ -160,8 +198,8 @@ class Grasp:
         Raises InputError if it is not possible.
         """
         builder.first(
-            self._heights(scene_object, approach),
-            lambda height: self._plan_at(builder, scene_object, approach, height, room),
+            self._grips(scene_object, approach),
+            lambda grip: self._plan_at(builder, scene_object, approach, grip, room),
         )
 
     def _plan_at(
@@ -169,12 +207,14 @@ class Grasp:
         builder: PlanBuilder,
         scene_object: SceneObject,
         approach: Approach,
-        height: float,
+        grip: Grip,
         room: float,
     ) -> None:
-        """Plan the grasp at ``height`` [m] over the underside of the object."""
-        point = _point(builder, scene_object, height)
-        distance, q = _smallest_distance(builder, point, approach)
+        """Plan the grasp at ``grip``. Raises InputError if it is not possible."""
+        point = _point(builder, scene_object, grip.height)
+        distance, q = _smallest_distance(builder, point, approach, grip.distance)
+        # Before the way there, whose planning takes longer.
+        self._closed(builder, q)
 
         def start_at(away: float) -> FloatArray:
             start = builder.joints_of(before(point, approach, distance + away))
@@ -189,13 +229,38 @@ class Grasp:
         builder.lead([ToolLine(builder.at, goal)], f"grasp {self.name}")
         if float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
             raise InputError("the straight path to it ends in another posture than planned.")
-        closed = builder.plan_context.arm.gripper.lower
-        held = builder.after(cmd.SetGripper(closed))
-        if held.grip is None:
-            raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
-        builder.note(f"grasp {self.name}: close", MoveFingers(closed), held)
+        closed, held = builder.plan_context.arm.gripper.lower, self._closed(builder, builder.q)
+        holding = "" if self._checked_later(builder.ahead) else self.name
+        builder.note(f"grasp {self.name}: close", MoveFingers(closed, holding), held)
         chosen = approach if self.pitch is None else None
         builder.taken = GraspInfo(builder.at, chosen, scene_object)
+
+    def _closed(self, builder: PlanBuilder, q: FloatArray) -> State:
+        """Return the state at ``q`` (5,) [rad] in which the closed fingers hold the object.
+
+        Raises InputError if they do not, or are so near to something that they could not leave.
+        """
+        now = builder.state
+        builder.state = builder.standing(q)
+        held = builder.after(cmd.SetGripper(builder.plan_context.arm.gripper.lower))
+        builder.state = now
+        if held.grip is None:
+            raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
+        others = tuple(each for each in held.objects if each.name != self.name)
+        world = builder.plan_context.session.world_at(replace(held, objects=others))
+        nearest = None if world is None else world.nearest(held.x_setpoint)
+        if nearest is not None and nearest.distance < MARGIN:
+            raise InputError(_too_near(nearest, MARGIN))
+        return held
+
+    def _checked_later(self, ahead: Sequence[object]) -> bool:
+        """Return whether an ``if`` of ``ahead`` asks whether the object is held, before a grasp."""
+        for step in ahead:
+            if isinstance(step, Conditional) and step.condition == Held(self.name):
+                return True
+            if isinstance(step, Grasp):
+                return False
+        return False
 
 
 def approaches(builder: PlanBuilder, scene_object: SceneObject) -> dict[str, tuple[Approach, ...]]:
@@ -207,7 +272,9 @@ def approaches(builder: PlanBuilder, scene_object: SceneObject) -> dict[str, tup
     """
     if scene_object.name == CUP:
         return {FRONT: tuple(map(Approach, PITCHES))}
-    front = tuple(map(Approach, (*PITCHES, *STEEP_PITCHES)))
+    # Only steep fingertips come near what a low object stands on.
+    low = scene_object.height < LOW
+    front = tuple(map(Approach, STEEP_PITCHES[::-1] if low else (*PITCHES, *STEEP_PITCHES)))
     if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
         return {FRONT: front, ABOVE: (Approach(DOWN),)}
     x, y, _ = builder.point(scene_object.T[:3, 3], in_base=True)
@@ -239,6 +306,15 @@ def _why_not_held(state: State) -> str:
     return "they close without touching it"
 
 
+def _too_near(nearest: Contact, minimum: float) -> str:
+    """Return that two bodies would be nearer than ``minimum`` [m]."""
+    one, other = map(part, nearest.parts)
+    return (
+        f"{one} and {other} would be {1e3 * nearest.distance:.1f} mm apart; the minimum is "
+        f"{1e3 * minimum:.1f} mm."
+    )
+
+
 def _no_approach(scene_object: SceneObject, side: str) -> str:
     """Return why no approach from ``side`` suits the object."""
     if scene_object.name == CUP:
@@ -250,26 +326,22 @@ def _no_approach(scene_object: SceneObject, side: str) -> str:
 
 
 def _smallest_distance(
-    builder: PlanBuilder, point: FloatArray, approach: Approach
+    builder: PlanBuilder, point: FloatArray, approach: Approach, least: float
 ) -> tuple[float, FloatArray]:
     """Return the smallest distance [m] of the tool before ``point`` at which the palm has room.
 
-    The second value is the joints (5,) [rad] at that distance.
+    It is at least ``least`` [m]. The second value is the joints (5,) [rad] at that distance.
     """
 
     def joints_with_room(distance: float) -> tuple[float, FloatArray]:
         q = builder.joints_of(before(point, approach, distance))
         nearest = None if world is None else world.nearest(np.append(q, fingers))
         if nearest is not None and nearest.distance < PALM_CLEARANCE:
-            one, other = map(part, nearest.parts)
-            raise InputError(
-                f"{one} and {other} would be {1e3 * nearest.distance:.1f} mm apart; the minimum is "
-                f"{1e3 * PALM_CLEARANCE:.1f} mm."
-            )
+            raise InputError(_too_near(nearest, PALM_CLEARANCE))
         return distance, q
 
     world, fingers = builder.world, builder.state.gripper_setpoint
-    distances = np.arange(MIN_DISTANCE, MAX_DISTANCE + DISTANCE_STEP, DISTANCE_STEP).tolist()
+    distances = (least + np.arange(0.0, MAX_DISTANCE + DISTANCE_STEP, DISTANCE_STEP)).tolist()
     return builder.first(distances, joints_with_room)
 
 
