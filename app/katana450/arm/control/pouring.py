@@ -22,15 +22,24 @@ ABSENT_BASIN_AT = (100.0, 0.0, 0.0)
 
 NO_VELOCITY: Vector = (0.0, 0.0, 0.0)
 
+FILM_STEP = 1.0
+"""[s] Time step of a film that drains in a cup at rest, because each step is published. The film
+differs by less than 0.5 % from that of short steps, and the sum of the volumes is exact.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class MotionWithWater:
-    """The water, the motion history of the cup, and position [m], velocity [m/s] of its middle."""
+    """The water, the motion history of the cup, and position [m], velocity [m/s] of its middle.
+
+    ``waited``: time [s] for which the film has still to drain, in a cup at rest.
+    """
 
     water: Water
     course: Course
     middle: Vector
     velocity: Vector = NO_VELOCITY
+    waited: float = 0.0
 
     @property
     def still(self) -> bool:
@@ -47,8 +56,7 @@ class Pouring:
 
         The objects of a scene give the place of the basin.
         """
-        self._water_environment = water_environment
-        self._environment = environment
+        self._water_environment, self._environment = water_environment, environment
         # Cache for the present place of the basin.
         self._cache: tuple[SceneObject | None, WaterFlow] | None = None
 
@@ -74,31 +82,34 @@ class Pouring:
     ) -> MotionWithWater | None:
         """Return the water after ``dt`` [s], with the arm now at ``x`` (k,) [rad].
 
-        Returns ``poured`` itself while cup and water are at rest; None if there is no cup.
+        Returns ``poured`` itself while cup and water are at rest; None if there is no cup. The
+        film in a cup at rest drains in steps of FILM_STEP; in between, the water stays the same.
         """
-        T = self._pose(objects, x)
-        if T is None:
+        cup = named(objects, CUP)
+        if cup is None:
             return None
+        T = self._environment.pose(cup, x)
         at_rest = bool((poured.water.T_base_cup == T).all())
         flow, middle = self._flow(objects), self._middle(T)
         still = at_rest and poured.still and poured.velocity == NO_VELOCITY
         if dt <= 0.0 or (still and flow.film_rests(poured.water)):
             return poured
-        if not at_rest and not _object(objects, CUP).carried:
+        water = poured.water
+        if still and poured.waited + dt < FILM_STEP and flow.margin_to_rim(water) > 0.0:
+            return replace(poured, waited=poured.waited + dt)
+        if poured.waited:
+            water = flow.step(water, water.T_base_cup, NO_VELOCITY, poured.waited)
+        if not at_rest and not cup.carried:
             # The cup was moved by a command, which does not accelerate the water.
-            moved = flow.step(poured.water, T, NO_VELOCITY, 0.0)
-            return replace(poured, water=moved, middle=middle, velocity=NO_VELOCITY)
+            moved = flow.step(water, T, NO_VELOCITY, 0.0)
+            return MotionWithWater(moved, poured.course, middle)
         velocity = scale(1.0 / dt, sub(middle, poured.middle))
         # The velocities are those in the middle of this step and of the one before, which is
         # shorter or longer where a STOP or a late tick came between.
         between = 0.5 * (dt + (poured.course.step or dt))
         acceleration = scale(1.0 / between, sub(velocity, poured.velocity))
-        return MotionWithWater(
-            flow.step(poured.water, T, acceleration, dt),
-            poured.course.after(acceleration, dt),
-            middle,
-            velocity,
-        )
+        water = flow.step(water, T, acceleration, dt)
+        return MotionWithWater(water, poured.course.after(acceleration, dt), middle, velocity)
 
     def margin_to_rim(self, poured: MotionWithWater, objects: Sequence[SceneObject]) -> float:
         """Return the height [m] of the lip over the surface; negative while water flows over it."""
@@ -125,7 +136,3 @@ class Pouring:
     def _middle(self, T: FloatArray) -> Vector:
         cup = self._water_environment.cup
         return vector(T[:3, 3] + (cup.floor + 0.5 * cup.inside.depth) * T[:3, 2])
-
-
-def _object(objects: Sequence[SceneObject], name: str) -> SceneObject:
-    return next(each for each in objects if each.name == name)

@@ -230,6 +230,7 @@ def _differs(a: State, b: State) -> bool:
         or a.mode is not b.mode
         or a.findings != b.findings
         or a.objects is not b.objects
-        or a.poured is not b.poured
+        # Not by the time for which a film has still to drain.
+        or (a.poured and a.poured.water) is not (b.poured and b.poured.water)
         or a.appearance is not b.appearance
     )
