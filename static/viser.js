@@ -12,6 +12,8 @@ const Viser = (() => {
   const PANEL_HANDLE = `${PANEL} [style*="height: 3.5em"]`;
   const PANEL_CONTENT = `${PANEL} [style*="width: 20em"]`;
   const PANEL_GROUND = "var(--mantine-color-body)";
+  // The tabs of the panel, and their row.
+  const [TAB, TABS] = ["[role=tab]", "[role=tablist]"];
   // The hint of a control, which lies over other ones.
   const HINT = "[role=tooltip]";
   // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
@@ -196,7 +198,7 @@ const Viser = (() => {
   }
 
   return {
-    PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, HINT, STEADY,
+    PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
     keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, thumbnail,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,

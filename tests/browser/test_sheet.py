@@ -159,6 +159,54 @@ def test_keys_and_screen_readers_change_the_height(phone: ViserPage, server: App
 
 
 @pytest.mark.long
+def test_swipe_and_arrow_keys_change_the_tab(phone: ViserPage, artefacts: Path) -> None:
+    def chosen() -> str:
+        return phone.frame.locator("[role=tab][aria-selected=true]").inner_text()
+
+    def swipe(start: Locator, by: float, drop: float = 0.0) -> None:
+        with fingers(phone.page) as hand:
+            x, y = middle(start)
+            hand.put((x, y))
+            hand.move((x + by, y + drop), seconds=0.15)
+            hand.lift()
+        phone.page.wait_for_timeout(200)
+
+    # Tabs that cannot be seen do not change.
+    swipe(handle(phone), -120.0)
+    wait_state(phone, "folded")
+    handle(phone).tap()
+    wait_state(phone, "half height")
+    assert chosen() == "Drive"
+    tabs = phone.frame.get_by_role("tablist")
+    for start, by, drop, tab in (
+        (handle(phone), -120.0, 20.0, "Programs"),
+        (tabs, -120.0, 10.0, "Scene"),
+        # There is no tab beyond the last.
+        (handle(phone), -120.0, 0.0, "Scene"),
+        (tabs, 120.0, 0.0, "Programs"),
+        # A short movement is a mistake, and one that is mostly downwards means the height.
+        (handle(phone), 20.0, 0.0, "Programs"),
+        (tabs, 30.0, -80.0, "Programs"),
+    ):
+        swipe(start, by, drop)
+        assert chosen() == tab, (by, drop)
+        assert state(phone) == "Controls, half height"
+        phone.keep(artefacts / f"sheet-{tab.lower()}.png")
+    swipe(handle(phone), 30.0, -200.0)
+    wait_state(phone, "full height")
+    assert chosen() == "Programs"
+    handle(phone).focus()
+    for key, tab in (("ArrowLeft", "Drive"), ("ArrowLeft", "Drive"), ("ArrowRight", "Programs")):
+        phone.page.keyboard.press(key)
+        phone.wait_until(lambda tab=tab: chosen() == tab, tab)  # type: ignore[misc]
+    assert state(phone) == "Controls, full height"
+    # The tabs have keys of their own.
+    phone.frame.get_by_role("tab", name="Programs").focus()
+    phone.page.keyboard.press("ArrowRight")
+    phone.wait_until(lambda: chosen() == "Scene", "the next tab")
+
+
+@pytest.mark.long
 def test_one_sheet_is_open_at_a_time(phone: ViserPage, server: AppServer, artefacts: Path) -> None:
     truth = Truth(server)
     jog = phone.page.locator("#jog")
