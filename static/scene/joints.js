@@ -266,7 +266,8 @@ export class Joints {
   }
 
   #link(joint) {
-    return this.#scene.contentWindow.katanaScene.node(`/arm/${this.arm.links[joint].path.join("/")}`);
+    const path = this.arm.links[joint].path.map(encodeURIComponent).join("/");
+    return this.#scene.contentWindow.katanaScene.node(`/arm/${path}`);
   }
 
   #words(joint, value) {

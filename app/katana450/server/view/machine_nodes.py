@@ -12,7 +12,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import VisualMesh
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.view.scene import add_shape
+from katana450.server.view.scene import add_shape, node_name
 from katana450.server.viser_bridge.posing import place, turn
 
 WORTH_SENDING = 1e-7
@@ -33,10 +33,10 @@ class MachineNodes:
         self._jointed: list[tuple[Joint, FloatArray, viser.FrameHandle]] = []
         self._sent: dict[str, float] = {}
         self._surfaces = {link.name: link.shapes for link in robot.links}
-        for number, link in enumerate(robot.links):
-            above = "" if link.parent is None else self.path[link.parent]
-            # The name of a link may contain the separator of paths.
-            path = self.path[link.name] = f"{above}/link{number}"
+        root = server.scene.add_frame("/arm", show_axes=False).name
+        for link in robot.links:
+            above = root if link.parent is None else self.path[link.parent]
+            path = self.path[link.name] = f"{above}/{node_name(link.name)}"
             T = link.T_parent_link
             frame = server.scene.add_frame(
                 path, show_axes=False, wxyz=so3.to_quaternion(T[:3, :3]), position=T[:3, 3]

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,15 @@ ANGLE_WORTH_SENDING = 1e-7
 
 GAP_WORTH_SEEING = 1e-3
 """Smallest distance [m] between target and goal that is drawn."""
+
+
+def node_name(link: str) -> str:
+    """Return the last part of the path of the node of ``link``.
+
+    A link's name may contain the separator of paths. The page finds the node of a link by the same
+    rule, which is that of ``encodeURIComponent`` (``static/scene/joints.js``).
+    """
+    return quote(link, safe="!~*'()")
 
 
 @dataclass
@@ -94,7 +104,7 @@ class FrameTree:
         self._joints: list[_Jointed | _Sliding] = []
         for link in robot.links:
             parent = root if link.parent is None else self.path[link.parent]
-            self.path[link.name] = f"{parent}/{link.name}"
+            self.path[link.name] = f"{parent}/{node_name(link.name)}"
             R, position, joint = link.T_parent_link[:3, :3], link.T_parent_link[:3, 3], link.joint
             straight = so3.to_quaternion(R)
             frame = server.scene.add_frame(
