@@ -13,6 +13,8 @@
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
+  // What Space types into: text, but neither a number nor the search in a list, which keeps the focus after a choice.
+  const TEXT = "textarea, input:is(:not([type]), [type=text]):not([readonly], [inputmode], [aria-haspopup])";
 
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
@@ -106,9 +108,9 @@
   });
   stopButton.addEventListener("click", (event) => event.detail === 0 && stop());
 
-  // Called for keys in both documents. Space and Esc only stop the arm, whatever has the focus.
+  // Called for keys in both documents. Space, except in a text, and Esc only stop the arm, whatever has the focus.
   function key(event) {
-    const ends = (event.key === " " && !mayType(event.target)) || event.key === "Escape";
+    const ends = (event.key === " " && !event.target?.matches?.(TEXT)) || event.key === "Escape";
     // Also in a text box, to which the focus may have moved.
     if (event.type === "keyup") Jog.release(event.code);
     if (ends && event.type === "keydown" && !event.repeat) stop();
@@ -122,11 +124,6 @@
     } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event))) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-  }
-
-  // Whether a blank is typed: in a box for texts with blanks, while the arm is known to be at rest.
-  function mayType(target) {
-    return up && silent < QUIET && ["ok", "stopped"].includes(status?.mood) && target?.matches?.("[data-typed]");
   }
 
   // Whether this window may take the detour that the arm offers.
@@ -170,6 +167,13 @@
     if (element.textContent !== words) element.textContent = words;
   };
 
+  // The last words of a headline, its `end`, are never cut.
+  function head(words, end = "") {
+    const [name, kept] = byId("headline").children;
+    const cut = [words.slice(0, words.length - end.length).trimEnd(), end];
+    [name, kept].forEach((each, i) => each.textContent !== cut[i] && (each.textContent = cut[i]));
+  }
+
   function act(label, request, main) {
     const button = document.createElement("button");
     button.type = "button";
@@ -209,8 +213,8 @@
 
   function handOver(others) {
     const list = document.createElement("select");
-    list.setAttribute("aria-label", "Hand over to");
-    list.add(new Option("Hand over to …", ""));
+    list.setAttribute("aria-label", "Give to");
+    list.add(new Option("Give to …", ""));
     for (const { number, name } of others) list.add(new Option(name, number));
     // On a closed list, a key changes the choice at once; it is sent by Enter.
     let byKeys = false;
@@ -243,8 +247,10 @@
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : status.mood;
     body.style.setProperty("--done", status.fraction);
-    const since = status.paused_at ? `, ${time(status.paused_at, { timeStyle: "short" })}` : "";
-    text("headline", proven ? "Stopped" : status.headline + since);
+    const since = status.paused_at ? time(status.paused_at, { timeStyle: "short" }) : "";
+    if (proven) head("Stopped");
+    else if (since) head(`${status.headline}, ${since}`, since);
+    else head(status.headline, status.end);
     const at = status.stopped_at ? `${time(status.stopped_at)}:` : "";
     const cause = status.stopped ? [at, status.stopped] : [proven];
     text("why", [status.taken, status.why, ...cause, status.until].filter(Boolean).join(" "));
@@ -289,7 +295,7 @@
     body.dataset.mood = proven ? "stopped" : "starting";
     byId("go").hidden = true;
     Pace.draw(null);
-    text("headline", proven ? "Stopped" : "No connection");
+    head(proven ? "Stopped" : "No connection");
     text("why", proven ?? "");
   }
 
@@ -363,6 +369,8 @@
 
   // The rest of the bar
 
+  // What is cut there is whole in a message.
+  byId("mode").addEventListener("click", () => toast(byId("mode").innerText.replaceAll("\n", " ")));
   byId("go").addEventListener("click", () => say({ do: "go" }));
   byId("clear-stop").addEventListener("click", () => say({ do: "clear_stop" }));
   // Below the bar and not modal, so that mouse and finger can press STOP.

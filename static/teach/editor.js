@@ -8,7 +8,7 @@ export class Editor {
   element = html("div", { id: "teach-editor" });
   #area = html("textarea", {
     id: "teach-text", "aria-label": "Text of the script", "aria-describedby": "teach-problems", spellcheck: "false",
-    autocapitalize: "off", autocomplete: "off", wrap: "off", rows: "12", maxlength: "65536", "data-typed": "",
+    autocapitalize: "off", autocomplete: "off", wrap: "off", rows: "12", maxlength: "65536",
   });
   #numbers = html("pre", { "aria-hidden": "true" });
   #problems = html("ol", { id: "teach-problems", role: "status" });

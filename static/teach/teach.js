@@ -41,7 +41,7 @@ export class Teach {
   #undo = button("↶", () => this.#content.undo(), { "aria-label": "Undo in Teach", title: "Undo in Teach" });
   #redo = button("↷", () => this.#content.redo(), { "aria-label": "Redo in Teach", title: "Redo in Teach" });
   #times = html("input", { type: "number", min: "1", max: MAX_TIMES, step: "1", inputmode: "numeric" });
-  #name = html("input", { maxlength: "40", spellcheck: "false", autocomplete: "off", "data-typed": "" });
+  #name = html("input", { maxlength: "40", spellcheck: "false", autocomplete: "off" });
   #open = html("select", { "aria-label": "Open a script" });
   #file = html("input", { type: "file", accept: ".yaml,.yml", "aria-label": "File of a script", hidden: "" });
   #keep = button("Save", () => this.#save(), { hidden: "", title: "Save in the folder of the server" });
@@ -293,7 +293,7 @@ export class Teach {
     if (!this.#isText) {
       this.#editor.text = scriptOf(this.#content.now).text;
       this.#content.change({ text: this.#editor.text });
-      this.#say("Space types a blank while the arm rests, and stops it otherwise.");
+      this.#say("Space types a blank in the text; Esc stops the arm.");
       return this.#editor.focus();
     }
     const found = await this.#editor.check();

@@ -88,8 +88,8 @@ def take(page: ViserPage) -> None:
 
 
 def bar(page: ViserPage, part: str) -> str:
-    """Return the text of a part of the bar."""
-    return page.page.inner_text(f"#{part}")
+    """Return the text of a part of the bar, in one line."""
+    return page.page.inner_text(f"#{part}").replace("\n", " ")
 
 
 def go_home(page: ViserPage, truth: Truth) -> None:

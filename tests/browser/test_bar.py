@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ from playwright.sync_api import Page
 
 from katana450.arm.control.lease import Role
 from katana450.client import connect
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.resources import STATIC
 from katana450.server.api import requests
 from katana450.server.web import static_files
@@ -30,11 +32,35 @@ from tests.browser.sizes import (
     WIDE,
     in_sizes_and_schemes,
 )
+from tests.gateway.test_programs import wait
 
 SIZES = {"phone": (390, 844), "tablet": (820, 1180), "desk": (1440, 900)}
 
 ROOM = {WIDE: 240, (1280, 800): 240, (820, 1180): 240, PORTRAIT: 180, LANDSCAPE: 180}
 """Sizes of the window, and the minimum width of the reason of a stop in the bar [px]."""
+
+LONG_NAME = """\
+name: A program with a long name, in all of 40
+steps:
+  - wait_for: {held: cup, timeout: 300}
+  - repeat: {times: 6, steps: [{wait: 60}]}
+"""
+"""Script whose name and first step do not fit into the bar."""
+
+STATE_LINE = """() => {
+    const [name, end] = document.getElementById("headline").children;
+    const [line, part] = ["mode", "headline"].map((id) => document.getElementById(id));
+    const box = end.getBoundingClientRect();
+    const around = [line, part, document.body].map((each) => each.getBoundingClientRect());
+    return {
+        cut: name.scrollWidth > name.clientWidth,
+        inside: box.width > 0 && end.scrollWidth <= end.clientWidth + 1 && around.every((each) =>
+            box.left >= each.left - 0.5 && box.right <= each.right + 0.5
+                && box.top >= each.top - 0.5 && box.bottom <= each.bottom + 0.5),
+        header: document.querySelector("header").offsetHeight,
+    };
+}"""
+"""Script that returns whether the name in the state line is cut, and its end is not."""
 
 AA = 4.5
 """Minimum contrast of a text to its background (WCAG 2.2, 1.4.3)."""
@@ -156,6 +182,52 @@ def test_bar_keeps_its_height_and_the_reason_its_room(
         clear_stop(page, truth)
     assert len(heights) == 1, heights
     assert page.errors == []
+
+
+@pytest.mark.parametrize(
+    ("size", "scheme"),
+    [
+        (WIDE, "light"),
+        pytest.param((1280, 800), "dark", marks=pytest.mark.long),
+        (PORTRAIT, "dark"),
+        pytest.param(LANDSCAPE, "light", marks=pytest.mark.long),
+    ],
+)
+def test_long_name_of_a_program_leaves_its_step_and_time(
+    window: ViserPage,
+    sized: Page,
+    server: AppServer,
+    artefacts: Path,
+    size: tuple[int, int],
+    scheme: str,
+) -> None:
+    sized.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+    sized.set_viewport_size({"width": size[0], "height": size[1]})
+    if bar(window, "holder") == "You drive":
+        window.press_in_bar("Release")
+        window.wait_until(lambda: bar(window, "holder") == "Nobody drives", "the release")
+    with connect(server.url, "An arm driver with a long name") as arm:
+        arm.ask(Program(text=LONG_NAME))
+        wait(arm, lambda each: each.status == "ready")
+        height = sized.evaluate("document.querySelector('header').offsetHeight")
+        arm.ask(Steer(order=ProgramOrder.RUN))
+        ends = (r"step 1 of \d, \d min \d+ s left", r"\d+:\d+( [AP]M)?")
+        for order, end in zip((None, ProgramOrder.PAUSE), ends, strict=True):
+            if order is not None:
+                arm.ask(Steer(order=order))
+            shown = re.compile(f"{end}$")
+            window.wait_until(lambda shown=shown: shown.search(bar(window, "headline")), end)  # type: ignore[misc]
+            found = sized.evaluate(STATE_LINE)
+            assert found["inside"], (found, end)
+            assert found["header"] == height
+            # What is cut is in a message.
+            sized.click("#mode")
+            window.wait_until(lambda: "with a long name" in bar(window, "toast"), "the whole line")
+            window.keep(artefacts / f"state-line-{size[0]}-{scheme}-{order or 'running'}.png")
+            if order is None:
+                assert found["cut"]
+        arm.ask(Steer(order=ProgramOrder.END))
+        arm.ask(requests.Resume())
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -14,6 +14,7 @@ from katana450.server.api import answers
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.session import bar
 
 pytestmark = pytest.mark.long
 
@@ -42,7 +43,7 @@ def arm(server: AppServer) -> Iterator[Client]:
 
 
 def headline(page: ViserPage) -> str:
-    return page.page.inner_text("#headline")
+    return bar(page, "headline")
 
 
 def orders(page: ViserPage) -> list[str]:

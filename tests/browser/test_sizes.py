@@ -39,6 +39,26 @@ PRESSABLE = """() => Object.fromEntries(
         .map(([name, { x, y, width, height }]) => [name, [x, y, width, height]]))"""
 """Script that returns position and size of all buttons of our page [px]."""
 
+CUT = """() => {
+    const list = document.querySelector("#acts select");
+    const style = getComputedStyle(list);
+    const pen = document.createElement("canvas").getContext("2d");
+    pen.font = style.font;
+    const words = list.selectedOptions[0].text;
+    const room = list.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight);
+    const cut = (each) => each.scrollWidth > each.clientWidth;
+    const driver = document.createRange();
+    driver.selectNodeContents(document.getElementById("holder"));
+    const { right } = document.querySelector("#who p").getBoundingClientRect();
+    return {
+        words,
+        list: pen.measureText(words).width > room + 0.5,
+        button: cut(document.querySelector("#acts button")),
+        driver: driver.getBoundingClientRect().right > right + 0.5,
+    };
+}"""
+"""Script that returns which words of the driver's row are cut."""
+
 LEAST_CONTRAST = 3.0
 """Minimum contrast of a lamp to its background (WCAG 2.2, 1.4.11)."""
 
@@ -211,12 +231,18 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
 
 
 @pytest.mark.long
-def test_buttons_of_the_lease_fit_on_a_phone(server: AppServer, open_page: OpenPage) -> None:
-    page = open_page(server.url, nodes=("/arm",), window=PORTRAIT, **PHONE)
+@pytest.mark.parametrize(("size", "scheme"), [(PORTRAIT, "light"), (LANDSCAPE, "dark")])
+def test_buttons_of_the_lease_fit_on_a_phone(
+    server: AppServer, open_page: OpenPage, size: tuple[int, int], scheme: str, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=size, color_scheme=scheme, **PHONE)
     with connect(server.url, "An arm driver with a long name") as other:
         take(page)
         page.wait_until(lambda: page.page.locator("#acts select").count(), "the other")
         assert overhang(page) <= 0.0
+        found = page.page.evaluate(CUT)
+        assert found == {"words": "Give to …", "list": False, "button": False, "driver": False}
+        page.keep(artefacts / f"lease-{size[0]}-{scheme}.png")
         other.ask(requests.Ask())
         page.wait_until(lambda: page.page.get_by_text("Refuse").count(), "the request")
         assert overhang(page) <= 0.0
@@ -263,7 +289,8 @@ def overhang(page: ViserPage) -> float:
         "() => Math.max(...[...document.querySelector('#acts').children]"
         ".map((each) => each.getBoundingClientRect().right))"
     )
-    return right - PORTRAIT[0]
+    assert page.page.viewport_size is not None
+    return right - page.page.viewport_size["width"]
 
 
 def in_view(page: ViserPage, text: str) -> bool:

@@ -45,7 +45,6 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     press(sheet, "Edit as text")
     area = page.locator("#teach-text")
     assert taught(parse(area.input_value())) is not None
-    # Blanks are typed while the arm rests.
     area.press("Control+End")
     area.type("  - wiat: 1\n")
     assert area.input_value().endswith("\n  - wiat: 1\n")
@@ -86,7 +85,9 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     assert page.locator("#teach-editor pre .bad").count() == 0
 
 
-def test_space_in_the_text_stops_a_moving_arm(sheet: ViserPage, truth: Truth) -> None:
+def test_space_is_typed_in_the_text_of_a_moving_arm_and_escape_stops_it(
+    sheet: ViserPage, truth: Truth, artefacts: Path
+) -> None:
     press(sheet, "Edit as text")
     area = sheet.page.locator("#teach-text")
     text = "name: Slow\nspeed: 0.05\nsteps:\n  - joints: [60, -68, 85, 8, 0]\n"
@@ -95,12 +96,63 @@ def test_space_in_the_text_stops_a_moving_arm(sheet: ViserPage, truth: Truth) ->
     area.focus()
     truth.wait(PLAYED, moving=True)
     sheet.wait_until(lambda: mood(sheet.page) == "program", "the bar")
+    sheet.page.keyboard.press("Control+End")
     sheet.page.keyboard.press("Space")
+    assert area.input_value() == f"{text} "
+    sheet.page.wait_for_timeout(200)
+    assert truth.status()["stopped"] is None
+    # The button says which key stops now.
+    key = "getComputedStyle(document.getElementById('stop'), '::after').content"
+    assert "Esc" in sheet.page.evaluate(key)
+    sheet.keep(artefacts / "teach-text-moving.png")
+    sheet.page.keyboard.press("Escape")
     truth.wait(mood="stopped")
-    assert area.input_value() == text
+    assert area.input_value() == f"{text} "
     sheet.wait_until(lambda: bar(sheet, "headline") == "Stopped", "the bar")
     sheet.page.wait_for_timeout(1200)
     clear_stop(sheet, truth)
+
+
+@pytest.mark.long
+def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth: Truth) -> None:
+    page = sheet.page
+
+    def stops(what: str) -> None:
+        """Press Space, which must stop the arm, and clear the stop."""
+        page.keyboard.press("Space")
+        truth.wait(mood="stopped")
+        page.wait_for_timeout(1200)
+        clear_stop(sheet, truth)
+        assert truth.status()["stopped"] is None, what
+
+    press(sheet, "Edit as text")
+    area = page.locator("#teach-text")
+    area.click()
+    # A press in the scene is the end of typing.
+    page.mouse.click(500.0, 250.0)
+    before = area.input_value()
+    stops("the scene")
+    assert area.input_value() == before
+    page.locator("#teach").get_by_label("Open a script").focus()
+    stops("a list of the page")
+    sheet.number_box("1 base turn").click()
+    stops("a number of the panel")
+    sheet.choose("Priority", sheet.chosen("Priority"))
+    stops("a list of the panel, which keeps the focus after a choice")
+    page.focus("#speed input")
+    stops("a slider")
+    page.focus("#jog-button")
+    stops("a button")
+    assert not page.locator("#jog").is_visible()
+    name = page.locator("#teach").get_by_label("Name", exact=True)
+    name.fill("")
+    name.type("Two words")
+    page.click("#more-button")
+    own = page.get_by_label("Your name")
+    own.fill("")
+    own.type("Anna B")
+    assert (name.input_value(), own.input_value()) == ("Two words", "Anna B")
+    assert truth.status()["stopped"] is None
 
 
 @pytest.mark.long
@@ -136,7 +188,6 @@ def test_script_is_saved_in_the_folder_and_listed(
     teach(sheet, truth, (20.0,))
     name = sheet.page.get_by_label("Name", exact=True)
     name.fill("")
-    # With a blank, which STOP leaves to this box while the arm rests.
     name.type("Two words")
     name.press("Enter")
     press(sheet, "Save")

@@ -20,11 +20,19 @@ log = logging.getLogger(__name__)
 
 
 class StatusLine(NamedTuple):
-    """The state line of the page: the colour of its lamp, a headline, and one sentence."""
+    """The state line of the page.
+
+    Attributes:
+        mood: the colour of its lamp.
+        headline: what moves or waits.
+        why: one sentence about it.
+        end: the end of the headline that is never cut, such as the time left.
+    """
 
     mood: str
     headline: str
     why: str
+    end: str = ""
 
 
 class Runner:

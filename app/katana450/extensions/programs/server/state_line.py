@@ -42,8 +42,9 @@ def _running(state: State, line: StatusLine, program: Progress) -> StatusLine:
     if state.paused:
         whys.append(f"{program.name}: {program.task}, {', '.join(about)}.")
         return line._replace(why=" ".join((*whys, line.why)).rstrip())
-    headline = f"{program.name}: {', '.join((program.task, *about))}"
-    return StatusLine(PROGRAM, headline, " ".join((*whys, line.why)).strip())
+    end = ", ".join(about)
+    headline = f"{program.name}: {program.task}, {end}"
+    return StatusLine(PROGRAM, headline, " ".join((*whys, line.why)).strip(), end)
 
 
 def _planning(state: State, line: StatusLine, program: Progress, *, waits: bool) -> StatusLine:
@@ -54,14 +55,14 @@ def _planning(state: State, line: StatusLine, program: Progress, *, waits: bool)
         about.append(f"Step {program.step} of {program.steps}: {program.task}.")
     if state.moving:
         return line._replace(why=" ".join((f"{headline}.", *about)))
-    headline += f" {100.0 * program.fraction:.0f} %"
+    end = f"{100.0 * program.fraction:.0f} %"
     if state.paused:
         about.insert(0, f"{line.headline}.")
     if waits:
         about.append("Then it waits for Resume." if state.paused else "Then it runs.")
     else:
         about.append("It does not start by itself.")
-    return StatusLine(PLANNING, headline, " ".join(about))
+    return StatusLine(PLANNING, f"{headline} {end}", " ".join(about), end)
 
 
 def duration(seconds: float) -> str:
