@@ -26,6 +26,7 @@ const Viser = (() => {
 
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const groups = new Map(); // labels of the rows of buttons, by id
+  const shown = new Map(); // whether the server shows a node, by name
   let page = null; // the page's worker
   const viewer = () => window.__viserMutable;
 
@@ -69,8 +70,10 @@ const Viser = (() => {
             groups.clear();
             connected();
           } else if (data?.type === BATCH && !data.ours) {
-            for (const { type, uuid, props } of data.messages)
+            for (const { type, uuid, props, name, visible } of data.messages) {
               if (type === "GuiButtonGroupMessage") groups.set(uuid, props.label);
+              if (type === "SetSceneNodeVisibilityMessage") shown.set(name, visible);
+            }
             hears(data.messages, this.#line);
           }
         });
@@ -95,6 +98,12 @@ const Viser = (() => {
   function press(label, value) {
     for (const [uuid, name] of groups)
       if (name === label) page.postMessage({ type: SEND, message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
+  }
+
+  // Show a node in this page, or show it as the server does.
+  function reveal(name, visible = shown.get(name) ?? false) {
+    const messages = [{ type: "SetSceneNodeVisibilityMessage", name, visible }];
+    page.dispatchEvent(new MessageEvent("message", { data: { type: BATCH, messages, ours: true } }));
   }
 
   // Return the server's last messages that place and turn the camera; each may be missing.
@@ -199,7 +208,7 @@ const Viser = (() => {
 
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
-    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, thumbnail,
+    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,
     // Return the three.js object of a node; "" is viser's world.

@@ -147,7 +147,7 @@ export class Stage {
     if (joint !== null) return this.#selection?.clear();
     if (!this.#selection) {
       const { Selection } = await import("../selection/selection.js");
-      this.#selection ??= new Selection(this.#stage, this.#scene, this.#page.say);
+      this.#selection ??= new Selection(this.#stage, this.#scene, this.#page);
     }
     this.#selection.pick(...pixel);
   }

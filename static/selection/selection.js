@@ -1,4 +1,5 @@
-// The selected object: a frame round it in the picture, with its name and a button to remove it.
+// The selected object: a frame round it in the picture, with its name and a button to remove it, and the
+// arrows that move it, in this window alone.
 import { html, write } from "../instruments/shape.js";
 
 const EVERY = 100; // ms between two updates of the frame
@@ -19,16 +20,16 @@ function corners({ shape, size, scale, T }) {
 
 export class Selection {
   #scene;
-  #say;
+  #page; // {say, status}
   #object = null;
   #timer = null;
   #name = html("b");
   #frame;
   #bar;
 
-  constructor(stage, scene, say) {
+  constructor(stage, scene, page) {
     this.#scene = scene;
-    this.#say = say;
+    this.#page = page;
     document.head.append(html("link", { rel: "stylesheet", href: STYLE }));
     const remove = html("button", { type: "button" }, "Remove ", html("kbd", {}, "Del"));
     const clear = html("button", { type: "button", "aria-label": "Deselect" }, "×");
@@ -54,7 +55,7 @@ export class Selection {
   // Remove the selected object. Return whether there is one.
   remove() {
     if (!this.#object) return false;
-    this.#say({ do: "remove", name: this.#object.name });
+    this.#page.say({ do: "remove", name: this.#object.name });
     this.#show(null);
     return true;
   }
@@ -70,11 +71,13 @@ export class Selection {
   }
 
   #show(object) {
+    if (this.#object && this.#object.name !== object?.name) this.#arrows(false);
     this.#object = object;
     clearInterval(this.#timer);
     this.#frame.hidden = !object;
     if (!object) return;
     write(this.#name, object.name);
+    this.#arrows(true);
     this.#place();
     let ticks = 0;
     this.#timer = setInterval(() => {
@@ -88,8 +91,17 @@ export class Selection {
     const name = this.#object?.name;
     const found = (await this.#objects()).find((each) => each.name === name && !each.held);
     if (this.#object?.name !== name) return;
-    if (found) this.#object = found;
-    else this.#show(null);
+    if (!found) return this.#show(null);
+    this.#object = found;
+    // viser hides them again after a lost connection.
+    this.#arrows(true);
+  }
+
+  // Show the arrows of the object, or show them as the server does. What the arm carries has none.
+  #arrows(own) {
+    const { name, held, fixed } = this.#object;
+    const mine = own && !held && !fixed && this.#page.status()?.role !== "viewer";
+    this.#scene.contentWindow.katanaScene?.reveal(`/handles/${encodeURIComponent(name)}`, mine || undefined);
   }
 
   #place() {

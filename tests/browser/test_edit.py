@@ -27,6 +27,14 @@ DROP = """async ([name, bytes]) => {
 }"""
 
 
+SEEN = """(name) => {
+    const seen = (each) => each.visible && (!each.parent || seen(each.parent));
+    const node = katanaScene.node(name);
+    return Boolean(node) && seen(node);
+}"""
+"""Script that returns whether a node is shown."""
+
+
 @pytest.fixture
 def page(server: AppServer, open_page: OpenPage, truth: Truth) -> ViserPage:
     page = open_page(server.url, nodes=("/arm", MOVE))
@@ -89,6 +97,54 @@ def test_clicked_object_is_removed_by_delete_and_returns(
     page.page.wait_for_selector("#selection:not([hidden])")
     page.page.mouse.click(60, 200)
     page.page.wait_for_selector("#selection", state="hidden")
+    assert page.errors == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
+    page: ViserPage,
+    reader: Client,
+    server: AppServer,
+    open_page: OpenPage,
+    scheme: Any,
+    artefacts: Path,
+) -> None:
+    arrows = "/handles/cup"
+    other = open_page(server.url, nodes=("/arm",))
+
+    def shown(window: ViserPage) -> bool:
+        return bool(window.frame.evaluate(SEEN, arrows))
+
+    def place() -> Any:
+        found = {each.name: each.T for each in reader.query(answers.Objects).objects}
+        return np.array(found["cup"])[:3, 3]
+
+    page.page.emulate_media(color_scheme=scheme)
+    start = place()
+    assert not shown(page)
+    page.page.mouse.click(*pixel_of(page, reader, "cup"))
+    page.wait_until(lambda: shown(page), "the arrows")
+    page.keep(artefacts / f"selection-arrows-{scheme}.png")
+    page.drag_arrow(arrows, "y", -0.06)
+    page.wait_until(lambda: place()[1] < start[1] - 0.05, "the cup to follow")
+    assert page.page.inner_text("#selection b") == "cup"
+    assert not shown(other)
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: np.allclose(place(), start, atol=1e-9), "the cup to return")
+    page.page.get_by_role("button", name="Deselect").click()
+    page.wait_until(lambda: not shown(page), "no arrows")
+    # The box of the panel shows those of all objects, and keeps them when none is selected.
+    page.open_tab("Scene")
+    page.frame.get_by_text("Handles on objects", exact=True).click()
+    other.wait_until(lambda: shown(other), "the arrows of all")
+    page.page.mouse.click(*pixel_of(page, reader, "cup"))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    page.page.get_by_role("button", name="Deselect").click()
+    page.page.wait_for_timeout(300)
+    assert shown(page)
+    page.frame.get_by_text("Handles on objects", exact=True).click()
+    page.wait_until(lambda: not shown(page), "no arrows")
     assert page.errors == []
 
 

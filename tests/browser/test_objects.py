@@ -13,8 +13,9 @@ from tests.browser.server import AppServer
 
 MOVE = "/target/move"
 SHAPE = "/objects/3/shape"
-HANDLE = "/handles/3"
 """The third object, after cup and basin."""
+
+HANDLE = "/handles/ring"
 
 
 def sheet_text(page: ViserPage) -> str:

@@ -209,6 +209,19 @@ def test_page_tells_and_takes_views(page: ViserPage) -> None:
         )
 
 
+def test_page_shows_a_hidden_node_by_itself(page: ViserPage) -> None:
+    seen = """(() => {
+        const seen = (each) => each.visible && (!each.parent || seen(each.parent));
+        const node = Viser.node("/hidden");
+        return Boolean(node) && seen(node);
+    })()"""
+    with part("reveal"):
+        assert ask(page, seen) is False
+        for argument, wanted in ((", true", True), ("", False)):
+            ask(page, f"Viser.reveal('/hidden'{argument})")
+            page.wait_until(lambda wanted=wanted: ask(page, seen) is wanted, f"{wanted}")  # type: ignore[misc]
+
+
 def test_page_is_painted_by_changed_messages(page: ViserPage) -> None:
     scheme = "document.documentElement.dataset.mantineColorScheme"
     with part("paint"):

@@ -29,13 +29,13 @@ GAP_WORTH_SEEING = 1e-3
 """Smallest distance [m] between target and goal that is drawn."""
 
 
-def node_name(link: str) -> str:
-    """Return the last part of the path of the node of ``link``.
+def node_name(name: str) -> str:
+    """Return the last part of the path of the node of a link or an object ``name``.
 
-    A link's name may contain the separator of paths. The page finds the node of a link by the same
-    rule, which is that of ``encodeURIComponent`` (``static/scene/joints.js``).
+    A name may contain the separator of paths. The page finds the node by the same rule, which is
+    that of ``encodeURIComponent`` (``static/scene/joints.js``, ``static/selection/selection.js``).
     """
-    return quote(link, safe="!~*'()")
+    return quote(name, safe="!~*'()")
 
 
 @dataclass

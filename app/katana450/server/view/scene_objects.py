@@ -23,6 +23,7 @@ from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.server.view.controls import GestureGate, refuse
+from katana450.server.view.scene import node_name
 from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place, turn
@@ -136,7 +137,7 @@ class SceneObjectNodes:
 
     def _handle(self, name: str) -> viser.TransformControlsHandle:
         handle = self._server.scene.add_transform_controls(
-            f"/handles/{self._made}",
+            f"/handles/{node_name(name)}",
             scale=HANDLE,
             line_width=3.0,
             active_axes=(True, True, False),

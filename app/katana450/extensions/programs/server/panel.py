@@ -97,7 +97,7 @@ class ProgramsPanel:
             "Script",
             names,
             initial_value=next(suitable, None),
-            hint="Scripts of the library, and of the folder of --programs",
+            hint="Scripts of the library, and of the folder of this server",
         )
         self._choice.on_update(lambda _: self._draw(None))
         self._orders = gui.add_button_group(
