@@ -209,7 +209,7 @@ def test_pose_form_converts_units_and_copies_the_present_pose(page: ViserPage) -
     page.click_button("Copy current")
     page.wait_until(lambda: numbers("x, y, z") == [478.5, 0.0, 7.6], "the pose in mm and {S}")
     assert numbers("r, p, y") == [0.0, 25.0, 0.0]
-    page.choose("Units", "cm")
+    page.choose("Units", "cm, °")
     page.choose("Frame", "Base")
     page.wait_until(lambda: numbers("x, y, z") == [47.85, 0.0, 28.21], "the pose in cm and base")
     page.wait_until(lambda: page.text_of("[data-now=z]") == "28.21", "the read-out in cm")
@@ -218,9 +218,16 @@ def test_pose_form_converts_units_and_copies_the_present_pose(page: ViserPage) -
     type_slowly(page, box, "101")
     assert marked(box)
     page.choose("Frame", "Shoulder {S}")
-    page.choose("Units", "mm")
+    page.choose("Units", "mm, °")
     page.wait_until(lambda: numbers("x, y, z") == [478.5, 0.0, 7.6], "the pose in mm again")
-    assert len(watch.sent) == 5
+    # Angles in radians, here and in the read-out; the joints stay in degrees.
+    page.choose("Units", "mm, rad")
+    page.wait_until(lambda: numbers("r, p, y") == [0.0, 0.436, 0.0], "the angles in rad")
+    page.wait_until(lambda: page.text_of("[data-now=pitch]") == "0.436", "the read-out in rad")
+    assert page.slider_value("2 shoulder") == -68.0
+    page.choose("Units", "mm, °")
+    page.wait_until(lambda: numbers("r, p, y") == [0.0, 25.0, 0.0], "the angles in degrees")
+    assert len(watch.sent) == 7
 
 
 def test_gripper_is_closed_and_opened_by_buttons(page: ViserPage) -> None:

@@ -114,6 +114,8 @@ def test_finger_moves_the_panel_between_three_heights(
     # A short quick movement is enough.
     drag(phone, 0.2 * frame["height"], seconds=0.06)
     phone.wait_until(lambda: state(phone) != "Controls, full height", "a lower height")
+    # The handle still moves.
+    phone.page.wait_for_timeout(300)
     drag(phone, 0.7 * frame["height"])
     wait_state(phone, "folded")
     assert top() == pytest.approx(folded, abs=1.0)

@@ -40,6 +40,23 @@ def choose_frame(server: viser.ViserServer, frame: str) -> None:
 
 
 @pytest.mark.usefixtures("form")
+def test_half_a_turn_is_allowed_in_every_unit_of_angle(server: viser.ViserServer) -> None:
+    angles, guard = control(server, "r, p, y"), Guard(server)
+    assert angles.value == pytest.approx((0.0, 25.0, 0.0))
+    for unit, half, beyond in (("in, rad", 3.142, 3.15), ("cm, °", 180.0, 180.1)):
+        pitch = angles.value[1]
+        control(server, "Units").value = unit
+        end = time.monotonic() + 10.0
+        while angles.value[1] == pitch:
+            assert time.monotonic() < end, "the numbers are not converted"
+            time.sleep(0.01)
+        for value, allowed in ((half, True), (-half, True), (beyond, False)):
+            change = internals.value_change(angles, (value, 0.0, 0.0))
+            assert (guard.objection(change) is None) is allowed, (unit, value)
+    assert angles.value == pytest.approx((0.0, 25.0, 0.0))
+
+
+@pytest.mark.usefixtures("form")
 def test_a_position_beyond_the_limit_in_another_frame_can_be_edited(
     server: viser.ViserServer,
 ) -> None:

@@ -42,34 +42,42 @@ def test_condition_is_infinite_in_a_singularity(arm: MountedArm, session: Sessio
 
 
 @pytest.mark.parametrize(
-    ("unit", "frame", "x", "z", "heading"),
+    ("units", "frame", "x", "z", "pitch", "heading"),
     [
-        ("mm", SHOULDER, "478.5", "7.6", "tcp in {S}"),
-        ("mm", BASE, "478.5", "282.1", "tcp in base"),
-        ("cm", BASE, "47.85", "28.21", "tcp in base"),
-        ("in", SHOULDER, "18.840", "0.297", "tcp in {S}"),
+        ("mm, °", SHOULDER, "478.5", "7.6", "25.0", "tcp in {S}"),
+        ("mm, °", BASE, "478.5", "282.1", "25.0", "tcp in base"),
+        ("cm, rad", BASE, "47.85", "28.21", "0.436", "tcp in base"),
+        ("in, °", SHOULDER, "18.840", "0.297", "25.0", "tcp in {S}"),
     ],
 )
 def test_tool_pose_is_shown_in_the_chosen_units_and_frame(
-    arm: MountedArm, session: Session, unit: str, frame: str, x: str, z: str, heading: str
+    arm: MountedArm,
+    session: Session,
+    units: str,
+    frame: str,
+    x: str,
+    z: str,
+    pitch: str,
+    heading: str,
 ) -> None:
-    display = PoseDisplay(UNITS[unit], frame, arm.T_base_shoulder)
+    display = PoseDisplay(*UNITS[units], frame, arm.T_base_shoulder)
     text = page(arm, session.begin(session.ready, 0.0, 0.0), display)
     assert f"<th>{heading}</th>" in text
     for place in ("now", "goal"):
         assert f"<td data-{place}='x'>{x}</td>" in text
         assert f"<td data-{place}='z'>{z}</td>" in text
-        assert f"<td data-{place}='pitch'>25.0</td>" in text
-    assert f"<td class='unit'>{unit}</td>" in text
+        assert f"<td data-{place}='pitch'>{pitch}</td>" in text
+    for unit in units.split(", "):
+        assert text.count(f"<td class='unit'>{unit}</td>") == 3
 
 
-@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("units", UNITS)
 @pytest.mark.parametrize("frame", [BASE, SHOULDER])
 def test_pose_is_the_same_from_its_numbers_in_any_units_and_frame(
-    arm: MountedArm, unit: str, frame: str
+    arm: MountedArm, units: str, frame: str
 ) -> None:
     T = forward(arm.chain, np.array([0.4, -1.0, 1.2, 0.3, -0.7]))
-    display = PoseDisplay(UNITS[unit], frame, arm.T_base_shoulder)
+    display = PoseDisplay(*UNITS[units], frame, arm.T_base_shoulder)
     np.testing.assert_allclose(display.pose(*display.numbers(T)), T, rtol=0, atol=1e-12)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 from typing import Any
 
@@ -22,8 +23,6 @@ MAX_TYPED_POSITION = 1.0
 
 It is more while a coordinate exceeds it, typed in another frame.
 """
-
-ANGLE_DECIMALS = 1
 
 
 class PoseForm:
@@ -49,7 +48,7 @@ class PoseForm:
         listen(self._priority, lambda: cmd.SetPriority(_priority(self._priority.value)))
         self._meaning = gui.add_html(_meaning(state.priority))
         self._unit = gui.add_dropdown(
-            "Units", tuple(UNITS), initial_value="mm", hint="Of the position here and above"
+            "Units", tuple(UNITS), hint="Of the pose here and above; joints are in degrees"
         )
         self._frame = gui.add_dropdown(
             "Frame",
@@ -65,12 +64,9 @@ class PoseForm:
         self._angles = gui.add_vector3(
             "r, p, y",
             (0.0, 0.0, 0.0),
-            min=(-180.0, -180.0, -180.0),
-            max=(180.0, 180.0, 180.0),
             step=1.0,
-            hint="Roll, pitch and yaw in degrees, in this frame; pitch above 0 points down",
+            hint="Roll, pitch and yaw in these units and this frame; pitch above 0 points down",
         )
-        self._angles.precision = ANGLE_DECIMALS
         self._fill(self._goal(state))
         for choice in (self._unit, self._frame):
             choice.on_update(self._change_display)
@@ -96,7 +92,7 @@ class PoseForm:
         return forward(self._arm.chain_to(state.tool), state.goal)
 
     def _chosen(self) -> PoseDisplay:
-        return PoseDisplay(UNITS[self._unit.value], self._frame.value, self._arm.T_base_shoulder)
+        return PoseDisplay(*UNITS[self._unit.value], self._frame.value, self._arm.T_base_shoulder)
 
     # These callbacks are coroutines, because viser calls only those in the order of the messages.
 
@@ -113,15 +109,19 @@ class PoseForm:
 
     def _fill(self, T: FloatArray) -> None:
         """Show the pose ``T`` (4, 4) in {S}."""
-        unit = self.display.unit
+        unit, angle = self.display.length, self.display.angle
         position, angles = self.display.numbers(T)
         shown = _rounded(position, unit.decimals)
         # The page sends all three numbers when one is edited, so each must be allowed.
-        end = max(MAX_TYPED_POSITION * unit.per_metre, *(abs(x) + unit.step for x in shown))
+        end = max(MAX_TYPED_POSITION * unit.per_si, *(abs(x) + unit.step for x in shown))
         self._position.min, self._position.max = (-end, -end, -end), (end, end, end)
         self._position.step, self._position.precision = unit.step, unit.decimals
         set_value(self._position, shown)
-        set_value(self._angles, _rounded(angles, ANGLE_DECIMALS))
+        # Not below half a turn: 180° and 3.142 rad.
+        turn = round(math.pi * angle.per_si, angle.decimals)
+        self._angles.min, self._angles.max = (-turn, -turn, -turn), (turn, turn, turn)
+        self._angles.step, self._angles.precision = angle.step, angle.decimals
+        set_value(self._angles, _rounded(angles, angle.decimals))
 
 
 def _rounded(numbers: list[float], decimals: int) -> tuple[float, ...]:

@@ -29,7 +29,7 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
     now, goal = (_numbers(forward(chain, q), display) for q in (state.q, state.goal))
     rows = "".join(
         f"<tr><th>{name}</th><td data-now='{name}'>{a}</td><td data-goal='{name}'>{b}</td>"
-        f"<td class='unit'>{display.unit.name if name in 'xyz' else '°'}</td></tr>"
+        f"<td class='unit'>{(display.length if name in 'xyz' else display.angle).name}</td></tr>"
         for name, a, b in zip(ROWS, now, goal, strict=True)
     )
     distances = limit_distances(chain, state.q)
@@ -70,7 +70,8 @@ def _row(key: str, name: str, value: str) -> str:
 
 def _numbers(T: FloatArray, display: PoseDisplay) -> list[str]:
     position, angles = display.numbers(T)
-    return [signed(x, display.unit.decimals) for x in position] + [signed(x, 1) for x in angles]
+    decimals = [display.length.decimals] * 3 + [display.angle.decimals] * 3
+    return [signed(x, n) for x, n in zip((*position, *angles), decimals, strict=True)]
 
 
 def style() -> str:
