@@ -104,10 +104,12 @@ STAGES = (
     ("grasp cup: approach", 0.0),
     ("grasp cup: close", 0.0),
     ("over basin", 0.5),
-    ("pour", 0.62),
+    ("pour", 0.0),
 )
 """Task of the pouring demo and the fraction of it done, as in figures 9 to 12 of the paper."""
 
+POURED = 60.0
+"""Water in the basin [ml] in the picture of the last stage."""
 
 SPEED = 0.5
 """Fraction of full speed: slow enough to see every stage before it is over."""
@@ -125,6 +127,8 @@ def pouring(page: ViserPage) -> None:
         arm.ask(Steer(order=ProgramOrder.RUN))
         for task, fraction in STAGES:
             program(arm, lambda run, t=task, s=fraction: run.task == t and run.fraction >= s)  # type: ignore[misc]
+            while task == "pour" and poured(arm) < POURED:
+                time.sleep(0.02)
             arm.ask(Steer(order=ProgramOrder.PAUSE))
             page.page.wait_for_timeout(700)
             page.wait_drawn()
@@ -133,6 +137,16 @@ def pouring(page: ViserPage) -> None:
         arm.ask(Steer(order=ProgramOrder.END))
     sheet = np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])])
     imageio.imwrite(IMAGES / "pouring.jpg", sheet, quality=85)
+
+
+def poured(arm: Client) -> float:
+    """Return the volume of water in the basin [ml]."""
+    water = arm.query(answers.State).water
+    return 0.0 if water is None else water.basin_ml
+
+
+CIRCLE_LEFT = 6.0
+"""Time [s] before the end of the script at which three quarters of the circle are drawn."""
 
 
 def instruments(page: ViserPage) -> None:
@@ -145,10 +159,8 @@ def instruments(page: ViserPage) -> None:
         send(arm, CircleDemo(tool="tcp").text)
         program(arm, lambda progress: progress.status in ("ready", "refused"))
         arm.ask(Steer(order=ProgramOrder.RUN))
-        # The path to the start of the circle counts from 0 to 1 too.
-        program(arm, lambda progress: progress.task == "circle" and progress.fraction > 0.75)
-        program(arm, lambda progress: progress.task == "circle" and 0.05 < progress.fraction < 0.3)
-        program(arm, lambda progress: progress.fraction > 0.75)
+        # The fraction would also count the path to the start of the circle, from 0 to 1.
+        program(arm, lambda run: run.status == "running" and 0.0 < run.seconds_left < CIRCLE_LEFT)
         arm.ask(Steer(order=ProgramOrder.PAUSE))
         page.page.locator("#instruments").get_by_role("button", name="Pause").click()
         page.page.wait_for_timeout(3000)
