@@ -25,7 +25,10 @@ export class Gauge {
     });
     this.element = html(
       "div",
-      { class: "gauge", role: "meter", "aria-label": title, "aria-valuemin": low, "aria-valuemax": high },
+      {
+        class: "gauge", role: "meter", "aria-label": title,
+        "aria-valuemin": low, "aria-valuemax": high, "aria-valuenow": low, "aria-valuetext": "none",
+      },
       html(
         "div",
         { class: "dial" },
@@ -78,7 +81,7 @@ export class Bars {
         "div",
         {
           role: "meter", "aria-label": `${title}, ${label}`,
-          "aria-valuemin": (-limit).toFixed(1), "aria-valuemax": limit.toFixed(1),
+          "aria-valuemin": (-limit).toFixed(1), "aria-valuemax": limit.toFixed(1), "aria-valuenow": "0",
         },
         html("span", {}, label.replace("Axis ", "")),
         html("div", { class: "track" }, bar),

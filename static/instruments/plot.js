@@ -72,8 +72,9 @@ export class Plot {
     const { label, short = label } = this.#history.channels[channel];
     const button = html(
       "button",
-      { type: "button", "aria-pressed": "true", "aria-label": label, class: `series-${(i % SERIES) + 1}` },
-      html("i"), html("span", {}, short), value,
+      { type: "button", "aria-pressed": "true", class: `series-${(i % SERIES) + 1}` },
+      // The rest of the label is for screen readers: a name has to contain what is seen.
+      html("i"), html("span", {}, html("small", {}, label.slice(0, label.length - short.length)), short), value,
     );
     button.addEventListener("click", () => {
       set(button, "aria-pressed", button.getAttribute("aria-pressed") !== "true");

@@ -18,7 +18,7 @@ const FACES = [
 /** @type {[Direction, Direction]} */
 const BELOW = [[0, 0, -1], [0, -1, 0]]; // the face without a view: the table is in front of it
 const MORE = [
-  ["Iso", "3D", "View from above and the side"],
+  ["Iso", "3D", "Iso: view from above and the side"],
   ["Tool", "Tool", "View that follows the tool until another one is chosen"],
 ];
 

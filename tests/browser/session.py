@@ -20,7 +20,7 @@ AXES = tuple(f"{number} {name}" for number, name in enumerate(AXIS_NAMES, start=
 """Labels of the joints' sliders."""
 READY = np.array(Settings().ready)
 VIEW_LABELS = {
-    "3D": "View from above and the side",
+    "3D": "Iso: view from above and the side",
     "Side": "View: right",
     "Tool": "View that follows the tool until another one is chosen",
 }

@@ -11,10 +11,10 @@ from playwright.sync_api import Frame, Page
 
 from katana450.arm.control.messages import PRIORITIES
 from tests.browser.conftest import OpenPage
-from tests.browser.page import ViserPage
+from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import take
-from tests.browser.sizes import WIDE
+from tests.browser.sizes import PHONE, PORTRAIT, WIDE
 
 MOVE = "/target/move"
 TABS = ("Drive", "Programs", "Scene")
@@ -152,3 +152,54 @@ def test_axe_finds_nothing_serious_on_page_and_panel(
         controls(page, tab)
         assert findings(page.frame) == [], tab
         page.keep(artefacts / f"panel-{tab.lower()}-{theme}.png")
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not AXE.exists(), reason="axe-core is not installed: make check-js")
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", [WIDE, PORTRAIT])
+def test_axe_finds_nothing_serious_in_sheets_and_dialogs(
+    server: AppServer,
+    open_page: OpenPage,
+    size: tuple[int, int],
+    theme: str,
+    artefacts: Path,
+) -> None:
+    options = PHONE if size == PORTRAIT else {}
+    page = open_page(
+        server.url,
+        nodes=("/arm", MOVE),
+        window=size,
+        color_scheme=theme,
+        script=FIRST_VISIT,
+        **options,
+    )
+    page.page.wait_for_selector("#welcome:not([hidden])")
+    take(page)
+    assert findings(page.page) == [], "first steps"
+    page.page.get_by_role("button", name="Close for good").click()
+    for name, ready in (
+        ("instruments", "#instruments:not([hidden]) canvas"),
+        ("objects", "#objects:not([hidden])"),
+        ("teach", "#teach:not([hidden])"),
+        ("jog", "#gripper button"),
+        ("help", "#help[open]"),
+        ("more", "#more[open]"),
+    ):
+        page.page.click(f"#{name}-button")
+        page.page.wait_for_selector(ready, state="attached")
+        if name == "teach":
+            page.page.get_by_role("button", name="Add pose").click()
+            page.page.wait_for_selector("#teach li[data-id]")
+        if name == "more":
+            page.page.click("#phone-button")
+            page.page.wait_for_selector("#phone:not([hidden])")
+        page.page.wait_for_timeout(400)
+        page.keep(artefacts / f"axe-{name}-{size[0]}-{theme}.png")
+        assert findings(page.page) == [], name
+        if name == "teach":
+            page.page.get_by_role("button", name="Edit as text").click()
+            page.page.wait_for_selector("#teach-text")
+            assert findings(page.page) == [], "text"
+        page.page.click(f"#{name}-button")
+    assert page.errors == []

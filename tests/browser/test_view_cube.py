@@ -157,7 +157,9 @@ def test_cube_covers_no_other_control(
             page.page.wait_for_timeout(500)
             page.keep(artefacts / f"view-cube-jog-{size[0]}.png")
         group = page.page.get_by_role("group", name="Camera")
-        views = group.get_by_label("View" if finger else "View from above and the side", exact=True)
+        views = group.get_by_label(
+            "View" if finger else "Iso: view from above and the side", exact=True
+        )
         for button in (views, group.get_by_text("Fit", exact=True)):
             # Fails if anything lies over it.
             button.click(trial=True)
