@@ -1,6 +1,7 @@
 // The joints in the picture: which link is under the pointer, its highlight, and the bar of the selected
 // one. A link that is dragged turns its joint; the pointer's events come from `stage.js`.
 import { html, signed, write } from "../instruments/shape.js";
+import { Glow, shapesOf } from "./glow.js";
 import { Grab } from "./grab.js";
 
 const EVERY = 40; // ms between two commands of a drag
@@ -10,8 +11,6 @@ const ABOVE = 60; // px from the click to the bar, so that a finger does not cov
 const EDGE = 8; // px between the bar and the edge of the scene
 const DEGREES = 180 / Math.PI;
 const ID = "joint-drag"; // id of the commands of a drag
-const COLOUR = 0x2477d4; // of the highlight
-const GLOW = 0.3; // its strength
 
 export class Joints {
   #scene;
@@ -20,7 +19,7 @@ export class Joints {
   #hovered = null; // number of a joint
   #selected = null;
   #drag = null; // {joint, pointer, pixel, grab, value, sent, timer, revocations}
-  #lit = new Map(); // own materials of the highlighted shapes
+  #glow = new Glow();
   #timer = null;
   #label = html("p", { id: "joint-label", class: "scene-label", hidden: "" });
   #name = html("b");
@@ -240,29 +239,9 @@ export class Joints {
   // Highlight the link of the joint that is dragged, under the pointer, or selected.
   #light() {
     const joint = this.#drag?.moved ? this.#drag.joint : this.#hovered ?? this.#selected;
-    const own = new Set();
-    if (joint !== null) this.#shapes(this.#link(joint), this.arm.links.map((_, each) => this.#link(each)), own);
-    for (const [shape, [mine, before]] of this.#lit)
-      if (!own.has(shape)) {
-        if (shape.material === mine) shape.material = before;
-        mine.dispose();
-        this.#lit.delete(shape);
-      }
-    for (const shape of own) {
-      if (this.#lit.has(shape)) continue;
-      const mine = shape.material.clone();
-      mine.emissive.set(COLOUR);
-      mine.emissiveIntensity = GLOW;
-      this.#lit.set(shape, [mine, shape.material]);
-      shape.material = mine;
-    }
+    const links = this.arm?.links.map((_, each) => this.#link(each)) ?? [];
+    this.#glow.show(joint === null ? new Set() : shapesOf(links[joint], links));
     this.#viewer?.requestRender();
-  }
-
-  // Add the shapes of a link, and of those that are fixed to it, to `found`.
-  #shapes(object, links, found) {
-    if (object?.isMesh && object.material.emissive) found.add(object);
-    for (const child of object?.children ?? []) if (!links.includes(child)) this.#shapes(child, links, found);
   }
 
   #link(joint) {

@@ -2,12 +2,15 @@
 // double-click looks at a point. Everything else turns the camera.
 import { html } from "../instruments/shape.js";
 import { Branches } from "./branches.js";
+import { Glow, shapesOf } from "./glow.js";
 import { Joints } from "./joints.js";
 import { Steps } from "./steps.js";
 import { Views } from "./views.js";
 
 const CLICK = 5; // px, within which a press and its release count as a click
 const SOLID = ["/arm", "/cup", "/basin", "/objects", "/table"]; // nodes that a ray can meet
+const OBJECTS = ["/cup", "/basin"]; // nodes of objects; the others are below the next one
+const MORE = "/objects";
 const STYLE = new URL("scene.css", import.meta.url).href;
 
 export class Stage {
@@ -21,6 +24,8 @@ export class Stage {
   #selection = null; // the selected object, loaded with the first click beside the arm
   #press = null; // [x, y] of a press that may become a click
   #over = null; // pixel of the pointer, to be looked up in the next frame
+  #pointed = null; // node of the object under the pointer
+  #glow = new Glow();
 
   constructor(stage, scene, page) {
     this.#stage = stage;
@@ -127,8 +132,23 @@ export class Stage {
       const { pixel } = this.#over;
       this.#over = null;
       const hit = pixel && this.#pick(pixel);
-      this.#joints.hover(hit ? this.#joints.of(hit.object) : null, pixel);
+      const joint = hit ? this.#joints.of(hit.object) : null;
+      this.#joints.hover(joint, pixel);
+      if (!this.#joints.dragging) this.#point(hit?.object, joint);
     });
+  }
+
+  // Show that a click selects the object of which `shape` is a part; `joint` is under the pointer otherwise.
+  #point(shape, joint) {
+    const { node, viewer } = this.#scene.contentWindow.katanaScene;
+    const [objects, more] = [OBJECTS.map(node), node(MORE)];
+    let each = joint === null ? shape : null;
+    while (each && !objects.includes(each) && !(more && each.parent === more)) each = each.parent;
+    if ((each ?? null) === this.#pointed) return;
+    this.#pointed = each ?? null;
+    this.#glow.show(shapesOf(this.#pointed));
+    if (this.#pointed || joint === null) viewer().canvas.style.cursor = this.#pointed ? "pointer" : "";
+    viewer().requestRender();
   }
 
   #up(event) {

@@ -27,6 +27,15 @@ DROP = """async ([name, bytes]) => {
 }"""
 
 
+GLOWING = """(name) => {
+    let found = false;
+    katanaScene.node(name).traverse(({ material }) => {
+        found ||= material?.emissiveIntensity < 1 && material.emissive.getHex() > 0;
+    });
+    return found;
+}"""
+"""Script that returns whether some shape of a node is highlighted."""
+
 SEEN = """(name) => {
     const seen = (each) => each.visible && (!each.parent || seen(each.parent));
     const node = katanaScene.node(name);
@@ -123,6 +132,16 @@ def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
     page.page.emulate_media(color_scheme=scheme)
     start = place()
     assert not shown(page)
+    # Under the mouse it is highlighted, with the pointer of what can be clicked.
+    cursor = "katanaScene.viewer().canvas.style.cursor"
+    x, y = pixel_of(page, reader, "cup")
+    page.page.mouse.move(x - 3.0, y)
+    page.page.mouse.move(x, y)
+    page.wait_until(lambda: page.frame.evaluate(GLOWING, "/cup"), "the highlight")
+    assert page.frame.evaluate(cursor) == "pointer"
+    page.page.mouse.move(60.0, 200.0)
+    page.wait_until(lambda: not page.frame.evaluate(GLOWING, "/cup"), "no highlight")
+    assert page.frame.evaluate(cursor) == ""
     page.page.mouse.click(*pixel_of(page, reader, "cup"))
     page.wait_until(lambda: shown(page), "the arrows")
     page.keep(artefacts / f"selection-arrows-{scheme}.png")
