@@ -69,6 +69,10 @@ def server() -> Iterator[AppServer]:
 def visit(server: AppServer, open_page: OpenPage) -> ViserPage:
     page = open_page(server.url, nodes=("/arm", MOVE), script=FIRST_VISIT)
     page.page.wait_for_selector("#welcome:not([hidden])")
+    truth = Truth(server)
+    if truth.status()["stopped"] is not None:
+        # The previous window closed while the arm was moving.
+        clear_stop(page, truth)
     return page
 
 

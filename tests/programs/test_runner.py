@@ -186,6 +186,20 @@ def test_steps_are_taken_one_at_a_time(stage: Stage, program: Program) -> None:
     assert rests == [6, 7, 8, 9, 10, 11, 12]
 
 
+def test_time_left_never_rises_while_a_command_is_on_its_way(
+    stage: Stage, program: Program
+) -> None:
+    state, run = stage.begin(), Run(0.0)
+    left = [runner.seconds_left(program, run, state)]
+    while run.phase is Phase.RUNNING:
+        before = state
+        run, state = stage.tick(program, run, state)
+        # The state is of before the command, as at a server.
+        left.append(runner.seconds_left(program, run, before))
+    assert left[0] > 2.0
+    assert max(b - a for a, b in pairwise(left)) < 1e-6
+
+
 def test_stop_and_a_person_end_the_run(stage: Stage, program: Program) -> None:
     for end in ("stop", "halt", "elsewhere"):
         state, run = stage.begin(), Run(0.0)

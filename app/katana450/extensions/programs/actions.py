@@ -64,8 +64,10 @@ class FollowPlan:
         return following.there
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
-        """Return the completed fraction of the plan; 0 while the arm follows no plan."""
-        return 0.0 if state.following is None else state.following.fraction
+        """Return the completed fraction of the plan; 0 until the arm follows it."""
+        following = state.following
+        # The plan of the step before is followed until the command arrives.
+        return following.fraction if following is not None and following.plan is self.plan else 0.0
 
 
 @dataclass(frozen=True)
