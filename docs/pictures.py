@@ -160,7 +160,7 @@ def instruments(page: ViserPage) -> None:
         program(arm, lambda progress: progress.status in ("ready", "refused"))
         arm.ask(Steer(order=ProgramOrder.RUN))
         # The fraction would also count the path to the start of the circle, from 0 to 1.
-        program(arm, lambda run: run.status == "running" and 0.0 < run.seconds_left < CIRCLE_LEFT)
+        program(arm, lambda run: run.task == "circle" and 0.0 < run.seconds_left < CIRCLE_LEFT)
         arm.ask(Steer(order=ProgramOrder.PAUSE))
         page.page.locator("#instruments").get_by_role("button", name="Pause").click()
         page.page.wait_for_timeout(3000)
