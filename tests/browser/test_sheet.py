@@ -237,6 +237,8 @@ def test_one_sheet_is_open_at_a_time(phone: ViserPage, server: AppServer, artefa
         at, low = middle(handle(phone))
         hand.put((at, low), finger=1)
         hand.move((at, low - 100.0), finger=1)
+        # At rest, so that its speed does not count.
+        phone.page.wait_for_timeout(200)
         hand.lift(1)
         wait_state(phone, "half height")
         assert not jog.is_visible()
