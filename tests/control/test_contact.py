@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import JointTarget, Reason, State, Status
+from katana450.arm.control.state import Reason, State, Status
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray

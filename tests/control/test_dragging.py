@@ -15,8 +15,9 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import NO_GRIPPER, ArmModel
 from katana450.arm.control.branch_options import current_target
+from katana450.arm.control.modes import ToolTarget
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status, ToolTarget
+from katana450.arm.control.state import Reason, State, Status
 from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of

@@ -12,10 +12,11 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.plan_follower import MAX_UNCHECKED_PATH
 from katana450.arm.control.plans import path_to, plan_along, plan_to
 from katana450.arm.control.session import TOOL_SPEED, Session
-from katana450.arm.control.state import JointTarget, Reason, State, Status
+from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.session import TOOL_SPEED, Session
-from katana450.arm.control.state import JointTarget, Reason, State, Status
+from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain

@@ -10,8 +10,9 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.session import MAX_STEP_TIME, Session
-from katana450.arm.control.state import JointTarget, PoseTarget, Reason, State, Status
+from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray

@@ -12,7 +12,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason
 from katana450.arm.control.stop_cause import pressed
 from katana450.arm.control.stopping import joined
-from katana450.arm.runtime.mailbox import CAPACITY, Drained, Mailbox, Submission
+from katana450.arm.runtime.mailbox import CAPACITY, Drained, Mailbox
+from katana450.arm.runtime.tick import Submission
 from katana450.errors import InputError
 
 

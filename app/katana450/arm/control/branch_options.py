@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.state import PoseTarget, State
+from katana450.arm.control.modes import PoseTarget
+from katana450.arm.control.state import State
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld

@@ -17,7 +17,6 @@ from katana450.arm.control.modes import (
     JointTarget,
     Leaving,
     Mode,
-    PoseTarget,
     Positioning,
     Servoing,
     Target,
@@ -34,22 +33,6 @@ from katana450.maths.kinematics.projection import Projection
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
-
-__all__ = [
-    "ACCEPTED",
-    "ActiveStop",
-    "Finding",
-    "JointTarget",
-    "Outcome",
-    "PartRefusal",
-    "PoseTarget",
-    "Reason",
-    "State",
-    "Status",
-    "Target",
-    "ToolTarget",
-    "Verdict",
-]
 
 
 class Status(Enum):

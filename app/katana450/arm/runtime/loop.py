@@ -6,23 +6,23 @@ import logging
 import math
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Protocol
 
-from katana450.arm.control.commands import Command, Stop
+from katana450.arm.control.commands import Stop
 from katana450.arm.control.event_log import LogEntry, entries_between
 from katana450.arm.control.messages import finding_text
-from katana450.arm.control.outcome import DROPPED, FAILED
+from katana450.arm.control.outcome import DROPPED
+from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import ACCEPTED, Finding, Reason, State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
-from katana450.arm.runtime.mailbox import Drained, Mailbox, Submission
+from katana450.arm.runtime.mailbox import Drained, Mailbox
 from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped
 
 log = logging.getLogger(__name__)
 
@@ -32,32 +32,12 @@ where no command can end a sleep that is exact.
 """
 
 
-class Rules(Protocol):
-    """The rules that decide each next state; a ``Session`` has them."""
-
-    def begin(self, q: FloatArray, gripper: float, t: float) -> State:
-        """Return the first state of a robot that stands at ``q`` (n,) [rad or m]."""
-        ...
-
-    def step(self, state: State, commands: Iterable[Command], t: float) -> State:
-        """Return the state after ``commands`` and the time until ``t`` [s]."""
-        ...
-
-    def observe(self, state: State, q: FloatArray, gripper: float) -> State:
-        """Return ``state`` with the place of the robot that the driver reports."""
-        ...
-
-    def fail(self, state: State) -> State:
-        """Return ``state`` that holds after an internal error."""
-        ...
-
-
 class ControlLoop:
     """The control loop: each tick drains the mailbox, steps, sends the setpoint and publishes."""
 
     def __init__(
         self,
-        session: Rules,
+        session: Session,
         driver: Driver,
         mailbox: Mailbox,
         clock: Clock,
@@ -103,6 +83,8 @@ class ControlLoop:
         )
         self.ticks = 0
         """Number of completed ticks."""
+        self.record: Callable[[TickRecord], None] | None = None
+        """Takes the record of each tick, in the control thread; it must return at once."""
         self._resting = False
 
     @property
@@ -120,16 +102,17 @@ class ControlLoop:
         if self._resting and drained.submissions:
             # Commands apply from now on, and not since the last tick, which may be long ago.
             before = replace(before, t=max(before.t, t - self._period))
+        commands, has_failed = drained.commands, False
         try:
-            state = self._session.step(before, drained.commands, t)
-            sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
-            state = self._session.observe(state, sent.q, sent.gripper)
+            state = stepped(self._session, before, commands, t, self._driver.send)
         except Exception:
             # The loop continues after any error and the arm holds: the state reports the error.
             log.exception("The control loop met an error; the arm holds.")
-            state = replace(self._session.fail(before), outcomes=(FAILED,) * len(drained.commands))
+            state, has_failed = failed(self._session, before, commands), True
             self._put_stops_again(drained)
         self._state = state
+        if self.record is not None:
+            self.record(TickRecord(before.t, t, drained.submissions, has_failed, state))
         # A state that differs only in its time is not published.
         changed = drained.last != self.state_publisher.snapshot.ticket or _differs(before, state)
         self._resting = not (changed or state.moving)

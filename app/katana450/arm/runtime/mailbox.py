@@ -5,24 +5,18 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command, Hold, Stop
 from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.presses import Presses
+from katana450.arm.runtime.tick import Submission
 from katana450.errors import InputError
 
 CAPACITY = 256
 """Maximum number of commands that wait for one tick: far more than people make in 10 ms, and few
 enough to execute in one tick."""
-
-
-class Submission(NamedTuple):
-    """A command and its giver; None where the process of the arm acts by itself."""
-
-    command: Command
-    actor: Actor | None
 
 
 class CommandSink(Protocol):

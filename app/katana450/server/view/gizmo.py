@@ -17,7 +17,8 @@ import viser
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command, EndDrag, MoveTool, TurnTool
-from katana450.arm.control.state import State, ToolTarget
+from katana450.arm.control.modes import ToolTarget
+from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import KatanaError
 from katana450.maths.geometry import so3

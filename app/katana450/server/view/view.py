@@ -10,8 +10,9 @@ import numpy as np
 import viser
 
 from katana450.arm.control.messages import title
+from katana450.arm.control.modes import PoseTarget, ToolTarget
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
+from katana450.arm.control.state import State, Status
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot

@@ -1,0 +1,61 @@
+"""One tick of the control loop as a pure function, and its record.
+
+The loop and the simulation of a recording call the same functions, so both mean the same by a tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.commands import Command
+from katana450.arm.control.outcome import FAILED
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.drivers.driver import SentSetpoint
+
+Send = Callable[..., SentSetpoint]
+"""Gives a setpoint to the driver and returns its answer, as ``Driver.send``."""
+
+
+class Submission(NamedTuple):
+    """A command and its giver; None where the process of the arm acts by itself."""
+
+    command: Command
+    actor: Actor | None
+
+
+class TickRecord(NamedTuple):
+    """One tick: its input, and the state after it.
+
+    Attributes:
+        t_before: time of the state that it stepped from [s]; that of the tick before, or later if
+            the arm rested until a command came.
+        t: time of the tick [s].
+        submissions: its commands with their givers, as drained from the mailbox.
+        failed: whether an internal error made the arm hold.
+        state: the state after it, with the driver's answer in ``q`` and ``gripper``.
+    """
+
+    t_before: float
+    t: float
+    submissions: Sequence[Submission]
+    failed: bool
+    state: State
+
+
+def stepped(session: Session, state: State, commands: list[Command], t: float, send: Send) -> State:
+    """Return the state after a tick from ``state`` at ``t`` [s].
+
+    Raises any error of the session, and of ``send``.
+    """
+    state = session.step(state, commands, t)
+    sent = send(state.setpoint, state.gripper_setpoint, t)
+    return session.observe(state, sent.q, sent.gripper)
+
+
+def failed(session: Session, state: State, commands: list[Command]) -> State:
+    """Return the state after a tick from ``state`` in which an error occurred: the arm holds."""
+    return replace(session.fail(state), outcomes=(FAILED,) * len(commands))
