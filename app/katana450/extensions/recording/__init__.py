@@ -1,0 +1,1 @@
+"""Recordings of a session: exact text forms, MCAP files, simulation again, and their command."""

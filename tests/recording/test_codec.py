@@ -1,0 +1,366 @@
+"""Every command and every state of random sessions survives its text form to the bit."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, cast, get_args
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import run_state_machine_as_test
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.modes import IDLE
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.session import Session
+from katana450.arm.control.solid import Solid
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.stop_cause import pressed
+from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
+from katana450.extensions.recording.allowed import CLASSES
+from katana450.extensions.recording.codec import Codec, json_form, json_text
+from katana450.extensions.recording.digest import Digester
+from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.shared_values import key_of
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
+from katana450.maths.planning.path import Path
+from katana450.maths.planning.plan import plan
+from katana450.maths.planning.scaling import Bounds
+from katana450.maths.planning.tool_path import ToolPath
+from katana450.settings import Settings
+from tests.conftest import LONG
+from tests.control.test_session_machine import ArmRules, bounded
+from tests.control.test_traits import KINDS, examples
+
+TWIST = np.array((0.0, 0.0, 0.1, 0.01, 0.02, 0.0))
+
+
+def copied(kind: Any, value: Any) -> Any:
+    """Return ``value`` read from its text, by a reader that knows only the texts."""
+    writer, reader = Codec(), Codec()
+    text = json_text(writer.encoded(kind, value))
+    for shared in writer.shared.take_new():
+        reader.shared.add(shared)
+    return reader.decoded(kind, json_form(text))
+
+
+def text_of(kind: Any, value: Any) -> bytes:
+    return json_text(Codec().encoded(kind, value))
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def follow(arm: ArmModel) -> cmd.Follow:
+    """A command with a plan that has every kind of curve, one segment twice."""
+    session = Session(arm, np.array(Settings().ready))
+    chain = session.require_arm().chain
+    near = session.ready
+    point = ToolTarget.at(chain, near)
+    there = ToolTarget(point.position + np.array((0.0, 0.05, 0.0)), point.pitch, 0.3)
+    branch = branch_of(chain, near)
+    centre = point.position + np.array((0.0, 0.0, 0.03))
+    swing = Swing(point.pitch, 0.05, 0.02, 0.0, 1.0)
+    curves: list[Curve] = [
+        ToolLine(point, there),
+        ToolLines((there, point, ToolTarget(there.position, point.pitch, 0.0)), np.array([0.5])),
+        ToolArc(
+            point.position, centre, np.array((0.3, 0.1, 0.2)), 0.7, Linear(point.pitch, 0.5), swing
+        ),
+        ToolTurn(point, np.array((0.1, 0.2, 0.1))),
+    ]
+    paths: list[Path] = [ToolPath(chain, curve, branch, near) for curve in curves]
+    paths.append(ToolPath(chain, ToolScrew(chain, branch, paths[0].end, TWIST), branch, near))
+    bounds = Bounds(session.require_arm().limits, 0.5)
+    # Each alone, because they do not meet.
+    plans = [plan([path], bounds, session.world, 0.1) for path in paths]
+    segments = [plans[0].segments[0], *(each.segments[0] for each in plans)]
+    return cmd.Follow(replace(plans[0], segments=tuple(segments)))
+
+
+def test_every_command_survives_to_the_bit(
+    session: Session, state: State, follow: cmd.Follow
+) -> None:
+    solid = Solid("abc123", (0.1, 0.1, 0.1), np.random.default_rng(3).random((12, 3)))
+    mesh = SceneObject("mesh", Shape.MESH, (), np.eye(4), solid=solid)
+    cause = pressed("Ada", "key", "press", 1e9 + 0.1)
+    given = [
+        *examples(session, state),
+        follow,
+        cmd.PlaceObject(mesh),
+        cmd.ReplaceScene((mesh,), 1e-4),
+        cmd.Servo(np.zeros(5), -np.zeros(5), 0.1),
+        cmd.Stop(cause, Finding(Reason.DRIVER_SILENT, 0.3, 2, ("a", "b"), math.inf), ("x",)),
+        cmd.Hold(Finding(Reason.WAITING)),
+        cmd.MoveObject("mesh", np.full(3, -0.0), np.eye(3).T),
+        cmd.Batch((cmd.ReplaceScene((mesh,)), cmd.Follow(follow.plan, 0.01))),
+    ]
+    assert {type(each) for each in given} == set(KINDS) == set(get_args(cmd.Command))
+    for each in given:
+        back = copied(cmd.Command, each)
+        assert type(back) is type(each)
+        assert text_of(cmd.Command, back) == text_of(cmd.Command, each), each
+
+
+def test_repeated_segment_is_one_object_again(follow: cmd.Follow) -> None:
+    back = copied(cmd.Command, follow)
+    first, again, *others = back.plan.segments
+    assert first is again
+    assert all(each is not first for each in others)
+    # The derived values are computed again from the same numbers.
+    for tau in np.linspace(0.0, follow.plan.span, 50).tolist():
+        assert back.plan.q(tau).tobytes() == follow.plan.q(tau).tobytes()
+    arcs = [each.plan.segments[3].path.curve for each in (back, cast(Any, follow))]
+    assert arcs[0].axis.tobytes() == arcs[1].axis.tobytes()
+
+
+def test_shared_value_is_written_once(follow: cmd.Follow) -> None:
+    codec = Codec()
+    forms = [json_text(codec.encoded(cmd.Command, follow)) for _ in range(3)]
+    assert len(list(codec.shared.take_new())) == 1
+    # An equal plan has the same key.
+    equal = copied(cmd.Command, follow)
+    forms.append(json_text(codec.encoded(cmd.Command, equal)))
+    assert not list(codec.shared.take_new())
+    assert len(set(forms)) == 1
+    assert len(forms[0]) < 100
+
+
+def test_actors_survive() -> None:
+    person = Person("k", "Ada \u0001\N{ROBOT FACE} é", Role.ADMIN, "3", "::1")
+    for each in (SERVER, Actor(person, CommandChannel.TCP, 3, Grounds.LEASE), None):
+        back = copied(Actor | None, each)
+        assert text_of(Actor | None, back) == text_of(Actor | None, each)
+        assert back == each
+
+
+def bits(value: float) -> bytes:
+    return struct.pack(">d", value)
+
+
+ODD = (0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, -2.2e-308, 1.7976931348623157e308)
+NANS = st.integers(1, 2**52 - 1).map(
+    lambda n: struct.unpack(">d", (0x7FF << 52 | n).to_bytes(8))[0]
+)
+
+
+@settings(max_examples=3000 if LONG else 100)
+@given(value=st.floats() | st.sampled_from(ODD) | NANS)
+def test_floats_survive_to_the_bit(value: float) -> None:
+    assert bits(copied(float, value)) == bits(value)
+    back = copied(FloatArray, np.array([value, 1.0]))
+    assert back.tobytes() == np.array([value, 1.0]).tobytes()
+
+
+def arrays() -> Iterable[np.ndarray[Any, Any]]:
+    whole = np.random.default_rng(1).normal(size=(4, 5, 3))
+    yield whole
+    yield whole[0]
+    yield np.asfortranarray(whole[0])
+    yield whole[0].T
+    yield whole[1:3, ::2, 1]
+    yield whole[:, 0, 0]
+    yield np.broadcast_to(whole[0, 0], (6, 3))
+    yield np.zeros((0, 5))
+    yield np.array(3.5)
+    yield np.arange(6).reshape(2, 3)
+    yield np.full((2, 2), np.nan)
+
+
+@pytest.mark.parametrize("array", list(arrays()))
+def test_arrays_keep_shape_type_and_order_in_memory(array: np.ndarray[Any, Any]) -> None:
+    back = copied(FloatArray, array)
+    assert back.dtype == array.dtype
+    assert back.shape == array.shape
+    assert back.tobytes() == array.tobytes()
+    for axis, (mine, other) in enumerate(zip(back.strides, array.strides, strict=True)):
+        assert array.shape[axis] <= 1 or mine == other or array.flags.c_contiguous
+
+
+def test_whole_number_in_place_of_a_float_stays_one() -> None:
+    back = copied(cmd.Command, cmd.SetJoint(1, 2))
+    assert type(back.value) is int
+    assert type(copied(cmd.Command, cmd.SetGripper(np.float64(0.1))).angle) is float
+
+
+class RecordedRules(ArmRules):
+    """Random commands to a session whose state is read from its text every few ticks."""
+
+    names = ("shipped", "bare")
+    every = 20
+
+    def tick(self, commands: Iterable[cmd.Command]) -> None:
+        super().tick(commands)
+        if len(self.log) % self.every == 0:
+            back = copied(State, self.state)
+            digester = Digester()
+            assert digester.digest(back) == digester.digest(self.state)
+            assert (back.mode is IDLE) == (self.state.mode is IDLE)
+            # At the end the same commands give the same state without this.
+            self.state = back
+
+
+def test_random_sessions_continue_from_the_text_of_their_states() -> None:
+    run_state_machine_as_test(RecordedRules, settings=bounded(2, 40))
+
+
+WRONG: st.SearchStrategy[Any] = st.sampled_from(
+    [None, True, -1, 10**30, 1e300, "", "x", "nan", [], [[]], [1, "x"], {}, {"is": "Plan"}]
+)
+
+
+def places(form: Any, path: tuple[Any, ...] = ()) -> Iterable[tuple[Any, ...]]:
+    """Yield the path to each value in ``form``."""
+    items = form.items() if isinstance(form, dict) else enumerate(form)
+    for key, value in items:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places(value, (*path, key))
+
+
+def changed(form: Any, path: tuple[Any, ...], how: str, wrong: Any) -> None:
+    *inner, last = path
+    for key in inner:
+        form = form[key]
+    if how == "replace" or not isinstance(form, dict):
+        form[last] = wrong
+    elif how == "remove":
+        del form[last]
+    else:
+        form[f"{last}_"] = wrong
+
+
+def mutated(data: st.DataObject, kind: Any, value: Any) -> None:
+    """Change the text of ``value``; its reader returns a value or raises FormError."""
+    writer, reader = Codec(), Codec()
+    form = json_form(json_text(writer.encoded(kind, value)))
+    texts = list(writer.shared.take_new())
+    found = list(places(form))
+    for _ in range(data.draw(st.integers(1, 3))):
+        path = data.draw(st.sampled_from(found))
+        how = data.draw(st.sampled_from(("replace", "remove", "add")))
+        try:
+            changed(form, path, how, data.draw(WRONG))
+        except (KeyError, IndexError, TypeError):
+            continue
+    for each in texts:
+        reader.shared.add(each)
+    with suppress(FormError):
+        reader.decoded(kind, json_form(json_text(form)))
+
+
+@settings(max_examples=1500 if LONG else 60)
+@given(data=st.data())
+def test_changed_text_raises_only_the_error_of_forms(data: st.DataObject) -> None:
+    session = SESSIONS["session"]
+    state = session.begin(session.ready, 0.0, 0.0)
+    if data.draw(st.booleans()):
+        mutated(data, cmd.Command, data.draw(st.sampled_from(SESSIONS["commands"])))
+    elif data.draw(st.booleans()):
+        mutated(data, State, replace(state, mode=SESSIONS["mode"]))
+    else:
+        mutated_plan(data)
+
+
+def mutated_plan(data: st.DataObject) -> None:
+    writer, reader = Codec(), Codec()
+    form = writer.encoded(cmd.Command, SESSIONS["follow"])
+    (text,) = writer.shared.take_new()
+    plan_form = json_form(text.text)
+    path = data.draw(st.sampled_from(list(places(plan_form))))
+    changed(plan_form, path, "replace", data.draw(WRONG))
+    text = text._replace(text=json_text(plan_form))
+    with pytest.raises(FormError, match="was changed"):
+        reader.shared.add(text)
+    text = text._replace(key=key_of(text.text))
+    reader.shared.add(text)
+    form["plan"] = text.key
+    with suppress(FormError):
+        reader.decoded(cmd.Command, form)
+
+
+SESSIONS: dict[str, Any] = {}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _examples(arm: ArmModel, follow: cmd.Follow) -> None:
+    session = Session(arm, np.array(Settings().ready))
+    state = session.begin(session.ready, 0.0, 0.0)
+    SESSIONS["session"] = session
+    SESSIONS["commands"] = [*examples(session, state), follow]
+    SESSIONS["follow"] = follow
+    SESSIONS["mode"] = session.step(state, [cmd.MoveTool(np.array((0.3, 0.1, 0.0)))], 0.01).mode
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (b"", "not JSON"),
+        (b"[" * 100_000, "not JSON"),
+        (b'{"is": "SetJoint"}', "SetJoint lacks axis, value"),
+        (b'{"is": "os.system", "command": "true"}', "not one of"),
+        (b'{"is": "State"}', "not one of"),
+        (b'{"is": "SetJoint", "axis": 0, "value": 1, "x": 1}', "has no field"),
+        (b'{"is": "SetJoint", "axis": 0.5, "value": 1}', "axis: 0.5 is not a whole number"),
+        (b'{"is": "SetJoint", "axis": 0, "value": "nan"}', "must be a finite number|nan"),
+        (b'{"is": "SetJoints", "q": [0, 1, [2]]}', "q: "),
+        (b'{"is": "SetJoints", "q": {"shape": [1e9], "type": "float64"}}', "is not an array"),
+        (
+            b'{"is":"SetJoints","q":{"shape":[9999999999],"type":"float64","steps":[0],"data":[1]}}',
+            "does not have",
+        ),
+        (b'{"is": "Follow", "plan": "0123", "tau": 0}', "plan: the Plan with the key '0123' is"),
+        (b'{"is": "Batch", "commands": [{"is": "Go"}, {"is": "Home", "a": 1}]}', r"commands\[1\]"),
+    ],
+)
+def test_error_names_the_place_and_the_fault(text: bytes, expected: str) -> None:
+    with pytest.raises(FormError, match=expected):
+        Codec().decoded(cmd.Command, json_form(text))
+
+
+def test_deep_batches_are_refused() -> None:
+    text = b'{"is":"Batch","commands":[' * 400 + b"]}" * 400
+    with pytest.raises(FormError, match="too often"):
+        Codec().decoded(cmd.Command, json_form(text))
+
+
+def test_every_allowed_class_has_a_coder_and_is_frozen() -> None:
+    codec = Codec()
+    for kind in CLASSES:
+        codec.fields(kind)
+        assert kind.__dataclass_params__.frozen, kind  # type: ignore[attr-defined]
+
+
+def test_values_of_other_classes_are_refused(state: State) -> None:
+    class Other:
+        pass
+
+    with pytest.raises(FormError, match="has no form"):
+        Codec().encoded(cmd.Command, Other())
+    with pytest.raises(TypeError, match="not a type of recorded values"):
+        Codec().coder(Other)
+    with pytest.raises(FormError, match="not a number of 64 bits"):
+        Codec().encoded(State, replace(state, gripper=10**40))
+
+
+def test_kinematics_of_a_read_chain_are_the_same(follow: cmd.Follow) -> None:
+    chain = copied(cmd.Command, follow).plan.segments[0].path.chain
+    q = np.array((0.1, -0.9, 1.2, 0.3, 0.4))
+    mine = follow.plan.segments[0].path.chain
+    assert forward(chain, q).tobytes() == forward(mine, q).tobytes()
