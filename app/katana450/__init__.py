@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from katana450.library.loading import load
     from katana450.library.motion_plan import MotionPlan
     from katana450.library.nearest import NearestPose
+    from katana450.library.recording import Recording, open
     from katana450.library.script_writer import ScriptWriter, program
     from katana450.library.solutions import IKSolutions
     from katana450.library.trajectory import Trajectory
@@ -51,6 +52,7 @@ __all__ = [
     "MotionPlan",
     "NearestPose",
     "ReachabilityMap",
+    "Recording",
     "RobotDescriptionError",
     "ScriptWriter",
     "Solution",
@@ -58,6 +60,7 @@ __all__ = [
     "Viewer",
     "connect",
     "load",
+    "open",
     "program",
 ]
 
@@ -73,6 +76,7 @@ _MODULES = {
     "MotionPlan": "library.motion_plan",
     "NearestPose": "library.nearest",
     "ReachabilityMap": "extensions.reachability.map",
+    "Recording": "library.recording",
     "RobotDescriptionError": "errors",
     "ScriptWriter": "library.script_writer",
     "Solution": "maths.kinematics.inverse",
@@ -80,6 +84,7 @@ _MODULES = {
     "Viewer": "library.viewer",
     "connect": "client",
     "load": "library.loading",
+    "open": "library.recording",
     "program": "library.script_writer",
 }
 

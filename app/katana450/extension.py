@@ -51,6 +51,7 @@ BUILT_IN = (
     "experiments",
     "media",
     "phone",
+    "recording",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 

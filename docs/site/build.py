@@ -43,6 +43,7 @@ REFERENCE = {
     "Kinematics": ("IKSolutions", "Solution", "Branch", "NearestPose"),
     "Plans": ("MotionPlan", "Trajectory", "Viewer"),
     "Reachability": ("ReachabilityMap",),
+    "Recordings": ("open", "Recording"),
     "Scripts": ("program", "ScriptWriter"),
     "Client": ("connect", "Client"),
     "Errors": (

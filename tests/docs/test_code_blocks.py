@@ -23,6 +23,7 @@ from katana450.server.api import requests
 from katana450.server.api.requests import RequestDecoder
 from tests.browser.server import ROOT, AppServer
 from tests.docs.code_blocks import CodeBlock, code_block, code_blocks
+from tests.recording.recorded import record
 
 PRINTED_URL = "http://127.0.0.1:8080"
 SECONDS = 120
@@ -85,8 +86,15 @@ def server(running: AppServer) -> AppServer:
     return running
 
 
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "run.mcap"
+    record(path, 20)
+    return path
+
+
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recording: Path) -> Path:
     """An empty folder with the commands of this environment, and what the blocks take as given."""
     (tmp_path / ".venv").symlink_to(Path(sys.executable).parents[1])
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
@@ -95,6 +103,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     script = code_block("docs/programs.md", "name: Square").text
     for name in ("square.yaml", "my_script.yaml"):
         (tmp_path / name).write_text(script, encoding="utf-8")
+    (tmp_path / "run.mcap").symlink_to(recording)
     (tmp_path / "my_arm.urdf").write_bytes((ROOT / "examples" / "my_own_arm.urdf").read_bytes())
     return tmp_path
 

@@ -1,0 +1,1 @@
+"""MCAP files of recordings: writing, reading, repair and cutting."""

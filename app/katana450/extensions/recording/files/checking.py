@@ -1,0 +1,162 @@
+"""Simulation of a recording again, and comparison with what was recorded."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.assembly.robot_session import DescribedRobot, find_robot
+from katana450.errors import InputError
+from katana450.extensions.recording.codec import Codec, json_form
+from katana450.extensions.recording.files.recording_file import Message, RecordingFile
+from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.replay import Checker, Verification
+from katana450.extensions.recording.shared_values import SharedText
+from katana450.extensions.recording.tick_form import TickInput, tick_input
+from katana450.extensions.recording.topics import (
+    CHECKPOINTS,
+    COMMANDS,
+    PLANS,
+    SHARED_TOPICS,
+    SOLIDS,
+    STATE,
+)
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+
+
+class SharedMessage(msgspec.Struct):
+    """Message with a shared value, whose text is kept as it is, because its key is a hash."""
+
+    key: str
+    value: msgspec.Raw
+
+
+class MissingMessage(msgspec.Struct):
+    """Message in place of ticks that were lost."""
+
+    missing: str | None = None
+    ticks: int = 1
+
+
+KINDS = {topic: kind for kind, topic in SHARED_TOPICS.items()}
+
+
+class TickReader:
+    """Reads the messages from which a session is simulated. For one file, in its order."""
+
+    def __init__(self) -> None:
+        self._codec = Codec()
+
+    def add_shared(self, message: Message) -> None:
+        """Remember the plan or solid in ``message``. Raises InputError."""
+        with _placed(message):
+            found = msgspec.json.decode(message.data, type=SharedMessage)
+            self._codec.shared.add(SharedText(KINDS[message.topic], found.key, bytes(found.value)))
+
+    def tick(self, message: Message) -> TickInput | MissingMessage:
+        """Return the tick in ``message``, or the note that it is missing. Raises InputError."""
+        with _placed(message):
+            missing = msgspec.json.decode(message.data, type=MissingMessage)
+            if missing.missing is not None:
+                return missing
+            return tick_input(self._codec, json_form(message.data))
+
+    def checkpoint(self, message: Message) -> State:
+        """Return the state in ``message``. Raises InputError."""
+        with _placed(message):
+            form = json_form(message.data)
+            if not isinstance(form, dict):
+                raise FormError("it is not an object")
+            state: State = self._codec.decoded(State, form.get("state"))
+            return state
+
+
+def state_numbers(message: Message) -> dict[str, Any]:
+    """Return the content of a message of the topic of states. Raises InputError."""
+    with _placed(message):
+        form = json_form(message.data)
+        if not isinstance(form, dict):
+            raise FormError("it is not an object")
+        return form
+
+
+@contextmanager
+def _placed(message: Message) -> Iterator[None]:
+    """Report a fault of ``message`` with its topic and time."""
+    try:
+        yield
+    except (FormError, msgspec.MsgspecError, RecursionError, UnicodeError) as error:
+        at = f"the message of {message.topic} at t = {message.t:.3f} s"
+        raise InputError(f"The recording is damaged in {at}: {error}.") from error
+
+
+def verify_recording(
+    file: RecordingFile, session: Session, progress: Callable[[float], None] | None = None
+) -> Verification:
+    """Return the comparison of ``file`` with its simulation by ``session``.
+
+    ``progress`` is called with the time [s] of each simulated tick. Raises InputError for a damaged
+    recording, and for one of another robot.
+    """
+    reader, checker = TickReader(), Checker(session)
+    for message in file.messages(PLANS, SOLIDS, COMMANDS, CHECKPOINTS, STATE):
+        if message.topic in KINDS:
+            reader.add_shared(message)
+        elif message.topic == STATE:
+            checker.setpoint(_setpoint(message))
+        elif message.topic == CHECKPOINTS:
+            if checker.state is None:
+                checker.checkpoint(reader.checkpoint(message))
+        elif isinstance(found := reader.tick(message), MissingMessage):
+            checker.missing(found.ticks)
+        else:
+            checker.tick(found)
+            if progress is not None:
+                progress(message.t)
+    return checker.result
+
+
+def _setpoint(message: Message) -> np.ndarray[Any, np.dtype[np.float64]]:
+    found = state_numbers(message).get("setpoint")
+    with _placed(message):
+        try:
+            return np.array(found, dtype=np.float64).reshape(-1)
+        except (TypeError, ValueError, OverflowError):
+            raise FormError("the setpoint is not a row of numbers") from None
+
+
+def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot:
+    """Return the robot of ``file`` with a new session like the recorded one.
+
+    ``urdf``: its file, if it is not the robot of this program. Raises InputError if it is another
+    robot, and RobotDescriptionError if its files cannot be read.
+    """
+    recorded = file.metadata.get("urdf_sha256")
+    path = URDF_PATH if urdf is None else urdf
+    try:
+        here = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+    if here != recorded:
+        raise InputError(
+            f"{file.path} is a recording of {file.metadata.get('urdf', 'another robot')!r}, not of "
+            f"{path}. Name the same URDF, with its meshes beside it, by --urdf."
+        )
+    try:
+        used = json.loads(file.metadata.get("settings", ""))
+        ready = tuple(float(each) for each in used["ready"])
+        settings = Settings(ready=ready, bare=bool(used["bare"]))
+        tool = None if used["tool"] is None else str(used["tool"])
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError(f"{file.path} does not state the settings of its session.") from error
+    return find_robot(settings, path, tool)

@@ -1,0 +1,132 @@
+"""Fingerprint of the machine and the libraries on which a session runs.
+
+The same commands give the same bits only with the same libraries on the same kind of processor:
+BLAS and libm choose other code, and so another order of rounding, for other processors.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import math
+import platform
+import struct
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from katana450.cli.version import version
+
+RELEVANT = (
+    *("version", "python", "numpy", "blas", "blas_core", "libc", "machine", "cpu"),
+    *("libm_rounding", "blas_rounding"),
+)
+"""Entries that show why a simulation may not give the same bits."""
+
+PROBES = 2000
+"""Number of arguments with which the rounding of functions is tried."""
+
+HASH_DIGITS = 12
+UNKNOWN = "unknown"
+
+
+def fingerprint() -> dict[str, str]:
+    """Return the versions of program and libraries, and the kind of the processor."""
+    return {
+        "version": version(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "blas": _blas(),
+        "blas_core": _blas_core(),
+        "libc": " ".join(platform.libc_ver()).strip() or UNKNOWN,
+        "machine": f"{sys.platform} {platform.machine()}",
+        "cpu": _cpu(),
+        "cpu_features": _cpu_features(),
+        "libm_rounding": _libm_rounding(),
+        "blas_rounding": _blas_rounding(),
+    }
+
+
+def differences(recorded: Mapping[str, str]) -> list[str]:
+    """Return in words what in ``recorded`` differs from this machine, of the relevant entries."""
+    here = fingerprint()
+    return [
+        f"{name}: {recorded.get(name, UNKNOWN)} there, {here[name]} here"
+        for name in RELEVANT
+        if recorded.get(name, UNKNOWN) != here[name]
+    ]
+
+
+def _libm_rounding() -> str:
+    """Return a hash of results of libm, which differ in the last bit between processors."""
+    digest = hashlib.sha256()
+    for number in range(1, PROBES):
+        x = number / 317.0
+        results = (math.sin(x), math.cos(x), math.atan2(x, 3.0), math.exp(-x), x**0.3)
+        digest.update(struct.pack("<5d", *results))
+    return digest.hexdigest()[:HASH_DIGITS]
+
+
+def _blas_rounding() -> str:
+    """Return a hash of products and a least-squares fit by BLAS, of the sizes that are used."""
+    numbers = np.arange(1.0, 1.0 + PROBES) % 0.7
+    digest = hashlib.sha256()
+    for n in (3, 4, 5, 6, 16):
+        A = numbers[: 20 * n].reshape(20, n)
+        for result in (A @ A.T, A[:n] @ A[:n], A.T @ A, A @ A[0], A[0] @ A[1]):
+            digest.update(np.ascontiguousarray(result).tobytes())
+        digest.update(np.linalg.lstsq(A, numbers[:20], rcond=None)[0].tobytes())
+    return digest.hexdigest()[:HASH_DIGITS]
+
+
+def _blas() -> str:
+    config: Any = np.show_config(mode="dicts")
+    with suppress(KeyError, TypeError):
+        found = config["Build Dependencies"]["blas"]
+        return f"{found['name']} {found['version']}"
+    return UNKNOWN
+
+
+def _blas_core() -> str:
+    """Return the kind of processor for which OpenBLAS has chosen its code."""
+    for path in _libraries():
+        with suppress(OSError, AttributeError):
+            library = ctypes.CDLL(str(path))
+            for name in ("scipy_openblas_get_corename64_", "openblas_get_corename"):
+                with suppress(AttributeError):
+                    core = getattr(library, name)
+                    core.restype = ctypes.c_char_p
+                    return str(core().decode())
+    return UNKNOWN
+
+
+def _libraries() -> Iterator[Path]:
+    """Yield the files of OpenBLAS that numpy has loaded."""
+    package = Path(np.__file__).parent
+    for folder in (package.parent / "numpy.libs", package / ".dylibs"):
+        if folder.is_dir():
+            yield from sorted(folder.glob("*openblas*"))
+
+
+def _cpu() -> str:
+    with suppress(OSError):
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        for line in text.splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or UNKNOWN
+
+
+def _cpu_features() -> str:
+    """Return the SIMD extensions that numpy uses, in short: their number and their hash."""
+    config: Any = np.show_config(mode="dicts")
+    with suppress(KeyError, TypeError):
+        found = config["SIMD Extensions"]
+        names = sorted((*found["baseline"], *found.get("found", ())))
+        digest = hashlib.sha256(" ".join(names).encode()).hexdigest()[:HASH_DIGITS]
+        return f"{len(names)} extensions, {digest}"
+    return UNKNOWN

@@ -1,0 +1,91 @@
+"""The beginning of a recording: what it is of, what made it, and the files that belong to it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from katana450.arm.control.scene_objects import Environment
+from katana450.arm.robot.robot import Robot
+from katana450.errors import InputError
+from katana450.extensions.recording.files.fingerprint import fingerprint
+from katana450.settings import Settings
+
+METADATA: Final = "katana450"
+"""Name of the metadata record."""
+
+FORMAT: Final = "1"
+"""Version of the format of recordings."""
+
+URDF_MEDIA_TYPE = "application/xml"
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file that belongs to a recording: its name, its media type and its content."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingHeader:
+    """The beginning of a recording.
+
+    Attributes:
+        robot: the robot.
+        environment: gives the poses of objects in the hand; None to leave them out.
+        metadata: texts by their names, see ``header_of``.
+        attachments: files that belong to it.
+        salt: random bytes for the pseudonyms of people; files that are to be joined have the same.
+    """
+
+    robot: Robot
+    environment: Environment | None
+    metadata: Mapping[str, str]
+    attachments: tuple[Attachment, ...] = ()
+    salt: bytes = field(default_factory=lambda: secrets.token_bytes(16), repr=False)
+
+
+def header_of(
+    robot: Robot,
+    settings: Settings,
+    urdf: Path,
+    tool: str | None = None,
+    environment: Environment | None = None,
+    attachments: Sequence[Attachment] = (),
+) -> RecordingHeader:
+    """Return the header of a recording that begins now. Raises InputError without the URDF.
+
+    Args:
+        robot: the robot.
+        settings: settings of the server.
+        urdf: file of the robot, which is attached.
+        tool: the link to which targets refer; None for that of the file.
+        environment: gives the poses of objects in the hand.
+        attachments: further files, such as scene and script.
+    """
+    try:
+        described = urdf.read_bytes()
+    except OSError as error:
+        raise InputError(f"{urdf} cannot be read: {error.strerror or error}.") from error
+    used = {"ready": settings.ready, "bare": settings.bare, "rate": settings.rate, "tool": tool}
+    metadata = {
+        "format": FORMAT,
+        "robot": robot.name,
+        "urdf": urdf.name,
+        "urdf_sha256": hashlib.sha256(described).hexdigest(),
+        "settings": json.dumps(used),
+        # The clock of states begins at an arbitrary time.
+        "utc_offset_ns": str(time.time_ns() - time.perf_counter_ns()),
+        **fingerprint(),
+    }
+    first = Attachment(urdf.name, URDF_MEDIA_TYPE, described)
+    return RecordingHeader(robot, environment, metadata, (first, *attachments))

@@ -1,0 +1,147 @@
+"""``katana450 record``: list, describe, repair, verify, cut and export recordings."""
+
+from __future__ import annotations
+
+import math
+import sys
+from argparse import Namespace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from katana450.assembly.log_lines import printable
+from katana450.errors import InputError
+from katana450.extensions.recording.files.checking import session_for, verify_recording
+from katana450.extensions.recording.files.fingerprint import differences
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recovery import recover
+from katana450.extensions.recording.files.table import write_csv
+from katana450.extensions.recording.files.trimming import trim
+
+SUFFIX = "*.mcap"
+
+PROGRESS_STEP = 0.02
+"""[1] Fraction of a recording after which the progress is shown again."""
+
+MB = 1e6
+
+
+def record(options: Namespace) -> int:
+    """Run ``katana450 record`` and return the exit status: 1 if a verification finds a difference.
+
+    Raises InputError for a file that cannot be used.
+    """
+    match options.act:
+        case "list":
+            return _list(options.folder)
+        case "info":
+            return _info(options.file)
+        case "recover":
+            return _recover(options.file, options.out or options.file)
+        case "verify":
+            return _verify(options.file, options.urdf)
+        case "trim":
+            return _trim(options.files, options.out, options.start, options.end)
+        case _:
+            return _export(options)
+
+
+def _list(folder: Path) -> int:
+    if not folder.is_dir():
+        raise InputError(f"There is no folder {folder}.")
+    for path in sorted(folder.glob(SUFFIX)):
+        try:
+            with RecordingFile.open(path) as file:
+                length = f"{file.end - file.start:.1f} s"
+                print(f"{path}  {_began(file)}  {length}  {file.size / MB:.1f} MB")
+        except InputError as error:
+            print(printable(f"{path}  {error}"), file=sys.stderr)
+    return 0
+
+
+def _info(path: Path) -> int:
+    with RecordingFile.open(path) as file:
+        print(f"{path}: {file.end - file.start:.1f} s from {_began(file)}, {file.size / MB:.1f} MB")
+        print(f"Times of its messages: {file.start:.3f} to {file.end:.3f} s")
+        for topic, count in file.counts().items():
+            print(printable(f"  {topic}: {count} messages"))
+        for each in file.attachments():
+            print(printable(f"  attached: {each.name}, {len(each.data)} bytes"))
+        for name, value in sorted(file.metadata.items()):
+            print(printable(f"  {name}: {value}"))
+    return 0
+
+
+def _recover(path: Path, out: Path) -> int:
+    found = recover(path, out)
+    if found is None:
+        print(f"{path} is whole: nothing was changed.")
+    else:
+        print(printable(f"{out}: {found}."))
+    return 0
+
+
+def _verify(path: Path, urdf: Path | None) -> int:
+    with RecordingFile.open(path) as file:
+        found = session_for(file, urdf)
+        result = verify_recording(file, found.session, _Progress(file))
+        print(f"{path}: {result}.")
+        if result.ticks == 0:
+            raise InputError(f"{path} has no tick that can be simulated.")
+        if result.identical:
+            return 0
+        others = differences(file.metadata)
+        if others:
+            print("It was made by another program or machine, whose rounding can differ:")
+            for each in others:
+                print(printable(f"  {each}"))
+        else:
+            print("Program, libraries and rounding are the same, so the recording was changed.")
+    return 1
+
+
+class _Progress:
+    """Shows the progress on a terminal."""
+
+    def __init__(self, file: RecordingFile) -> None:
+        self._start, self._length = file.start, max(file.end - file.start, PROGRESS_STEP)
+        self._shown = -1.0 if sys.stderr.isatty() else math.inf
+
+    def __call__(self, t: float) -> None:
+        """Show the progress at ``t`` [s] of the recording."""
+        fraction = (t - self._start) / self._length
+        if fraction >= self._shown + PROGRESS_STEP:
+            self._shown = fraction
+            print(f"\r{100.0 * fraction:3.0f} %", end="\r", file=sys.stderr, flush=True)
+
+
+def _trim(paths: list[Path], out: Path, start: float, end: float) -> int:
+    first = math.inf
+    for path in paths:
+        with RecordingFile.open(path) as file:
+            first = min(first, file.start)
+    found = trim(paths, out, first + start, first + end)
+    print(f"{out}: {found.end - found.start:.1f} s.")
+    if found.simulated_from is None:
+        print("No complete state lies before its end, so it cannot be verified.")
+    return 0
+
+
+def _export(options: Namespace) -> int:
+    if options.format == "mcap":
+        return _trim([options.file], options.out, options.start, options.end)
+    with RecordingFile.open(options.file) as file:
+        first = file.start
+        count = write_csv(file, options.out, first + options.start, first + options.end)
+    print(f"{options.out}: {count} rows.")
+    return 0
+
+
+def _began(file: RecordingFile) -> str:
+    """Return the time of the first message in UTC."""
+    if not file.utc_offset:
+        return "an unknown time"
+    try:
+        began = datetime.fromtimestamp(file.start + file.utc_offset, UTC)
+    except (ValueError, OverflowError, OSError):
+        return "an unknown time"
+    return f"{began:%Y-%m-%d %H:%M:%S} UTC"

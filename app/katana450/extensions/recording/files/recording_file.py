@@ -1,0 +1,287 @@
+"""Reader of recordings. It takes files of anybody: every fault is an InputError.
+
+Memory is bounded: no record is longer than the file, and no chunk unpacks to more than a maximum.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Final, NamedTuple, Self
+
+import zstandard
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import Chunk, ChunkIndex
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.summary import Summary
+
+from katana450.errors import InputError
+from katana450.extensions.recording.files.header import METADATA, Attachment
+from katana450.extensions.recording.state_message import NANO, nanoseconds
+
+MAX_CHUNK_BYTES = 64_000_000
+"""Maximum size of an unpacked chunk. The writer makes chunks of 1 MB and one message more."""
+
+MAX_RECORD_BYTES = 256_000_000
+"""Maximum size of a record; only an attachment is that large."""
+
+PART_START: Final = "part_start_s"
+"""Name of the metadata with the begin of a part that was cut out of a recording [s]."""
+
+FAULTS: Final = (
+    McapError,
+    zstandard.ZstdError,
+    struct.error,
+    ValueError,
+    LookupError,
+    OverflowError,
+    EOFError,
+)
+"""Errors that reading a damaged file raises."""
+
+
+class Message(NamedTuple):
+    """A message: its topic, the number of its tick, its time [ns] and its JSON."""
+
+    topic: str
+    number: int
+    log_time: int
+    data: bytes
+
+    @property
+    def t(self) -> float:
+        """Time of the message [s]."""
+        return self.log_time / NANO
+
+
+class BoundedStream:
+    """A file that refuses to read more than it holds, before any memory is used for that."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.size = file.seek(0, 2)
+        """Length of the file [bytes]."""
+        file.seek(0)
+
+    def read(self, length: int = -1) -> bytes:
+        """Return the next ``length`` bytes. Raises EOFError if there are fewer."""
+        left = self.size - self._file.tell()
+        if not 0 <= length <= left:
+            raise EOFError(f"it ends {length - left} bytes too soon")
+        return self._file.read(length)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Go to ``offset``."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """Return the place in the file."""
+        return self._file.tell()
+
+    def seekable(self) -> bool:
+        """Return True."""
+        return True
+
+
+def unpacked(chunk: Chunk) -> list[Any]:
+    """Return the records in ``chunk``. Raises one of FAULTS."""
+    if chunk.compression not in ("", "zstd"):
+        raise ValueError(f"its chunks are compressed by {chunk.compression!r}, not by zstd")
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        # The unpacker uses as much memory as this says.
+        stated = zstandard.get_frame_parameters(chunk.data).content_size
+        if stated != size:
+            raise ValueError("the size of a chunk is wrong")
+    if size > MAX_CHUNK_BYTES:
+        raise ValueError(f"a chunk has {size} bytes, more than {MAX_CHUNK_BYTES}")
+    return breakup_chunk(chunk, validate_crc=True)
+
+
+def records_at(stream: BoundedStream, offset: int) -> Iterator[Any]:
+    """Return the records from ``offset`` on, chunks as they are."""
+    stream.seek(offset)
+    reader = StreamReader(
+        stream,  # type: ignore[arg-type]  # it has all that is used of a file
+        skip_magic=offset > 0,
+        emit_chunks=True,
+        record_size_limit=MAX_RECORD_BYTES,
+    )
+    return iter(reader.records)
+
+
+class RecordingFile:
+    """A recording that is read by its index. For use in one thread."""
+
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        """Read the index of ``file``; use ``open`` instead."""
+        self.path = path
+        self._file = file
+        self._stream = BoundedStream(file)
+        with self._faults():
+            self._reader = SeekingReader(
+                self._stream,  # type: ignore[arg-type]  # it has all that is used of a file
+                validate_crcs=True,
+                record_size_limit=MAX_RECORD_BYTES,
+            )
+            summary = self._summary()
+            self._topics = {each.id: each.topic for each in summary.channels.values()}
+            self._chunks = sorted(summary.chunk_indexes, key=lambda each: each.chunk_start_offset)
+            named = {each.name: dict(each.metadata) for each in self._reader.iter_metadata()}
+        if METADATA not in named:
+            raise InputError(f"{path} is an MCAP file, but no recording of katana450.")
+        self.metadata: Mapping[str, str] = named[METADATA]
+        """Texts about the recording by their names."""
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """Open the recording at ``path``. Raises InputError if it cannot be read."""
+        try:
+            file = path.open("rb")
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+        try:
+            return cls(path, file)
+        except BaseException:
+            file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _summary(self) -> Summary:
+        try:
+            summary = self._reader.get_summary()
+        except FAULTS as error:
+            # The beginning was valid, so the end is missing.
+            raise InputError(
+                f"{self.path} has no valid end, as after a crash. Repair it with "
+                f"`katana450 record recover {self.path}`."
+            ) from error
+        if summary is None or not summary.channels:
+            raise InputError(f"{self.path} has no index, so it is no whole recording.")
+        return summary
+
+    @contextmanager
+    def _faults(self) -> Iterator[None]:
+        try:
+            yield
+        except InputError:
+            raise
+        except FAULTS as error:
+            raise InputError(
+                f"{self.path} is no recording, or is damaged: {error or type(error).__name__}."
+            ) from error
+        except OSError as error:
+            raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
+
+    @property
+    def start(self) -> float:
+        """Time at which the recording begins [s]; 0 if it is empty.
+
+        Ticks before the begin of a part that was cut out serve its simulation only.
+        """
+        first = min((each.message_start_time for each in self._chunks), default=0) / NANO
+        try:
+            return max(first, float(self.metadata.get(PART_START, "-inf")))
+        except ValueError:
+            return first
+
+    @property
+    def end(self) -> float:
+        """Time of the last message [s]; 0 if there is none."""
+        return max((each.message_end_time for each in self._chunks), default=0) / NANO
+
+    @property
+    def size(self) -> int:
+        """Length of the file [bytes]."""
+        return self._stream.size
+
+    @property
+    def utc_offset(self) -> float:
+        """Seconds to add to the times of the recording for seconds since the epoch."""
+        text = self.metadata.get("utc_offset_ns", "")
+        return int(text) / NANO if text.lstrip("-").isdigit() and len(text) < 20 else 0.0
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the files that belong to the recording. Raises InputError."""
+        with self._faults():
+            for each in self._reader.iter_attachments():
+                yield Attachment(each.name, each.media_type, each.data)
+
+    def counts(self) -> dict[str, int]:
+        """Return the number of messages of each topic. Raises InputError."""
+        with self._faults():
+            summary = self._reader.get_summary()
+            if summary is None or summary.statistics is None:
+                return {}
+            counts = summary.statistics.channel_message_counts
+            return {topic: counts.get(channel, 0) for channel, topic in self._topics.items()}
+
+    def messages(
+        self, *topics: str, start: float = -math.inf, end: float = math.inf
+    ) -> Iterator[Message]:
+        """Yield the messages of ``topics`` from ``start`` to ``end`` [s], in their order.
+
+        Raises InputError where the file is damaged.
+        """
+        wanted = frozenset(topics)
+        first, last = nanoseconds_of(start), nanoseconds_of(end)
+        for index in self._chunks:
+            if (
+                index.message_end_time >= first
+                and index.message_start_time <= last
+                and self._has(index, wanted)
+            ):
+                for message in self._messages(index, wanted):
+                    if first <= message.log_time <= last:
+                        yield message
+
+    def last_before(self, topic: str, t: float) -> Message | None:
+        """Return the last message of ``topic`` at or before ``t`` [s]; None if there is none."""
+        wanted = frozenset((topic,))
+        for index in reversed(self._chunks):
+            if index.message_start_time <= nanoseconds_of(t) and self._has(index, wanted):
+                last = nanoseconds_of(t)
+                found = [each for each in self._messages(index, wanted) if each.log_time <= last]
+                if found:
+                    return found[-1]
+        return None
+
+    def _has(self, index: ChunkIndex, topics: frozenset[str]) -> bool:
+        return any(self._topics.get(each) in topics for each in index.message_index_offsets)
+
+    def _messages(self, index: ChunkIndex, topics: frozenset[str]) -> list[Message]:
+        with self._faults():
+            chunk = next(records_at(self._stream, index.chunk_start_offset))
+            if not isinstance(chunk, Chunk):
+                raise ValueError("its index is wrong")
+            return [
+                Message(topic, record.sequence, record.log_time, record.data)
+                for record in unpacked(chunk)
+                if isinstance(record, McapMessage)
+                and (topic := self._topics.get(record.channel_id, "")) in topics
+            ]
+
+
+def nanoseconds_of(t: float) -> float:
+    """Return the log time of ``t`` [s], which may be infinite."""
+    return nanoseconds(t) if math.isfinite(t) else t

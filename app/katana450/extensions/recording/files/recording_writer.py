@@ -1,0 +1,173 @@
+"""Writer of recordings: MCAP files with JSON messages.
+
+A message is on the disk after ``flush`` and ``os.fsync`` of the file, which the caller does about
+once a second. What was synced before a crash can be recovered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+from mcap.writer import CompressionType, Writer
+
+from katana450.arm.control.state import State
+from katana450.arm.runtime.tick import TickRecord
+from katana450.cli.version import version
+from katana450.extensions.recording.codec import Codec, json_text
+from katana450.extensions.recording.digest import Digester
+from katana450.extensions.recording.files.header import METADATA, RecordingHeader
+from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.pseudonyms import Pseudonyms
+from katana450.extensions.recording.state_message import StateMessages, nanoseconds
+from katana450.extensions.recording.tick_form import tick_form
+from katana450.extensions.recording.topics import (
+    CHECKPOINTS,
+    COMMANDS,
+    EVENTS,
+    JOINT_STATES,
+    SHARED_TOPICS,
+    STATE,
+    TF,
+    TOPICS,
+)
+
+CHUNK_BYTES = 1 << 20
+"""Maximum size of a chunk before compression. ``flush`` ends one sooner."""
+
+CHECKPOINT_PERIOD = 10.0
+"""[s] Time between two complete states: a simulation from one to any moment takes a second."""
+
+SHOWN_PERIOD = 0.05
+"""[s] Minimum time between two messages that only displays read."""
+
+
+def started(file: BinaryIO) -> tuple[Writer, dict[str, int]]:
+    """Begin a recording in ``file``; return its writer, and the channel of each topic."""
+    writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer.start("katana450", f"katana450 {version()}")
+    channels = {}
+    for topic in TOPICS:
+        schema = writer.register_schema(topic.schema_name, "jsonschema", json_text(topic.schema))
+        channels[topic.name] = writer.register_channel(topic.name, "json", schema)
+    return writer, channels
+
+
+@dataclass
+class _Written:
+    """Part of the states that has been written so far."""
+
+    content: bytes = b""
+    t: float | None = None
+    checkpoint_t: float | None = None
+    shown_t: float = float("-inf")
+    shown: bool = True
+    moved: set[str] = field(default_factory=set)
+
+
+class RecordingWriter:
+    """Writes the ticks of one session to a file. For use in one thread.
+
+    Every method may raise OSError. The file is then good for ``recover`` only.
+    """
+
+    def __init__(self, file: BinaryIO, header: RecordingHeader) -> None:
+        """Begin a recording in ``file``, which is open for writing and empty."""
+        self._file = file
+        self._writer, self._channels = started(file)
+        self._writer.add_metadata(METADATA, dict(header.metadata))
+        for each in header.attachments:
+            self._writer.add_attachment(0, 0, each.name, each.media_type, each.data)
+        self._codec, self._digester = Codec(), Digester()
+        self._pseudonyms = Pseudonyms(header.salt)
+        self._messages = StateMessages(header.robot, header.environment)
+        self._number = 0
+        self._written = _Written()
+        file.flush()
+
+    def put(self, record: TickRecord) -> None:
+        """Write one tick. Its records must come in the order of the ticks, without gaps.
+
+        A tick with a value that has no form is written as missing, with the reason.
+        """
+        record, written = self._pseudonyms.record(record), self._written
+        state, t = record.state, record.t
+        self._number += 1
+        try:
+            content = self._digester.content(state)
+            digest = self._digester.digest(state, content)
+            form = tick_form(self._codec, record, written.t, digest)
+        except FormError as error:
+            written.checkpoint_t = written.t = None
+            self._add(COMMANDS, t, {"t": t, "missing": str(error), "ticks": 1})
+            return
+        self._add_shared(t)
+        self._add(COMMANDS, t, form)
+        written.t = state.t
+        due = written.checkpoint_t is None or t - written.checkpoint_t >= CHECKPOINT_PERIOD
+        if due:
+            self._messages.describe_all()
+        if due or content != written.content:
+            written.content = content
+            self._add_state(t, state)
+        if not written.shown and t - written.shown_t >= SHOWN_PERIOD:
+            self._add_shown(t, state)
+        if due:
+            self._add_checkpoint(t, state)
+
+    def lost(self, t: float, ticks: int, why: str) -> None:
+        """Record that ``ticks`` ticks until ``t`` [s] were lost, for the reason ``why``."""
+        self._number += ticks
+        self._written.checkpoint_t = self._written.t = None
+        self._add(COMMANDS, t, {"t": t, "missing": why, "ticks": ticks})
+
+    def event(self, t: float, kind: str, what: Mapping[str, Any]) -> None:
+        """Record an event at ``t`` [s] with further fields, which are JSON values."""
+        self._add(EVENTS, t, {"t": t, "kind": kind, **what})
+
+    def flush(self) -> None:
+        """Give everything to the system. ``os.fsync`` of the file then brings it to the disk."""
+        self._writer.flush()
+        self._file.flush()
+
+    def close(self) -> None:
+        """Write the index and the end of the file. The file itself stays open."""
+        self._writer.finish()
+        self._file.flush()
+
+    def _add(self, topic: str, t: float, form: Any) -> None:
+        at = max(nanoseconds(t), 0)
+        self._writer.add_message(self._channels[topic], at, json_text(form), at, self._number)
+
+    def _add_shared(self, t: float) -> None:
+        at = max(nanoseconds(t), 0)
+        for kind, key, text in self._codec.shared.take_new():
+            # The key is that of these bytes, so they are written as they are.
+            data = b'{"key":"%b","value":%b}' % (key.encode(), text)
+            channel = self._channels[SHARED_TOPICS[kind]]
+            self._writer.add_message(channel, at, data, at, self._number)
+
+    def _add_state(self, t: float, state: State) -> None:
+        message = self._messages.state(state)
+        self._add(STATE, t, message)
+        self._written.shown = False
+        self._written.moved.update(each["name"] for each in message.get("objects", ()))
+        self._written.moved.difference_update(message.get("removed", ()))
+
+    def _add_shown(self, t: float, state: State) -> None:
+        """Write the messages that displays read."""
+        self._add(JOINT_STATES, t, self._messages.joint_states(state))
+        self._add(TF, t, self._messages.transforms(state, sorted(self._written.moved)))
+        self._written.shown, self._written.shown_t = True, t
+        self._written.moved.clear()
+
+    def _add_checkpoint(self, t: float, state: State) -> None:
+        try:
+            form = self._codec.encoded(State, state)
+        except FormError:
+            # A value without a form, whose tick was written as missing. A later state may do.
+            return
+        self._add_shared(t)
+        self._add(CHECKPOINTS, t, {"t": t, "state": form})
+        self._written.checkpoint_t = t

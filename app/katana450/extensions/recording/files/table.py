@@ -1,0 +1,99 @@
+"""Recordings as tables: columns in memory, and CSV files of the motion."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from katana450.atomic import write_files, writer_of
+from katana450.errors import InputError
+from katana450.extensions.recording.files.checking import state_numbers
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.topics import CHECKPOINTS, STATE
+from katana450.maths.geometry.arrays import FloatArray, finite_array
+
+WIDTHS = {"q": None, "qd": None, "setpoint": None, "position": 3, "orientation": 4}
+NUMBERS = ("t", "gripper", "gripper_setpoint", "speed")
+
+
+def rows(
+    file: RecordingFile, start: float = -math.inf, end: float = math.inf
+) -> Iterator[dict[str, Any]]:
+    """Yield the states that were written from ``start`` to ``end`` [s]. Raises InputError."""
+    for message in file.messages(STATE, start=start, end=end):
+        yield state_numbers(message)
+
+
+def state_at(file: RecordingFile, t: float) -> dict[str, Any] | None:
+    """Return the last state at or before ``t`` [s], with all its objects; None if there is none.
+
+    Only objects that changed are in the message of a state; the others are those since the last
+    complete state. Raises InputError for a damaged recording.
+    """
+    checkpoint = file.last_before(CHECKPOINTS, t)
+    found: dict[str, Any] | None = None
+    objects: dict[str, Any] = {}
+    try:
+        for found in rows(file, -math.inf if checkpoint is None else checkpoint.t, t):
+            objects.update({each["name"]: each for each in found.pop("objects", ())})
+            for name in found.pop("removed", ()):
+                objects.pop(name, None)
+    except (TypeError, KeyError) as error:
+        raise InputError(f"{file.path} is damaged: the objects of a state are wrong.") from error
+    return None if found is None else {**found, "objects": list(objects.values())}
+
+
+def columns(
+    file: RecordingFile, start: float = -math.inf, end: float = math.inf
+) -> dict[str, FloatArray]:
+    """Return the numbers of all states as arrays with one row for each, by their names.
+
+    Names: ``t``, ``q``, ``qd``, ``setpoint``, ``gripper``, ``gripper_setpoint``, ``speed``, and
+    ``position`` and ``orientation`` of an arm. Raises InputError for a damaged recording.
+    """
+    found = list(rows(file, start, end))
+    if not found:
+        raise InputError(f"{file.path} has no states in that time.")
+    names = [*NUMBERS, *(name for name in WIDTHS if name in found[0])]
+    table = {}
+    for name in names:
+        first = found[0].get(name)
+        width = len(first) if isinstance(first, list) else None
+        shape = (len(found),) if width is None else (len(found), width)
+        values = [row.get(name) for row in found]
+        if any(value is None for value in values):
+            raise InputError(f"{file.path} is damaged: it has a state without {name}.")
+        table[name] = finite_array(values, shape, f"{name} of {file.path}")  # type: ignore[arg-type]
+    return table
+
+
+def write_csv(
+    file: RecordingFile, out: Path, start: float = -math.inf, end: float = math.inf
+) -> int:
+    """Write the setpoints as a CSV file and return the number of its rows.
+
+    The columns are ``t`` [s] from 0, ``theta1`` and so on [rad or m], and for an arm ``gripper``
+    [rad or m]. Their 17 digits are exact. Raises InputError.
+    """
+    table = columns(file, start, end)
+    t, q = table["t"], table["setpoint"]
+    # An extra tick for a STOP can have the time of the tick before.
+    later = np.concatenate(([True], np.diff(t) > 0.0))
+    kept = [t[later] - t[0], *q[later].T]
+    names = ["t", *(f"theta{axis}" for axis in range(1, q.shape[1] + 1))]
+    if "position" in table:
+        kept.append(table["gripper_setpoint"][later])
+        names.append("gripper")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    lines = np.stack(kept, axis=1)
+    writer.writerows([f"{value:.17g}" for value in line] for line in lines.tolist())
+    write_files({out: writer_of(text.getvalue().encode())})
+    return len(lines)

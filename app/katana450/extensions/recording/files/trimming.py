@@ -1,0 +1,150 @@
+"""A part of a recording, or of several that follow each other, as a recording of its own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from katana450.atomic import write_files
+from katana450.errors import InputError
+from katana450.extensions.recording.files.copying import RecordingCopy
+from katana450.extensions.recording.files.recording_file import (
+    PART_START,
+    Message,
+    RecordingFile,
+    nanoseconds_of,
+)
+from katana450.extensions.recording.topics import (
+    CHECKPOINTS,
+    COMMANDS,
+    EPISODES,
+    EVENTS,
+    JOINT_STATES,
+    PLANS,
+    SOLIDS,
+    STATE,
+    TF,
+)
+
+KEY = re.compile(rb'"([0-9a-f]{32})"')
+"""Pattern of the keys of shared values in messages."""
+
+SHOWN = (JOINT_STATES, TF, EVENTS, EPISODES)
+"""Topics of which only the messages in the part are kept."""
+
+CHUNK_SECONDS = 1.0
+"""[s] Time after which a chunk ends, as in a recording; the index is by chunks."""
+
+
+@dataclass(frozen=True)
+class Trimmed:
+    """A part of a recording.
+
+    Attributes:
+        start, end: its first and last moment [s].
+        simulated_from: time [s] of the complete state from which it can be simulated; None if there
+            is none before its end.
+    """
+
+    start: float
+    end: float
+    simulated_from: float | None
+
+
+def trim(sources: Sequence[Path], out: Path, start: float, end: float) -> Trimmed:
+    """Write the part from ``start`` to ``end`` [s] of ``sources`` to ``out``.
+
+    The sources are files of one session, which are put into the order of their times. The ticks
+    from the last complete state before ``start`` on are kept too, so that the part can be simulated
+    again. Raises InputError if there is nothing in that time, or a file cannot be read.
+    """
+    with ExitStack() as stack:
+        files = [stack.enter_context(RecordingFile.open(path)) for path in sources]
+        files.sort(key=lambda file: file.start)
+        first, last = max(start, files[0].start), min(end, max(file.end for file in files))
+        if first > last or not start < end:
+            raise InputError(
+                f"There is nothing from {start:.3f} to {end:.3f} s; the recording is from "
+                f"{files[0].start:.3f} to {files[-1].end:.3f} s."
+            )
+        if len({file.metadata.get("utc_offset_ns") for file in files}) > 1:
+            raise InputError("The files are not of one run of the server, so their times differ.")
+        begin = _checkpoint_before(files, first)
+        write_files({out: lambda target: _write(target, files, (first, last), begin)})
+    return Trimmed(first, last, begin)
+
+
+def _checkpoint_before(files: Sequence[RecordingFile], t: float) -> float | None:
+    """Return the time of the last checkpoint at or before ``t`` [s], or else of the first."""
+    for file in reversed(files):
+        found = file.last_before(CHECKPOINTS, t)
+        if found is not None:
+            return found.t
+    return next((each.t for file in files for each in file.messages(CHECKPOINTS)), None)
+
+
+def _write(
+    target: BinaryIO,
+    files: Sequence[RecordingFile],
+    part: tuple[float, float],
+    begin: float | None,
+) -> None:
+    start, end = part
+    metadata = {**files[0].metadata, PART_START: repr(start)}
+    copy = RecordingCopy(target, metadata, files[0].attachments())
+    needed: set[bytes] = set()
+    for message in _simulated(files, begin, end):
+        needed.update(KEY.findall(message.data))
+    given: set[bytes] = set()
+    for file in files:
+        for message in file.messages(PLANS, SOLIDS, end=end):
+            key = KEY.search(message.data)
+            if key is not None and key[1] in needed - given:
+                given.add(key[1])
+                copy.add(message)
+    copy.flush()
+    chunk_ends = start
+    for message in _merged(files, begin, start, end):
+        copy.add(message)
+        if message.t >= chunk_ends:
+            copy.flush()
+            chunk_ends = message.t + CHUNK_SECONDS
+    copy.close()
+
+
+def _simulated(
+    files: Sequence[RecordingFile], begin: float | None, end: float
+) -> Iterator[Message]:
+    """Yield the checkpoint at ``begin`` [s], later ones and the ticks after it, until ``end``."""
+    if begin is None:
+        return
+    number = -1
+    for file in files:
+        for message in file.messages(COMMANDS, CHECKPOINTS, start=begin, end=end):
+            if number < 0 and message.topic == CHECKPOINTS:
+                number = message.number
+            if number >= 0:
+                yield message
+
+
+def _merged(
+    files: Sequence[RecordingFile], begin: float | None, start: float, end: float
+) -> Iterator[Message]:
+    """Yield the messages of the part in the order of their files."""
+    begun = False
+    first = start if begin is None else min(begin, start)
+    for file in files:
+        for message in file.messages(COMMANDS, CHECKPOINTS, STATE, *SHOWN, start=first, end=end):
+            begun |= message.topic == CHECKPOINTS
+            if message.topic == STATE:
+                # The first one is that of the checkpoint, which names all objects.
+                yield message
+            elif message.topic in SHOWN:
+                if message.log_time >= nanoseconds_of(start):
+                    yield message
+            elif begun:
+                yield message

@@ -1,0 +1,74 @@
+"""Options of ``katana450 record``, separate from its work: reading them must load nothing heavy."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+FORMATS = ("csv", "mcap")
+
+
+def add_record_options(parser: argparse.ArgumentParser) -> None:
+    """Add the subcommands of ``katana450 record`` to ``parser``."""
+    acts = parser.add_subparsers(
+        dest="act", required=True, metavar="list | info | recover | verify | trim | export"
+    )
+    listed = acts.add_parser("list", help="list the recordings in a folder")
+    listed.add_argument("folder", type=Path, nargs="?", default=Path(), metavar="FOLDER")
+    info = acts.add_parser("info", help="describe a recording")
+    info.add_argument("file", type=Path, metavar="FILE")
+    recover = acts.add_parser("recover", help="repair a recording after a crash")
+    recover.add_argument("file", type=Path, metavar="FILE")
+    recover.add_argument(
+        "--out", type=Path, metavar="FILE", help="new file (default: replace the broken one)"
+    )
+    verify = acts.add_parser(
+        "verify", help="simulate the recorded commands again and compare every tick"
+    )
+    verify.add_argument("file", type=Path, metavar="FILE")
+    verify.add_argument(
+        "--urdf",
+        type=Path,
+        metavar="FILE",
+        help="the recorded robot, if it is not the Katana450 of this program",
+    )
+    trim = acts.add_parser("trim", help="write a part of a recording, or join several")
+    trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    export = acts.add_parser("export", help="write a recording for other programs")
+    export.add_argument("file", type=Path, metavar="FILE")
+    export.add_argument(
+        "--format",
+        choices=FORMATS,
+        default=FORMATS[0],
+        help="csv: t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it; "
+        "mcap: a recording (default: %(default)s)",
+    )
+    for each in (trim, export):
+        each.add_argument("--out", type=Path, required=True, metavar="FILE", help="new file")
+        each.add_argument(
+            "--from",
+            dest="start",
+            type=_seconds,
+            default=0.0,
+            metavar="S",
+            help="begin of the part, in seconds after the begin of the recording",
+        )
+        each.add_argument(
+            "--to",
+            dest="end",
+            type=_seconds,
+            default=math.inf,
+            metavar="S",
+            help="end of the part (default: that of the recording)",
+        )
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not value >= 0.0:
+        raise argparse.ArgumentTypeError(f"a number of seconds from 0, not {text!r}")
+    return value

@@ -1,0 +1,203 @@
+"""A recording of an arm as arrays: `katana450.open`."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from katana450.arm.control.commands import Command
+from katana450.errors import ConfigurationError, InputError
+from katana450.extensions.recording.files.checking import (
+    MissingMessage,
+    TickReader,
+    session_for,
+    state_numbers,
+    verify_recording,
+)
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.table import columns
+from katana450.extensions.recording.replay import Verification
+from katana450.extensions.recording.topics import COMMANDS, EVENTS, PLANS, SOLIDS
+from katana450.maths.geometry.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCommand:
+    """A command in a recording.
+
+    Attributes:
+        t: time of its tick [s].
+        command: the command.
+        giver: display name of the person or program that gave it; empty for the arm's process.
+    """
+
+    t: float
+    command: Command
+    giver: str
+
+
+class Recording:
+    """A recording of an arm. Its content is read when it is used.
+
+    Arrays have one row for each of N states, which are those that differ from the one before.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Open the recording at ``path``. Raises InputError for a file that is none.
+
+        Args:
+            path: an MCAP file of katana450.
+        """
+        self.path = Path(path)
+        with RecordingFile.open(self.path) as file:
+            self.metadata: Mapping[str, str] = dict(file.metadata)
+            """Program, machine and settings that made it, by name."""
+            self.start, self.end = file.start, file.end
+            """Times of begin and end [s], on the clock of the recording."""
+            self.utc_offset = file.utc_offset
+            """Seconds to add to its times for seconds since the epoch."""
+
+    def __repr__(self) -> str:
+        return f"Recording({str(self.path)!r}, {self.end - self.start:.1f} s)"
+
+    @cached_property
+    def _columns(self) -> Mapping[str, FloatArray]:
+        with RecordingFile.open(self.path) as file:
+            return columns(file, self.start, self.end)
+
+    def _column(self, name: str) -> FloatArray:
+        if name not in self._columns:
+            raise InputError(f"{self.path} has no {name}: its robot has joints only, without tool.")
+        return self._columns[name]
+
+    @property
+    def t(self) -> FloatArray:
+        """Times (N,) [s], on the clock of the recording."""
+        return self._column("t")
+
+    @property
+    def q(self) -> FloatArray:
+        """Joints (N, n) as the driver reported them [rad, or m where they slide]."""
+        return self._column("q")
+
+    @property
+    def qd(self) -> FloatArray:
+        """Rates (N, n) of the setpoints [rad/s or m/s]."""
+        return self._column("qd")
+
+    @property
+    def setpoint(self) -> FloatArray:
+        """Setpoints (N, n) of the joints [rad or m]."""
+        return self._column("setpoint")
+
+    @property
+    def gripper(self) -> FloatArray:
+        """Finger joint (N,) as the driver reported it [rad or m]."""
+        return self._column("gripper")
+
+    @property
+    def position(self) -> FloatArray:
+        """Tool point (N, 3) in the base frame [m]. Raises InputError for a robot without a tool."""
+        return self._column("position")
+
+    @property
+    def orientation(self) -> FloatArray:
+        """Unit quaternion (N, 4) x, y, z, w of the tool in the base frame. Raises InputError."""
+        return self._column("orientation")
+
+    @cached_property
+    def commands(self) -> tuple[RecordedCommand, ...]:
+        """All commands with their times and givers, in order. Raises InputError."""
+        reader, found = TickReader(), []
+        with RecordingFile.open(self.path) as file:
+            for message in file.messages(PLANS, SOLIDS, COMMANDS):
+                if message.topic != COMMANDS:
+                    reader.add_shared(message)
+                    continue
+                tick = reader.tick(message)
+                if not isinstance(tick, MissingMessage) and tick.t >= self.start:
+                    for each in tick.submissions:
+                        giver = "" if each.actor is None else each.actor.name
+                        found.append(RecordedCommand(tick.t, each.command, giver))
+        return tuple(found)
+
+    @cached_property
+    def events(self) -> tuple[Mapping[str, Any], ...]:
+        """All events, each with its time ``t`` [s] and its ``kind``. Raises InputError."""
+        with RecordingFile.open(self.path) as file:
+            return tuple(state_numbers(message) for message in file.messages(EVENTS))
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Settings of the session. Raises InputError for a recording without them."""
+        try:
+            found: Mapping[str, Any] = json.loads(self.metadata["settings"])
+        except (KeyError, ValueError, RecursionError) as error:
+            raise InputError(f"{self.path} does not state its settings.") from error
+        return found
+
+    def verify(self, urdf: str | os.PathLike[str] | None = None) -> Verification:
+        """Simulate the commands again, and return the comparison with every recorded tick.
+
+        The result is a sentence by ``str``; its ``identical`` tells whether every bit is the same,
+        which only the same kind of machine with the same libraries can give.
+
+        Args:
+            urdf: file of the recorded robot, if it is not the Katana450 of this package.
+
+        Raises:
+            InputError: the file is damaged, or is of another robot.
+        """
+        with RecordingFile.open(self.path) as file:
+            found = session_for(file, None if urdf is None else Path(urdf))
+            return verify_recording(file, found.session)
+
+    def to_dataframe(self) -> Any:
+        """Return the states as a pandas DataFrame with the index ``t`` [s].
+
+        Its columns are ``q1``, ``setpoint1`` and so on, ``gripper``, and ``x``, ``y``, ``z`` [m]
+        and the quaternion ``qx`` to ``qw`` of the tool. Raises ConfigurationError without pandas.
+        """
+        try:
+            pandas = import_module("pandas")
+        except ImportError as error:
+            raise ConfigurationError(
+                "A DataFrame needs pandas, which is not installed: `pip install pandas`. The "
+                "arrays of the recording need nothing else."
+            ) from error
+        table: dict[str, FloatArray] = {}
+        for name in ("q", "qd", "setpoint"):
+            table.update(_split(f"{name}{{}}", self._column(name), range(1, self.q.shape[1] + 1)))
+        table["gripper"] = self.gripper
+        if "position" in self._columns:
+            table.update(_split("{}", self.position, "xyz"))
+            table.update(_split("q{}", self.orientation, "xyzw"))
+        return pandas.DataFrame(table, index=pandas.Index(self.t, name="t"))
+
+
+def _split(name: str, values: FloatArray, columns: Iterable[object]) -> dict[str, FloatArray]:
+    """Return the columns of ``values`` (N, k) by their names."""
+    return {
+        name.format(each): np.asarray(column)
+        for each, column in zip(columns, values.T, strict=True)
+    }
+
+
+def open(path: str | os.PathLike[str]) -> Recording:
+    """Return the recording at ``path``. Raises InputError if it is none, or has no end.
+
+    A recording is an MCAP file that `katana450 serve` writes. After a crash, repair it with
+    ``katana450 record recover``.
+
+    Args:
+        path: the file.
+    """
+    return Recording(path)

@@ -1,0 +1,109 @@
+"""`katana450.open`: a recording as arrays, commands and events."""
+
+from __future__ import annotations
+
+import sys
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.arm.control import commands as cmd
+from katana450.arm.runtime.tick import TickRecord
+from katana450.extensions.recording.files.trimming import trim
+from tests.recording.recorded import described, record
+
+TICKS = 150
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("recorded") / "run.mcap"
+
+
+@pytest.fixture(scope="module")
+def records(path: Path) -> list[TickRecord]:
+    return record(path, TICKS, 5)
+
+
+def test_arrays_are_those_of_the_session(path: Path, records: list[TickRecord]) -> None:
+    recording = katana450.open(path)
+    by_time = {each.state.t: each.state for each in records}
+    states = [by_time[t] for t in recording.t.tolist()]
+    assert len(states) > 50
+    np.testing.assert_array_equal(recording.q, [each.q for each in states])
+    np.testing.assert_array_equal(recording.setpoint, [each.setpoint for each in states])
+    np.testing.assert_array_equal(recording.gripper, [each.gripper for each in states])
+    np.testing.assert_allclose(recording.qd, [each.motion.qd for each in states], atol=2e-6)
+    pose = katana450.load(frame="base").fk(recording.q[-1])
+    np.testing.assert_allclose(recording.position[-1], pose[:3, 3], atol=2e-6)
+    np.testing.assert_allclose(np.linalg.norm(recording.orientation, axis=1), 1.0, atol=1e-5)
+    assert recording.settings["ready"] == pytest.approx(described().session.ready.tolist())
+    assert repr(recording) == f"Recording({str(path)!r}, {recording.end - recording.start:.1f} s)"
+
+
+def test_commands_and_events_are_listed(path: Path, records: list[TickRecord]) -> None:
+    recording = katana450.open(str(path))
+    given = [(each.t, sub) for each in records for sub in each.submissions]
+    assert [type(each.command) for each in recording.commands] == [
+        type(sub.command) for _, sub in given
+    ]
+    assert [each.t for each in recording.commands] == [t for t, _ in given]
+    assert {each.giver for each in recording.commands} == {"Ada", "the server"}
+    first = recording.commands[0].command
+    assert isinstance(first, cmd.MoveTool)
+    assert [each["number"] for each in recording.events] == [100]
+
+
+def test_recording_verifies_itself(path: Path, records: list[TickRecord]) -> None:
+    result = katana450.open(path).verify()
+    assert result.identical
+    assert result.ticks == len(records) - 1
+
+
+def test_part_of_a_recording_begins_where_it_was_cut(
+    path: Path, records: list[TickRecord], tmp_path: Path
+) -> None:
+    part = tmp_path / "part.mcap"
+    trim([path], part, records[50].t, records[90].t)
+    recording = katana450.open(part)
+    assert recording.start == pytest.approx(records[50].t)
+    assert recording.t[0] >= records[50].t - 1e-9
+    assert recording.commands[0].t >= records[50].t - 1e-9
+    assert recording.verify().ticks >= 90 - 1
+
+
+def test_missing_pandas_is_named(
+    path: Path, records: list[TickRecord], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del records
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(katana450.ConfigurationError, match="needs pandas"):
+        katana450.open(path).to_dataframe()
+
+
+def test_dataframe_has_named_columns(
+    path: Path, records: list[TickRecord], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """pandas itself is no dependency; what is given to it is checked."""
+    del records
+    pandas = ModuleType("pandas")
+    pandas.__spec__ = ModuleSpec("pandas", None)
+    pandas.Index = lambda values, name: (name, values)  # type: ignore[attr-defined]
+    pandas.DataFrame = lambda table, index: (table, index)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    recording = katana450.open(path)
+    table, (name, t) = recording.to_dataframe()
+    assert name == "t"
+    assert t is recording.t
+    assert list(table)[:2] == ["q1", "q2"]
+    assert {"setpoint5", "qd1", "gripper", "x", "y", "z", "qx", "qw"} <= set(table)
+    assert (table["setpoint2"] == recording.setpoint[:, 1]).all()
+
+
+def test_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(katana450.InputError, match="cannot be read"):
+        katana450.open(tmp_path / "missing.mcap")

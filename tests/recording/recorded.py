@@ -1,0 +1,191 @@
+"""Random sessions of the shipped arm: the real control loop on a test clock, and its records."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import SERVER, Actor, CommandChannel
+from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.scene_objects import Attachment as Mount
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.solid import Solid
+from katana450.arm.control.state import State
+from katana450.arm.control.stop_cause import pressed
+from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.tick import TickRecord
+from katana450.assembly.robot_session import DescribedRobot, describe_robot
+from katana450.errors import InputError, KatanaError
+from katana450.extensions.recording.files.header import Attachment, RecordingHeader, header_of
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+
+PERIOD = 0.01
+ADA = Actor(Person("session-of-ada/1", "Ada", Role.ADMIN, address="10.0.0.7"), CommandChannel.SCENE)
+FAILING_EVERY = 300
+
+
+@cache
+def described() -> DescribedRobot:
+    """Return the shipped robot, read once."""
+    return describe_robot(Settings(), URDF_PATH, None)
+
+
+def fresh() -> DescribedRobot:
+    """Return the shipped robot with a session that has computed nothing yet."""
+    return describe_robot(Settings(), URDF_PATH, None)
+
+
+class TestClock:
+    """A clock that the test sets."""
+
+    __test__ = False
+
+    def __init__(self, t: float) -> None:
+        self.t = t
+
+    def now(self) -> float:
+        return self.t
+
+    def sleep_until(self, t: float, _wake: threading.Event | None = None) -> None:
+        self.t = max(self.t, t)
+
+
+class OddDriver(SimulatedDriver):
+    """A driver that is sometimes behind its setpoint, and sometimes fails."""
+
+    count = 0
+
+    def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
+        self.count += 1
+        if self.count % FAILING_EVERY == 0:
+            raise OSError("the cable came out")
+        sent = super().send(q, gripper, t)
+        behind = self.count % 50 < 5
+        return SentSetpoint(sent.q - 1e-3, sent.gripper) if behind else sent
+
+
+def random_commands(
+    rng: np.random.Generator, state: State, session: DescribedRobot
+) -> Iterator[cmd.Command]:
+    """Yield a few commands for the next tick, often none."""
+    kind = rng.random()
+    if state.stopped is not None:
+        yield from [cmd.ClearStop()] * int(kind < 0.05)
+    elif state.following is not None and kind < 0.98:
+        # Most plans are followed to their end, some of them there and back.
+        yield from [cmd.GoAlong(round(rng.random(), 3))] * int(kind < 0.02)
+    elif state.t % 4.0 > 2.5:
+        # A while without drags, in which the arm comes to rest and can follow a plan.
+        if state.motion.at_rest and kind < 0.1:
+            goal = session.session.ready + 0.3 * rng.normal(size=5)
+            world = session.session.world_at(state)
+            with suppress(KatanaError):
+                yield cmd.Follow(plan_to(session.session.require_arm(), world, state, goal))
+    elif kind < 0.6:
+        at = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
+        yield cmd.MoveTool(at)
+        DRAGGED[id(rng)] = np.clip(
+            at + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
+        )
+    elif kind < 0.7:
+        yield from seldom_commands(rng, session)
+
+
+def seldom_commands(rng: np.random.Generator, session: DescribedRobot) -> tuple[cmd.Command, ...]:
+    """Return the commands of one of several kinds."""
+    ready, first = session.session.ready, session.session.begin(session.session.ready, 0.0, 0.0)
+    corners = 0.03 * rng.random((8, 3)) + np.array((0.0, 0.0, 0.001))
+    stone = Solid("stone", (0.03, 0.03, 0.03), corners)
+    place = np.array((*rng.uniform((0.2, -0.3), (0.45, 0.3)), 0.0))
+    kinds: tuple[tuple[cmd.Command, ...], ...] = (
+        (cmd.SetJoints(ready + 0.5 * rng.normal(size=5)),),
+        (cmd.Stop(pressed("Ada", ADA.key, f"press {rng.random()}", 1e9)),),
+        (cmd.Jog(0.1 * rng.normal(size=5), JogFrame.TOOL),),
+        (cmd.ReplaceScene(first.objects, 1e-4),),
+        (cmd.MoveObject("cup", place),),
+        (cmd.Servo(ready + 0.02 * rng.normal(size=5)),),
+        (cmd.Attach("cup", Mount.HAND),),
+        (cmd.Attach("cup", Mount.WORLD), cmd.TurnTool(0.5, 0.3 * rng.normal())),
+        (cmd.SetGripper(abs(0.2 * rng.normal())), cmd.SpeedScale(0.5 + 0.5 * rng.random())),
+        (cmd.Pause(), cmd.Resume()),
+        (cmd.PlaceObject(SceneObject("stone", Shape.MESH, (), np.eye(4), solid=stone)),),
+        (cmd.EndDrag(), cmd.Batch((cmd.Home(), cmd.SetGripper(0.1)))),
+    )
+    return kinds[int(rng.integers(len(kinds)))]
+
+
+DRAGGED: dict[int, FloatArray] = {}
+
+
+def run(
+    ticks: int,
+    seed: int,
+    take: Callable[[TickRecord], None],
+    commands: Callable[
+        [np.random.Generator, State, DescribedRobot], Iterator[cmd.Command]
+    ] = random_commands,
+    *,
+    odd: bool = True,
+) -> ControlLoop:
+    """Run the control loop for ``ticks`` with random commands; ``take`` gets every record.
+
+    ``odd``: whether its driver sometimes answers otherwise, or fails.
+    """
+    found = described()
+    rng, clock = np.random.default_rng(seed), TestClock(1000.0)
+    mailbox = Mailbox(found.session.check)
+    kind = OddDriver if odd else SimulatedDriver
+    driver = kind(found.robot.require_arm(), found.session.ready, 0.0)
+    loop = ControlLoop(found.session, driver, mailbox, clock, 1.0 / PERIOD)
+    loop.record = take
+    for _ in range(ticks):
+        resting = not loop.state_publisher.snapshot.state.moving and rng.random() < 0.1
+        clock.t += REST_PERIOD if resting else PERIOD * (1.0 + 0.01 * rng.random())
+        for command in commands(rng, loop.state_publisher.snapshot.state, found):
+            try:
+                mailbox.put(command, ADA if rng.random() < 0.8 else SERVER)
+            except InputError:
+                continue
+        loop.tick()
+    DRAGGED.pop(id(rng), None)
+    return loop
+
+
+def header(*attachments: Attachment) -> RecordingHeader:
+    """Return the header of a recording of the shipped arm."""
+    found = described()
+    return header_of(
+        found.robot, Settings(), URDF_PATH, None, found.session.environment, attachments
+    )
+
+
+def record(path: Path, ticks: int, seed: int = 1) -> list[TickRecord]:
+    """Write a random session to ``path`` and return its records."""
+    records: list[TickRecord] = []
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header(Attachment("scene.json", "application/json", b"{}")))
+
+        def take(tick: TickRecord) -> None:
+            records.append(tick)
+            writer.put(tick)
+            if len(records) % 100 == 0:
+                writer.event(tick.t, "note", {"number": len(records)})
+                writer.flush()
+
+        run(ticks, seed, take)
+        writer.close()
+    return records

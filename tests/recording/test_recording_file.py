@@ -1,0 +1,285 @@
+"""The content of a recording: topics, schemas, seeking, parts, and tables."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from katana450.arm.runtime.tick import TickRecord
+from katana450.cli.main import main
+from katana450.errors import InputError
+from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.recording.files.checking import verify_recording
+from katana450.extensions.recording.files.fingerprint import RELEVANT, differences, fingerprint
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.table import columns, state_at
+from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.topics import (
+    CHECKPOINTS,
+    COMMANDS,
+    EVENTS,
+    JOINT_STATES,
+    STATE,
+    TF,
+    TOPICS,
+)
+from katana450.maths.kinematics.forward import forward
+from katana450.platform_support import claim_file
+from katana450.resources import URDF_PATH
+from tests.recording.recorded import described, header, record, run
+
+TICKS = 250
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("recorded") / "run.mcap"
+
+
+@pytest.fixture(scope="module")
+def records(path: Path) -> list[TickRecord]:
+    return record(path, TICKS, 5)
+
+
+@pytest.fixture
+def file(path: Path, records: list[TickRecord]) -> Iterator[RecordingFile]:
+    del records
+    with RecordingFile.open(path) as file:
+        yield file
+
+
+def test_stock_reader_finds_every_message_valid_by_its_schema(
+    path: Path, records: list[TickRecord]
+) -> None:
+    checks = {}
+    counts: dict[str, int] = {}
+    with path.open("rb") as opened:
+        for schema, channel, message in make_reader(opened, validate_crcs=True).iter_messages():
+            assert schema is not None
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            if schema.name not in checks:
+                found = json.loads(schema.data)
+                jsonschema.Draft202012Validator.check_schema(found)
+                checks[schema.name] = jsonschema.Draft202012Validator(found)
+            checks[schema.name].validate(json.loads(message.data))
+            counts[channel.topic] = counts.get(channel.topic, 0) + 1
+    assert counts[COMMANDS] == len(records)
+    assert counts[EVENTS] == len(records) // 100
+    assert {"foxglove.JointStates", "foxglove.FrameTransforms"} <= set(checks)
+
+
+def test_all_topics_have_channels(file: RecordingFile) -> None:
+    assert tuple(file.counts()) == tuple(topic.name for topic in TOPICS)
+    assert file.counts()["/episodes"] == 0
+
+
+def test_states_are_the_changed_ones_to_the_bit(
+    file: RecordingFile, records: list[TickRecord]
+) -> None:
+    by_time = {each.state.t: each.state for each in records}
+    messages = [json.loads(each.data) for each in file.messages(STATE)]
+    assert 0.3 * TICKS < len(messages) <= TICKS
+    robot = described().robot
+    arm = robot.require_arm()
+    for each in messages:
+        state = by_time[each["t"]]
+        assert np.array(each["q"]).tobytes() == state.q.tobytes()
+        assert np.array(each["setpoint"]).tobytes() == state.setpoint.tobytes()
+        assert each["status"] == state.status.value
+        T = arm.T_base_shoulder @ forward(arm.chain_to(state.tool), state.q)
+        np.testing.assert_allclose(each["position"], T[:3, 3], atol=2e-6)
+        assert math.hypot(*each["orientation"]) == pytest.approx(1.0, abs=1e-5)
+    # A state holds until the next.
+    for tick in records:
+        found = file.last_before(STATE, tick.t)
+        assert found is not None
+        assert json.loads(found.data)["setpoint"] == tick.state.setpoint.tolist()
+
+
+def test_objects_and_water_follow_the_states(
+    file: RecordingFile, records: list[TickRecord]
+) -> None:
+    objects: dict[str, list[float]] = {}
+    for message in file.messages(STATE):
+        each = json.loads(message.data)
+        objects.update({one["name"]: one["position"] for one in each.get("objects", ())})
+        for name in each.get("removed", ()):
+            del objects[name]
+    last = records[-1].state
+    assert set(objects) == {each.name for each in last.objects}
+    for each in last.objects:
+        pose = described().session.environment.pose(each, last.x)
+        np.testing.assert_allclose(objects[each.name], pose[:3, 3], atol=2e-6)
+
+
+def test_state_at_any_moment_has_all_objects(
+    file: RecordingFile, records: list[TickRecord], path: Path, tmp_path: Path
+) -> None:
+    part = tmp_path / "part.mcap"
+    trim([path], part, records[150].t, records[200].t)
+    with RecordingFile.open(part) as cut:
+        for number in (0, 3, 149, 150, 175, 200, 230):
+            state = records[number].state
+            for each in (file, cut):
+                found = state_at(each, state.t)
+                if each is cut and number > 200:
+                    continue
+                assert found is not None
+                assert found["q"] == state.q.tolist()
+                assert {one["name"] for one in found["objects"]} == {o.name for o in state.objects}
+    assert state_at(file, file.start - 1.0) is None
+
+
+def test_displays_get_joints_and_frames(file: RecordingFile, records: list[TickRecord]) -> None:
+    first = next(file.messages(JOINT_STATES))
+    names = [each["name"] for each in json.loads(first.data)["joints"]]
+    assert set(names) == set(described().robot.joints)
+    frames = json.loads(next(file.messages(TF)).data)["transforms"]
+    assert {each["parent_frame_id"] for each in frames} == {described().robot.links[0].name}
+    assert {"tcp", "object/cup"} <= {each["child_frame_id"] for each in frames}
+    *_, last = file.messages(JOINT_STATES)
+    values = {each["name"]: each["position"] for each in json.loads(last.data)["joints"]}
+    state = next(each.state for each in records if abs(each.t - last.t) < 1e-6)
+    for name, value in described().robot.joint_values(state.q, state.gripper).items():
+        assert values[name] == pytest.approx(value, abs=1e-5)
+
+
+def test_metadata_and_attachments_tell_what_made_it(file: RecordingFile) -> None:
+    assert file.metadata.items() >= fingerprint().items()
+    assert set(RELEVANT) <= set(file.metadata)
+    assert not differences(file.metadata)
+    assert "unknown" not in (file.metadata["libm_rounding"], file.metadata["blas_rounding"])
+    assert differences({**file.metadata, "blas_core": "Other"}) == [
+        f"blas_core: Other there, {file.metadata['blas_core']} here"
+    ]
+    attached = {each.name: each.data for each in file.attachments()}
+    assert attached == {"katana450.urdf": URDF_PATH.read_bytes(), "scene.json": b"{}"}
+
+
+def test_seeking_reads_only_what_is_asked_for(file: RecordingFile) -> None:
+    middle = 0.5 * (file.start + file.end)
+    found = file.last_before(STATE, middle)
+    assert found is not None
+    assert file.start <= found.t <= middle
+    assert file.last_before(STATE, file.start - 1.0) is None
+    assert file.last_before(CHECKPOINTS, file.end) is not None
+    part = list(file.messages(COMMANDS, start=middle, end=middle + 0.1))
+    assert all(middle <= each.t <= middle + 0.1 for each in part)
+    assert 5 <= len(part) <= 12
+
+
+def test_files_of_a_ring_are_joined(records: list[TickRecord], tmp_path: Path) -> None:
+    head, paths = header(), []
+    for number in range(3):
+        paths.append(tmp_path / f"{number}.mcap")
+        with paths[-1].open("wb") as opened:
+            writer = RecordingWriter(opened, head)
+            for each in records[number * 80 : (number + 1) * 80]:
+                writer.put(each)
+            writer.close()
+    found = trim(paths[::-1], tmp_path / "whole.mcap", -math.inf, math.inf)
+    kept = records[:240]
+    assert [found.start, found.end] == pytest.approx([kept[0].t, kept[-1].t])
+    with RecordingFile.open(tmp_path / "whole.mcap") as whole:
+        result = verify_recording(whole, described().session)
+        assert str(result) == "identical to the bit over 239 ticks"
+        # The first tick is not simulated: the complete state is that after it.
+        assert whole.counts()[COMMANDS] == len(kept) - 1
+    with pytest.raises(InputError, match="There is nothing from"):
+        trim(paths, tmp_path / "nothing.mcap", 1.0, 2.0)
+    assert not (tmp_path / "nothing.mcap").exists()
+    other = tmp_path / "other.mcap"
+    with other.open("wb") as opened:
+        RecordingWriter(opened, header()).close()
+    with pytest.raises(InputError, match="not of one run"):
+        trim([*paths, other], tmp_path / "mixed.mcap", -math.inf, math.inf)
+
+
+def test_csv_is_a_motion_that_export_plays(
+    path: Path, records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run.csv"
+    assert main(["record", "export", str(path), "--out", str(out), "--from", "0.5"]) == 0
+    assert "rows" in capsys.readouterr().out
+    motion = load_motion(out, described().robot)
+    with RecordingFile.open(path) as file:
+        table = columns(file, file.start + 0.5)
+    assert len(motion.t) == len(table["t"])
+    chain = described().robot.require_arm().chain
+    for axis, name in enumerate(chain.names):
+        assert motion.values[name].tobytes() == table["setpoint"][:, axis].tobytes()
+    assert records[0].t + 0.4 < table["t"][0]
+
+
+def test_full_disk_is_reported_and_what_was_synced_is_whole(
+    records: list[TickRecord], tmp_path: Path
+) -> None:
+    class FullDisk(io.BytesIO):
+        def write(self, data: object) -> int:
+            if self.tell() > 60_000:
+                raise OSError(28, "No space left on device")
+            return super().write(data)  # type: ignore[arg-type]
+
+    file = FullDisk()
+
+    def write() -> None:
+        writer = RecordingWriter(file, header())
+        for number, each in enumerate(records * 3):
+            writer.put(each)
+            if number % 50 == 49:
+                writer.flush()
+
+    with pytest.raises(OSError, match="No space"):
+        write()
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(file.getvalue())
+    assert main(["record", "recover", str(broken)]) == 0
+    with RecordingFile.open(broken) as whole:
+        assert whole.counts()[COMMANDS] >= 50
+
+
+def test_file_that_is_being_written_is_not_replaced(
+    records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "running.mcap"
+    with path.open("wb") as opened:
+        claim_file(opened.fileno())
+        writer = RecordingWriter(opened, header())
+        for each in records[:20]:
+            writer.put(each)
+        writer.flush()
+        assert main(["record", "recover", str(path)]) == 1
+        assert "is being written by a running program" in capsys.readouterr().err
+        writer.close()
+    with RecordingFile.open(path) as file:
+        assert file.counts()[COMMANDS] == 20
+
+
+def test_recording_of_another_robot_is_refused(
+    path: Path, records: list[TickRecord], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    del records
+    other = tmp_path / "other.urdf"
+    other.write_text(URDF_PATH.read_text() + "<!-- changed -->")
+    assert main(["record", "verify", str(path), "--urdf", str(other)]) == 1
+    assert "not of" in capsys.readouterr().err
+
+
+def test_resting_arm_writes_little(tmp_path: Path) -> None:
+    path = tmp_path / "rest.mcap"
+    with path.open("wb") as opened:
+        writer = RecordingWriter(opened, header())
+        run(500, 1, writer.put, lambda *_: iter(()), odd=False)
+        writer.close()
+    with RecordingFile.open(path) as file:
+        assert file.counts()[STATE] <= 3
+        assert verify_recording(file, described().session).ticks == 499

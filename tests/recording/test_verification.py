@@ -1,0 +1,268 @@
+"""A recording is simulated again: identical to the bit, or the first difference is named."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from queue import SimpleQueue
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.arm.control import commands as cmd
+from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.tick import Submission, TickRecord, stepped
+from katana450.assembly.robot_session import find_robot
+from katana450.cli.main import main
+from katana450.errors import InputError
+from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.recording.digest import Digester
+from katana450.extensions.recording.files.checking import TickReader, verify_recording
+from katana450.extensions.recording.files.header import header_of
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS
+from katana450.settings import Settings
+from tests.conftest import LONG
+from tests.recording.recorded import ADA, described, fresh, header, record, run
+
+TICKS = 3000 if LONG else 600
+GANTRY = Path(__file__).parents[1] / "exchange" / "gantry.urdf"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("recorded") / "run.mcap"
+
+
+@pytest.fixture(scope="module")
+def records(path: Path) -> list[TickRecord]:
+    return record(path, TICKS)
+
+
+def test_random_session_is_identical_to_the_bit(path: Path, records: list[TickRecord]) -> None:
+    kinds = Counter(type(each.command).__name__ for r in records for each in r.submissions)
+    assert kinds["MoveTool"] > 40
+    assert {"Stop", "ClearStop", "Follow", "ReplaceScene", "Batch"} <= set(kinds), kinds
+    assert any(each.failed for each in records)
+    assert sum(each.state.following is not None for each in records) > 40
+    assert any(r.t_before != b.state.t for b, r in pairwise(records))
+    with RecordingFile.open(path) as file:
+        result = verify_recording(file, fresh().session)
+    assert str(result) == f"identical to the bit over {len(records) - 1} ticks"
+
+
+def test_every_part_is_identical_from_its_first_complete_state(
+    path: Path, records: list[TickRecord], tmp_path: Path
+) -> None:
+    """A new session begins in the middle of drags, plans and pouring."""
+    with RecordingFile.open(path) as file:
+        starts = [each.t for each in file.messages(CHECKPOINTS)]
+    assert len(starts) >= len(records) // 1500 + 1
+    for start in starts[1:]:
+        part = tmp_path / f"{start}.mcap"
+        found = trim([path], part, start, start + 4.0)
+        assert found.simulated_from == start
+        with RecordingFile.open(part) as file:
+            result = verify_recording(file, described().session)
+        assert result.identical, result
+        assert result.ticks > 50
+        assert result.unknown == 0
+
+
+def test_tick_inputs_are_those_of_the_loop(path: Path, records: list[TickRecord]) -> None:
+    reader = TickReader()
+    with RecordingFile.open(path) as file:
+        for message in file.messages("/plans", "/solids"):
+            reader.add_shared(message)
+        ticks = [reader.tick(message) for message in file.messages(COMMANDS)]
+    assert len(ticks) == len(records)
+    for tick, made in zip(ticks, records, strict=True):
+        assert tick.t == made.t  # type: ignore[union-attr]
+        given = [type(each.command) for each in tick.submissions]  # type: ignore[union-attr]
+        assert given == [type(each.command) for each in made.submissions]
+        names = [each.actor.name for each in tick.submissions if each.actor]  # type: ignore[union-attr]
+        assert names == [each.actor.name for each in made.submissions if each.actor]
+
+
+def test_identities_of_people_are_not_in_the_file(path: Path, records: list[TickRecord]) -> None:
+    del records
+    with RecordingFile.open(path) as file:
+        data = b"".join(each.data for each in file.messages(COMMANDS, CHECKPOINTS))
+    assert b'"name":"Ada"' in data
+    assert b"session-of-ada" not in data
+    assert b"10.0.0.7" not in data
+
+
+def write(path: Path, records: list[TickRecord], lost: range = range(0)) -> Path:
+    """Write ``records``; those with the numbers ``lost`` are lost."""
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header())
+        for number, each in enumerate(records):
+            if number in lost[-1:]:
+                writer.lost(each.t, len(lost), "the disk was full")
+            elif number not in lost:
+                writer.put(each)
+        writer.close()
+    return path
+
+
+def test_changed_command_is_found_at_its_tick(tmp_path: Path) -> None:
+    records: list[TickRecord] = []
+    goal = described().session.ready + 0.2
+
+    def commands(*_: object) -> Iterator[cmd.Command]:
+        if len(records) == 50:
+            yield cmd.SetJoints(goal)
+
+    run(120, 1, records.append, commands)
+    changed = cmd.SetJoints(goal + np.array((0.0, 0.0, 1e-3, 0.0, 0.0)))
+    records[50] = records[50]._replace(submissions=[Submission(changed, None)])
+    with RecordingFile.open(write(tmp_path / "changed.mcap", records)) as file:
+        result = verify_recording(file, described().session)
+    assert result.first is not None
+    assert result.largest is not None
+    assert result.first.t == records[50].t
+    assert 0.0 < result.first.size < 1e-6
+    assert 1e-4 < result.largest.size <= 1e-3
+    assert result.different == 70
+    assert str(result).startswith(f"first difference at t = {records[50].t:.3f} s, ")
+    assert "; 70 of 119 ticks differ, by up to 0.000" in str(result)
+
+
+def test_lost_ticks_are_a_gap_and_not_a_difference(
+    records: list[TickRecord], tmp_path: Path
+) -> None:
+    with RecordingFile.open(write(tmp_path / "gap.mcap", records[:400], range(150, 250))) as file:
+        result = verify_recording(file, described().session)
+    assert result.identical
+    assert result.unknown == 100
+    assert result.ticks == 400 - 100 - 2
+    assert str(result) == "identical to the bit over 298 ticks; 100 ticks cannot be simulated"
+
+
+def test_value_without_a_form_is_a_gap(records: list[TickRecord], tmp_path: Path) -> None:
+    part = list(records[:60])
+    odd = cmd.SetTool("\ud800")
+    part[30] = part[30]._replace(submissions=[Submission(odd, None)])
+    with RecordingFile.open(write(tmp_path / "odd.mcap", part)) as file:
+        result = verify_recording(file, described().session)
+        text = b"".join(each.data for each in file.messages(COMMANDS))
+    assert b"not Unicode" in text
+    assert result.identical
+    assert result.unknown == 1
+
+
+def test_loop_on_the_clock_of_the_machine_is_identical(tmp_path: Path) -> None:
+    found, records = described(), SimpleQueue[TickRecord]()
+    mailbox = Mailbox(found.session.check)
+    driver = SimulatedDriver(found.robot.require_arm(), found.session.ready, 0.0)
+    loop = ControlLoop(found.session, driver, mailbox, MonotonicClock(), 100.0)
+    loop.record = records.put
+    loop.start()
+    for goal in (0.2, -0.2, 0.0):
+        mailbox.put(cmd.SetJoints(found.session.ready + goal), ADA)
+        time.sleep(0.3)
+    loop.stop()
+    taken = [records.get() for _ in range(records.qsize())]
+    with RecordingFile.open(write(tmp_path / "real.mcap", taken)) as file:
+        # A session of its own, which has not seen these states.
+        result = verify_recording(file, fresh().session)
+    assert str(result) == f"identical to the bit over {len(taken) - 1} ticks"
+    assert len(taken) > 30
+    assert sum(len(each.submissions) for each in taken) == 3
+
+
+def test_mechanism_without_an_arm_is_recorded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = find_robot(Settings(), GANTRY, None)
+    assert found.robot.arm is None
+    path, records = tmp_path / "gantry.mcap", []
+    state = found.session.begin(found.session.ready, 0.0, 10.0)
+    for number in range(60):
+        given = [cmd.SetJoint(0, 0.2)] if number == 5 else []
+        before, t = state, 10.0 + 0.01 * (number + 1)
+        state = stepped(found.session, before, list(given), t, lambda q, g, _t: SentSetpoint(q, g))
+        inputs = [Submission(each, ADA) for each in given]
+        records.append(TickRecord(before.t, t, inputs, False, state))
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header_of(found.robot, Settings(), GANTRY))
+        for each in records:
+            writer.put(each)
+        writer.close()
+    assert main(["record", "verify", str(path), "--urdf", str(GANTRY)]) == 0
+    assert "identical to the bit over 59 ticks" in capsys.readouterr().out
+    assert main(["record", "verify", str(path)]) == 1
+    assert "Name the same URDF" in capsys.readouterr().err
+    out = tmp_path / "gantry.csv"
+    assert main(["record", "export", str(path), "--out", str(out)]) == 0
+    motion = load_motion(out, found.robot)
+    assert motion.values[found.robot.driven[0]][-1] == state.setpoint[0]
+    with pytest.raises(InputError, match="has no position"):
+        _ = katana450.open(path).position
+
+
+def test_digest_sees_every_bit(records: list[TickRecord]) -> None:
+    state, digester = records[200].state, Digester()
+    digest = digester.digest(state)
+    other = np.array(state.goal)
+    other[2] = np.nextafter(other[2], 9.0)
+    changes = [
+        replace(state, t=np.nextafter(state.t, 0.0)),
+        replace(state, goal=other),
+        replace(state, gripper=-0.0 if repr(state.gripper) == "0.0" else 0.5),
+        replace(state, tool="flange"),
+        replace(state, objects=state.objects[1:]),
+        replace(state, presses=("x",)),
+    ]
+    found = {digest, *(digester.digest(each) for each in changes)}
+    assert len(found) == len(changes) + 1
+    assert digester.digest(state) == digest == Digester().digest(state)
+
+
+SCRIPT = "import sys; from katana450.cli.main import main; sys.exit(main(sys.argv[1:]))"
+
+
+def verified_by(environment: dict[str, str], path: Path) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, "record", "verify", str(path)],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode in (0, 1), done.stderr
+    return done.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", ["0", "1", "4711"])
+def test_other_processes_find_the_same_bits(
+    path: Path, records: list[TickRecord], seed: str
+) -> None:
+    text = verified_by({"PYTHONHASHSEED": seed}, path)
+    assert f"identical to the bit over {len(records) - 1} ticks" in text
+
+
+@pytest.mark.long
+def test_other_processor_is_named_if_it_differs(path: Path, records: list[TickRecord]) -> None:
+    """OpenBLAS rounds otherwise for other processors: the result says so and is small."""
+    text = verified_by({"OPENBLAS_CORETYPE": "Sandybridge"}, path)
+    if "identical" not in text:
+        assert "blas_core" in text
+        assert f" of {len(records) - 1} ticks differ, by up to " in text
