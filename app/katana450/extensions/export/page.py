@@ -8,8 +8,8 @@ from pathlib import Path
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.playback import chosen
+from katana450.extensions.export.recorded import recorded
 from katana450.extensions.progress import progress
-from katana450.server.view.recording import recorded
 
 FPS = 25.0
 """States per second in the page; states between them are left out."""
