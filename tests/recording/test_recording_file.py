@@ -127,7 +127,7 @@ def test_state_at_any_moment_has_all_objects(
     part = tmp_path / "part.mcap"
     trim([path], part, records[150].t, records[200].t)
     with RecordingFile.open(part) as cut:
-        for number in (0, 3, 149, 150, 175, 200, 230):
+        for number in (0, 3, 149, 150, 175, 200, 210):
             state = records[number].state
             for each in (file, cut):
                 found = state_at(each, state.t)
@@ -191,7 +191,7 @@ def test_files_of_a_ring_are_joined(records: list[TickRecord], tmp_path: Path) -
     assert [found.start, found.end] == pytest.approx([kept[0].t, kept[-1].t])
     with RecordingFile.open(tmp_path / "whole.mcap") as whole:
         result = verify_recording(whole, described().session)
-        assert str(result) == "identical to the bit over 239 ticks"
+        assert str(result) == f"identical to the bit over {len(kept) - 1} ticks"
         # The first tick is not simulated: the complete state is that after it.
         assert whole.counts()[COMMANDS] == len(kept) - 1
     with pytest.raises(InputError, match="There is nothing from"):
@@ -282,4 +282,6 @@ def test_resting_arm_writes_little(tmp_path: Path) -> None:
         writer.close()
     with RecordingFile.open(path) as file:
         assert file.counts()[STATE] <= 3
-        assert verify_recording(file, described().session).ticks == 499
+        # The first two, in which it comes to rest; then there is nothing to record.
+        assert verify_recording(file, described().session).ticks == 1
+        assert file.counts()[COMMANDS] == 2

@@ -60,6 +60,7 @@ def build_frontend(
     )
     nodes = _nodes(config.options, robot, session.environment)
     front_end.on_stop_change = partial(gateway.soon, gateway.hub.follow_stop)
+    front_end.on_command_at_rest = partial(gateway.soon, gateway.watch_closely)
     if robot.arm is None:
         for layer in layers:
             if layer.what:
@@ -116,11 +117,7 @@ def _view(
 
 
 def _folders(
-    gateway: Gateway,
-    options: Namespace | None,
-    robot: Robot,
-    front_end: FrontEnd,
-    tabs: PanelTabs,
+    gateway: Gateway, options: Namespace | None, robot: Robot, front_end: FrontEnd, tabs: PanelTabs
 ) -> Iterator[PanelFolder]:
     """Add the controls of the extensions to the panel. Raises KatanaError."""
     if options is None:

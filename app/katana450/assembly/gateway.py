@@ -57,7 +57,7 @@ READ_CHUNK_BYTES = 4_096
 TLS_READ_CHUNK_BYTES = 65_536
 """Size of the receive buffer with TLS, which reads all that the system holds."""
 
-REST_TICK = 0.05
+REST_TICK = 0.1
 """[s] Interval of the checks while the arm rests and is not stopped; otherwise ``TICK``."""
 
 START_SECONDS = 10.0
@@ -156,6 +156,8 @@ class Gateway:
         )
         self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
         self._started = threading.Event()
+        self._moves = asyncio.Event()
+        self._close_until = -math.inf
 
     def start(self) -> None:
         """Start answering. Raises ConfigurationError if the server does not start."""
@@ -236,18 +238,32 @@ class Gateway:
         """Return the time since the arm's process was heard [s]; infinite before."""
         return math.inf if self.hub.arm is None else self.hub.arm.age
 
+    def watch_closely(self) -> None:
+        """Check at the short interval for a while, because a command may move the arm."""
+        self._close_until = self.hub.clock() + 2 * REST_TICK
+        self._moves.set()
+
     async def _watch(self) -> None:
+        pause = TICK
         while True:
             if self._server.started:
                 self._started.set()
+            hub = self.hub
             try:
-                self.hub.tick()
+                hub.tick(pause)
             except Exception:
                 # The watchdog of the arm must survive every error.
                 log.exception("The watchdog of the driver met an error.")
-            hub = self.hub
             rests = not (hub.stopped or hub.gate.moves() or hub.runner.running)
-            await asyncio.sleep(REST_TICK if rests else TICK)
+            rests = rests and hub.clock() > self._close_until
+            pause = REST_TICK if rests else TICK
+            if not rests:
+                await asyncio.sleep(pause)
+                continue
+            self._moves.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(pause):
+                    await self._moves.wait()
 
 
 class _Server(uvicorn.Server):

@@ -24,7 +24,7 @@ from katana450.server.web.stop_connection import StopConnection
 from katana450.server.web.stop_server import StopServer
 from katana450.settings import Settings
 
-TURN_INTERVAL = 0.1
+TURN_INTERVAL = 0.2
 """[s] Interval at which the event loop proves that it runs, and checks whether it must end."""
 
 HANG_TIMEOUT = 1.0

@@ -34,7 +34,7 @@ from katana450.assembly.supervised import (
 )
 from katana450.errors import ConfigurationError, KatanaError
 
-TURN = 0.05
+TURN = HEARTBEAT_INTERVAL
 """[s] Interval at which signals and silence are checked; the end of a process wakes earlier."""
 
 START_SECONDS = 60.0
@@ -176,9 +176,9 @@ class Child:
         return None
 
     def beat(self) -> None:
-        """Send a heartbeat to the process if it is time."""
+        """Send a heartbeat to the process, unless one was sent in this turn already."""
         now = time.monotonic()
-        if now - self._beaten >= HEARTBEAT_INTERVAL:
+        if now - self._beaten >= HEARTBEAT_INTERVAL / 2:
             self._beaten = now
             self.send(HEARTBEAT)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
 from katana450.arm.control.appearance import ALL_AS_MADE, Appearance
+from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
     IDLE,
-    Following,
     Idle,
     Jogging,
     JointTarget,
@@ -20,7 +21,6 @@ from katana450.arm.control.modes import (
     Positioning,
     Servoing,
     Target,
-    ToolTarget,
     Tracking,
 )
 from katana450.arm.control.pouring import MotionWithWater
@@ -30,6 +30,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
@@ -317,7 +318,7 @@ class State:
         """The plan that ``Go`` follows; None without an offer."""
         return self.intent.detour if isinstance(self.intent, Positioning) else None
 
-    @property
+    @cached_property
     def moving(self) -> bool:
         """True if the arm or the gripper is still under way."""
         resting = self.blocked or self.paused or self.stopped is not None
@@ -349,7 +350,7 @@ class State:
         """The object that the fingers hold; None if there is none."""
         return next((each for each in self.objects if each.held), None)
 
-    @property
+    @cached_property
     def under_way(self) -> bool:
         """True if the setpoints differ from the goals, even if the arm waits."""
         return bool(

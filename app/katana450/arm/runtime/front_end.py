@@ -32,8 +32,8 @@ from katana450.errors import InputError
 COMMAND_TIMEOUT = 0.5
 """[s] Silence of the arm's process after which only a stop is sent to it."""
 
-REST_HEARTBEAT = 0.05
-"""[s] Interval of the heartbeats to an arm at rest: less than a quarter of its silence timeout."""
+REST_HEARTBEAT = 0.08
+"""[s] Minimum interval of the heartbeats to an arm at rest: less than half its silence timeout."""
 
 RECONNECT_INTERVAL = 0.05
 """[s] Interval of the attempts to connect to a new process of the arm."""
@@ -82,6 +82,8 @@ class FrontEnd:
         """Set once this front end is no longer the one of the arm."""
         self.on_stop_change: Callable[[], None] = lambda: None
         """Called in the thread of the pipe when a state is the first that is stopped, or not."""
+        self.on_command_at_rest: Callable[[], None] = lambda: None
+        """Called with each command to an arm at rest, which may need heartbeats from now on."""
         self._thread = threading.Thread(target=self._listen, name="pipe", daemon=True)
 
     def start(self) -> None:
@@ -131,7 +133,10 @@ class FrontEnd:
             seen = self.state_publisher.snapshot.state.t
             self._unsent.append(CommandMessage(self._number, command, actor, seen))
             self._flush()
-            return self._number
+            number = self._number
+        if not self.state_publisher.snapshot.state.moving:
+            self.on_command_at_rest()
+        return number
 
     @property
     def age(self) -> float:

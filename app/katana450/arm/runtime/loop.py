@@ -22,7 +22,7 @@ from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
 from katana450.arm.runtime.mailbox import Drained, Mailbox
 from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped
+from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped, waited
 
 log = logging.getLogger(__name__)
 
@@ -85,7 +85,7 @@ class ControlLoop:
         """Number of completed ticks."""
         self.record: Callable[[TickRecord], None] | None = None
         """Takes the record of each tick, in the control thread; it must return at once."""
-        self._resting = False
+        self._resting = self._settled = False
 
     @property
     def loop_timing(self) -> LoopTiming:
@@ -103,19 +103,26 @@ class ControlLoop:
             # Commands apply from now on, and not since the last tick, which may be long ago.
             before = replace(before, t=max(before.t, t - self._period))
         commands, has_failed = drained.commands, False
+        given = drained.last != self.state_publisher.snapshot.ticket
         try:
-            state = stepped(self._session, before, commands, t, self._driver.send)
+            if self._settled and not given:
+                state = waited(self._session, before, t, self._driver.send)
+            else:
+                state = stepped(self._session, before, commands, t, self._driver.send)
         except Exception:
             # The loop continues after any error and the arm holds: the state reports the error.
             log.exception("The control loop met an error; the arm holds.")
             state, has_failed = failed(self._session, before, commands), True
             self._put_stops_again(drained)
         self._state = state
-        if self.record is not None:
+        if self.record is not None and state is not before:
             self.record(TickRecord(before.t, t, drained.submissions, has_failed, state))
         # A state that differs only in its time is not published.
-        changed = drained.last != self.state_publisher.snapshot.ticket or _differs(before, state)
+        changed = given or _differs(before, state)
         self._resting = not (changed or state.moving)
+        # Only time has passed, and nothing waits for it, as a film of water does that drains.
+        self._settled = self._resting and not (state.under_way or state.blocked)
+        self._settled = self._settled and state.poured is before.poured
         if changed:
             self.state_publisher.note(_outcomes(drained, state))
             self.state_publisher.publish(

@@ -59,3 +59,14 @@ def stepped(session: Session, state: State, commands: list[Command], t: float, s
 def failed(session: Session, state: State, commands: list[Command]) -> State:
     """Return the state after a tick from ``state`` in which an error occurred: the arm holds."""
     return replace(session.fail(state), outcomes=(FAILED,) * len(commands))
+
+
+def waited(session: Session, state: State, t: float, send: Send) -> State:
+    """Return ``state`` itself after a tick at ``t`` [s] in which nothing was to do.
+
+    If the driver reports another place, the state has it, and the time.
+    """
+    sent = send(state.setpoint, state.gripper_setpoint, t)
+    if sent.q is state.q and sent.gripper == state.gripper:
+        return state
+    return session.observe(replace(state, t=t), sent.q, sent.gripper)

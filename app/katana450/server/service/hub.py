@@ -331,11 +331,11 @@ class Hub:
 
     # Watch
 
-    def tick(self) -> None:
-        """Check that the driver and the arm are alive. Call this every ``TICK``."""
+    def tick(self, since: float = TICK) -> None:
+        """Check that driver and arm are alive. ``since``: interval since the last check [s]."""
         arm = self.arm
         before, self._ticked = self._ticked, self.clock()
-        self._driver_watch.note_lateness(self._ticked - before - TICK, self._ticked)
+        self._driver_watch.note_lateness(self._ticked - before - since, self._ticked)
         self._update_lease()
         silent = self._check_driver(self.clock())
         if arm is not None:
