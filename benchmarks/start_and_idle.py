@@ -30,7 +30,7 @@ from playwright.sync_api import Browser
 from tests.browser.camera import Drawing
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
-from tests.browser.server import APP, BARE_APP, AppServer
+from tests.browser.server import BARE_APP, RECORDING_APP, AppServer
 from tests.gateway.client import SUBPROTOCOL, ask, enter, page_name, websocket
 
 SETTLE_SECONDS = 3.0
@@ -38,7 +38,7 @@ SCENE_SECONDS = 1.0
 """[s] Silence after which a scene is complete: at rest no more messages come."""
 OPEN_SECONDS = 30.0
 APPS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
-    "app": (APP, ("/arm", "/target/move")),
+    "app": (RECORDING_APP, ("/arm", "/target/move")),
     "bare": (BARE_APP, ("/arm/box", "/target/move")),
 }
 
@@ -133,7 +133,10 @@ def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | N
         fraction = None
         if idle:
             time.sleep(SETTLE_SECONDS)
-            pids = [server.pid] if app == "bare" else [server.pid, server.front, server.arm]
+            pids = [server.pid]
+            if app == "app":
+                pids += [server.front, server.arm, server.stop_process]
+                pids.append(server.child("katana450 rec"))
             before = cpu_seconds(pids)
             time.sleep(idle)
             fraction = (cpu_seconds(pids) - before) / idle

@@ -20,7 +20,8 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from katana450.arm.control.session import Session
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
+    from katana450.arm.runtime.arm_listener import ArmAddress
+    from katana450.arm.runtime.loop import ControlLoop
     from katana450.server.service.nodes import Nodes
     from katana450.server.service.recorder import Recorder
     from katana450.server.service.runner import Runner
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
     from katana450.server.view.layer import ViewLayer
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
+    from katana450.settings import Settings
 
 PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
@@ -75,6 +79,53 @@ class CliCommand:
     run: Callable[[Namespace], int]
 
 
+class PipeEnd(Protocol):
+    """End of a pipe that threads of its own serve."""
+
+    def start(self) -> None:
+        """Start the threads."""
+
+    def close(self) -> None:
+        """Let the threads end after what waits to be sent."""
+
+    def join(self) -> None:
+        """Wait for the threads, for a short time."""
+
+
+@dataclass(frozen=True)
+class ServerFacts:
+    """Description of a server for a further process of it.
+
+    Attributes:
+        settings: Settings of the server.
+        urdf: File of the robot.
+        tool: Link to which targets refer; None for that of the file.
+        port: Port of the page.
+        address: Address of the arm's process.
+    """
+
+    settings: Settings
+    urdf: Path
+    tool: str | None
+    port: int
+    address: ArmAddress
+
+
+@dataclass(frozen=True)
+class ExtraProcess:
+    """A further process of the server. The supervisor starts it again when it ends.
+
+    Attributes:
+        what: Name of the process, of up to 15 letters; its name for people, at the beginning of a
+            sentence; its function, of a module, which is called in the process with the next value
+            and a ``SupervisorPipe``, and ends when the server does; and that value.
+        description: Line for the terminal.
+    """
+
+    what: tuple[str, str, Callable[[Any, Any], None], Any]
+    description: str
+
+
 @dataclass(frozen=True)
 class ServeExtension:
     """Functions that extend ``katana450 serve``. Each is called at most once, at the start.
@@ -98,6 +149,10 @@ class ServeExtension:
             that starts the others, of the first extension that has it.
         send_records: Sends records of the notes of a recorder by a pipe to that event log, and
             returns the function that ends this. Called in the process of the view.
+        process: Returns a further process of the server, or None. Called in the process that starts
+            the others.
+        record_end: Returns the end of a pipe by which the record of each tick goes to that process.
+            Called in the process of the arm.
         needs: Built-in extensions that must be installed; without them this part is left out.
     """
 
@@ -112,6 +167,8 @@ class ServeExtension:
     send_records: Callable[[Namespace, Recorder, Connection], Callable[[], None] | None] | None = (
         None
     )
+    record_end: Callable[[Connection, ControlLoop], PipeEnd] | None = None
+    process: Callable[[Namespace, ServerFacts], ExtraProcess | None] | None = None
     needs: tuple[str, ...] = ()
 
 

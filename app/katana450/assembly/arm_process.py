@@ -10,10 +10,11 @@ import sys
 import threading
 from argparse import Namespace
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from katana450.arm.runtime.arm_listener import FRONT, STOP, ArmAddress, ArmListener
+from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmAddress, ArmListener
 from katana450.assembly.output import say
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
 from katana450.extension import serve_extensions
@@ -25,11 +26,14 @@ if TYPE_CHECKING:
     from katana450.arm.runtime.state_publisher import StatePublisher
     from katana450.assembly.robot_session import DescribedRobot
 
-WAKE_INTERVAL = 0.05
+WAKE_INTERVAL = 0.2
 """[s] Interval at which the end of the control loop is checked."""
 
 KEEP_INTERVAL = 0.02
 """[s] Minimum time between two states that the supervisor keeps."""
+
+IDLE_INTERVAL = 5.0
+"""[s] Maximum time for which the thread that keeps states sleeps; a new state wakes it."""
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +71,11 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
     found = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
     again = kept is not None
     arm = RunningArm(config.settings, found, scene, again=again, kept=state)
-    listener = ArmListener(config.address, {FRONT: arm.attach, STOP: arm.attach_stop})
+    roles = {FRONT: arm.attach, STOP: arm.attach_stop}
+    for part in () if config.options is None else serve_extensions():
+        if part.record_end is not None:
+            roles[RECORD] = partial(arm.attach_recorder, part.record_end)
+    listener = ArmListener(config.address, roles)
     if not again:
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr, flush=True)
@@ -88,6 +96,7 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
     # First, so that nothing connects again to an arm that ends.
     listener.close()
     arm.stop()
+    arm.state_publisher.wake()
     keeper.join()
     # A supervisor that was killed leaves it.
     shutil.rmtree(config.folder, ignore_errors=True)
@@ -131,7 +140,8 @@ def _keep(state_publisher: StatePublisher, supervisor: SupervisorPipe) -> None:
         if state is not seen:
             sent = supervisor.keep(KEPT, _packed(state)) and sent
         seen = state if sent else None
-        state_publisher.wait_for_change(snapshot, WAKE_INTERVAL)
+        if seen is not None:
+            state_publisher.wait_for_change(snapshot, IDLE_INTERVAL, supervisor.ended.is_set)
 
 
 def _packed(state: State) -> bytes:

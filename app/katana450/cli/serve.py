@@ -25,7 +25,7 @@ from katana450.assembly.stop_process import StopConfig, run_stop
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.errors import ConfigurationError
-from katana450.extension import serve_extensions
+from katana450.extension import ExtraProcess, ServerFacts, serve_extensions
 from katana450.platform_support import pipe_address, stop_signals
 from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
@@ -46,6 +46,10 @@ its own sends the heartbeats, so load does not cause silence."""
 STOP_DEADLINE = 2.0
 """[s] Silence after which the process of STOP is ended. It falls silent 1 s after the last turn of
 its event loop, and at once when its thread that reads from the arm's process has ended."""
+
+
+EXTRA_DEADLINE = 10.0
+"""[s] Silence after which a process of an extension is ended."""
 
 
 def serve_with(options: Namespace) -> int:
@@ -103,10 +107,13 @@ def serve(
     arm = ArmConfig(settings, urdf, tool, options, address, folder)
     stop = StopConfig(settings, stopping_socket, listening.getsockname()[1], address)
     front_end_work = _FrontendWork(front, event_log)
+    facts = ServerFacts(settings, urdf, tool, listening.getsockname()[1], address)
+    extra = _extra_processes(options, facts)
     specs = (
         child_spec(STOP, "The process of STOP", run_stop, stop, STOP_DEADLINE),
         ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
         child_spec(ARM, "The arm's process", run_arm, arm, ARM_DEADLINE, keeps=True),
+        *(child_spec(*each.what, EXTRA_DEADLINE) for each in extra),
     )
     supervisor = Supervisor(specs, stopping, event_log.restart)
     try:
@@ -120,7 +127,7 @@ def serve(
         if not stopping.is_set():
             if lines is not None:
                 say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
-            for line in event_log.description:
+            for line in (*event_log.description, *(each.description for each in extra)):
                 say(line)
             say(f"katana450 is ready: {url} (STOP also on port {stop_port}; Ctrl-C stops)")
         supervisor.run()
@@ -175,6 +182,13 @@ def _server_log(options: Namespace | None, port: int) -> ServerLog:
             if found is not None:
                 return found
     return ServerLog()
+
+
+def _extra_processes(options: Namespace | None, facts: ServerFacts) -> list[ExtraProcess]:
+    """Return the processes that extensions add. Raises KatanaError."""
+    parts = () if options is None else serve_extensions()
+    found = [part.process(options, facts) for part in parts if part.process and options]
+    return [each for each in found if each is not None]
 
 
 def _private_folder() -> Path:

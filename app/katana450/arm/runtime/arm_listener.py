@@ -26,6 +26,9 @@ FRONT = "front"
 STOP = "stop"
 """Role of the process of STOP, of which there is one at a time too."""
 
+RECORD = "record"
+"""Role of the process that records, of which there is one at a time too."""
+
 BACKLOG = 16
 """Connections that may wait while the arm's process accepts one."""
 

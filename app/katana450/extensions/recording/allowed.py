@@ -17,6 +17,7 @@ from katana450.arm.control.appearance import (
     DisplayMode,
     LinkAppearance,
 )
+from katana450.arm.control.following import Following
 from katana450.arm.control.lease import Person, Role
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.maths.collision.contact import Contact
@@ -25,6 +26,7 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
@@ -66,7 +68,7 @@ CLASSES: Final[tuple[type, ...]] = (
     # The state and its mode.
     *(state.State, state.ActiveStop, state.Finding, state.Outcome, state.PartRefusal),
     *(modes.Idle, modes.Positioning, modes.Tracking, modes.Jogging, modes.Servoing),
-    *(modes.Following, modes.Leaving, modes.JointTarget, modes.PoseTarget, modes.ToolTarget),
+    *(modes.Leaving, modes.JointTarget, modes.PoseTarget, Following, ToolTarget),
     *(JointMotion, Stream, Projection, Branch),
     # Objects and water.
     *(scene_objects.SceneObject, solid.Solid, solid.ObjectAppearance),

@@ -15,7 +15,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from katana450.arm.control.modes import Following, Leaving, Mode, Positioning
+from katana450.arm.control.following import Following
+from katana450.arm.control.modes import Leaving, Mode, Positioning
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.extensions.recording.form_error import FormError

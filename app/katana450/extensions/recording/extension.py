@@ -1,11 +1,57 @@
-"""The extension ``recording``: files of what an arm did, and the command about them."""
+"""The extension ``recording``: what the arm does is recorded, and a command about recordings."""
 
 from __future__ import annotations
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from katana450.extension import CliCommand, Extension
+from katana450.extension import (
+    CliCommand,
+    Extension,
+    ExtraProcess,
+    PipeEnd,
+    ServeExtension,
+    ServerFacts,
+)
 from katana450.extensions.recording.record_options import add_record_options
+
+if TYPE_CHECKING:
+    from katana450.arm.runtime.loop import ControlLoop
+
+
+def add_serve_options(parser: ArgumentParser) -> None:
+    """Add the options of ``katana450 serve`` to ``parser``."""
+    recorded = parser.add_mutually_exclusive_group()
+    recorded.add_argument(
+        "--record",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for the last ten minutes of motion (default: one for each port, named at the "
+        "start)",
+    )
+    recorded.add_argument("--no-record", action="store_true", help="record nothing")
+
+
+def _process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
+    if options.no_record:
+        return None
+    from katana450.extensions.recording.live.places import default_folder
+    from katana450.extensions.recording.live.recorder import RecorderConfig, run_recorder
+
+    folder = options.record or default_folder(facts.port)
+    config = RecorderConfig(facts, folder)
+    return ExtraProcess(
+        ("katana450 rec", "The process that records", run_recorder, config),
+        f"Recording: the last ten minutes of motion are kept in {folder}",
+    )
+
+
+def _record_end(pipe: Connection, loop: ControlLoop) -> PipeEnd:
+    from katana450.extensions.recording.live.record_end import RecordEnd
+
+    return RecordEnd(pipe, loop)
 
 
 def _record(options: Namespace) -> int:
@@ -16,5 +62,6 @@ def _record(options: Namespace) -> int:
 
 EXTENSION = Extension(
     "recording",
-    (CliCommand("record", "verify, repair and cut recordings", add_record_options, _record),),
+    (CliCommand("record", "keep, verify, repair and cut recordings", add_record_options, _record),),
+    ServeExtension(add_serve_options, process=_process, record_end=_record_end),
 )

@@ -12,8 +12,25 @@ FORMATS = ("csv", "mcap")
 def add_record_options(parser: argparse.ArgumentParser) -> None:
     """Add the subcommands of ``katana450 record`` to ``parser``."""
     acts = parser.add_subparsers(
-        dest="act", required=True, metavar="list | info | recover | verify | trim | export"
+        dest="act", required=True, metavar="keep | list | info | recover | verify | trim | export"
     )
+    keep = acts.add_parser(
+        "keep", help="keep what a server has just recorded, whether it still runs or not"
+    )
+    keep.add_argument(
+        "folder",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the last ten minutes, which the server names at its start",
+    )
+    keep.add_argument(
+        "--last",
+        type=_seconds,
+        default=math.inf,
+        metavar="S",
+        help="seconds before the end of the recording (default: all)",
+    )
+    keep.add_argument("--out", type=Path, required=True, metavar="FILE", help="new file")
     listed = acts.add_parser("list", help="list the recordings in a folder")
     listed.add_argument("folder", type=Path, nargs="?", default=Path(), metavar="FOLDER")
     info = acts.add_parser("info", help="describe a recording")

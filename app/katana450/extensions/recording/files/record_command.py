@@ -12,6 +12,7 @@ from katana450.assembly.log_lines import printable
 from katana450.errors import InputError
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.fingerprint import differences
+from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.table import write_csv
@@ -31,6 +32,8 @@ def record(options: Namespace) -> int:
     Raises InputError for a file that cannot be used.
     """
     match options.act:
+        case "keep":
+            return _keep(options.folder, options.out, options.last)
         case "list":
             return _list(options.folder)
         case "info":
@@ -43,6 +46,12 @@ def record(options: Namespace) -> int:
             return _trim(options.files, options.out, options.start, options.end)
         case _:
             return _export(options)
+
+
+def _keep(folder: Path, out: Path, last: float) -> int:
+    start, end, note = keep(folder, out, last)
+    print(printable(f"{out}: the last {end - start:.1f} s.{note}"))
+    return 0
 
 
 def _list(folder: Path) -> int:

@@ -1,0 +1,69 @@
+"""Keeping what has just happened: the newest files of a ring become one recording."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from katana450.errors import InputError
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recovery import is_whole, recover
+from katana450.extensions.recording.files.trimming import trim
+
+SUFFIX = "*.mcap"
+
+
+def keep(folder: Path, out: Path, last: float) -> tuple[float, float, str]:
+    """Write the last seconds of the ring in ``folder`` to ``out``; return begin and end [s].
+
+    The third value is a note for people, which is empty if the ring holds everything. The server
+    may go on writing: of the file that it writes now, the part that is on the disk is taken. Only
+    files of the newest run of the server are joined.
+
+    Args:
+        folder: folder of the ring.
+        out: the new file.
+        last: time before the end of the recording [s].
+
+    Raises:
+        InputError: the folder has no recording, or ``out`` cannot be written.
+    """
+    with tempfile.TemporaryDirectory(prefix="katana450-") as temporary:
+        copies: list[Path] = []
+        run: str | None = None
+        for path in sorted(folder.glob(SUFFIX), reverse=True):
+            copy = _whole(path, Path(temporary) / path.name)
+            if copy is None:
+                continue
+            with RecordingFile.open(copy) as file:
+                this, empty = file.metadata.get("utc_offset_ns"), not any(file.counts().values())
+            if run not in (None, this):
+                break
+            run = this
+            if not empty:
+                copies.append(copy)
+        if not copies:
+            raise InputError(
+                f"{folder} has no recording. A server names its folder at the start; nothing is "
+                "recorded while the arm rests."
+            )
+        with RecordingFile.open(copies[0]) as newest:
+            end = newest.end
+        found = trim(copies, out, end - last, end)
+    note = "" if found.simulated_from is not None else " It cannot be verified: no complete state."
+    return found.start, found.end, note
+
+
+def _whole(path: Path, copy: Path) -> Path | None:
+    """Return a whole copy of ``path`` at ``copy``; None if nothing of it can be read."""
+    try:
+        shutil.copyfile(path, copy)
+        if not is_whole(copy):
+            recover(copy, copy)
+    except InputError:
+        return None
+    except OSError:
+        # The server has removed it meanwhile.
+        return None
+    return copy

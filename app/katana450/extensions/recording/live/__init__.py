@@ -1,0 +1,1 @@
+"""The process that records a running arm, and the pipe to it."""

@@ -1,0 +1,97 @@
+"""The process that records: it receives every tick of the arm and writes the ring.
+
+It imports little until the server has started, and the arm's process keeps the ticks meanwhile.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from katana450.assembly.record_pipe import connected_to_ticks
+from katana450.assembly.supervised import READY, SupervisorPipe
+from katana450.extension import ServerFacts
+
+if TYPE_CHECKING:
+    from katana450.extensions.recording.live.ring import Ring
+
+START_DELAY = 4.0
+"""[s] Time after the start of the arm in which the other processes have the processor alone."""
+
+SYNC_INTERVAL = 1.0
+"""[s] Maximum age of what a crash of the machine loses."""
+
+
+@dataclass(frozen=True)
+class RecorderConfig:
+    """Configuration of the process that records.
+
+    Attributes:
+        facts: what it knows of the server.
+        folder: folder of the ring.
+    """
+
+    facts: ServerFacts
+    folder: Path
+
+
+def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
+    """Record in this process, from start to end. Raises KatanaError."""
+    facts = config.facts
+    supervisor.report(READY)
+    try:
+        pipe = connected_to_ticks(facts.address, supervisor.ended)
+        supervisor.ended.wait(START_DELAY)
+        ring = _ring(config)
+        try:
+            while True:
+                _receive(pipe, ring)
+                pipe = connected_to_ticks(facts.address, supervisor.ended)
+        finally:
+            ring.close()
+    except EOFError:
+        # The server ends.
+        return
+
+
+def _ring(config: RecorderConfig) -> Ring:
+    from katana450.assembly.robot_session import find_robot
+    from katana450.extensions.recording.files.header import header_of
+    from katana450.extensions.recording.live.ring import Ring
+
+    facts = config.facts
+    found = find_robot(facts.settings, facts.urdf, facts.tool)
+    header = header_of(
+        found.robot, facts.settings, facts.urdf, facts.tool, found.session.environment
+    )
+    return Ring(config.folder, header)
+
+
+def _receive(pipe: Connection, ring: Ring) -> None:
+    """Write what comes by ``pipe`` until the other end closes it."""
+    from katana450.extensions.recording.live.record_end import lost_records
+    from katana450.extensions.recording.live.record_wire import RecordDeserializer
+
+    deserializer, synced = RecordDeserializer(), time.monotonic()
+    try:
+        while True:
+            # Without anything to sync there is nothing to do until the next record.
+            left = max(synced + SYNC_INTERVAL - time.monotonic(), 0.0)
+            if not ring.unsynced or pipe.poll(left):
+                message = pipe.recv_bytes()
+                lost = lost_records(message)
+                if lost is None:
+                    ring.put(deserializer.loaded(message))
+                else:
+                    count, until = lost
+                    ring.lost(until, count)
+            if ring.unsynced and time.monotonic() - synced >= SYNC_INTERVAL:
+                ring.sync()
+                synced = time.monotonic()
+    except (EOFError, OSError):
+        ring.sync()
+        # The next process of the arm begins with another state.
+        ring.close()

@@ -1,0 +1,188 @@
+"""The ring: recordings of the last minutes, in files of about a minute each."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from katana450.arm.control.event_log import entries_between
+from katana450.arm.control.state import State
+from katana450.arm.runtime.tick import TickRecord
+from katana450.errors import InputError
+from katana450.extensions.recording.files.header import RecordingHeader
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.recovery import recover
+from katana450.extensions.recording.live.places import SUFFIX, ring_files
+from katana450.platform_support import claim_file, create_file
+
+MAX_FILE_TICKS = 6000
+"""Ticks in a file: a minute of motion. An arm at rest has no ticks to record."""
+
+MAX_FILES = 11
+"""Number of files: the last ten minutes of motion, and the one that is being written."""
+
+MAX_FILE_BYTES = 20_000_000
+"""Size after which a file ends, whatever it contains, so that the ring is bounded."""
+
+RETRY_SECONDS = 5.0
+"""[s] Time after an error of the disk until the next attempt to write."""
+
+log = logging.getLogger(__name__)
+
+
+class Ring:
+    """Writes records into the newest file of a folder, and removes the oldest files.
+
+    No method raises OSError: while the disk takes nothing, records are lost, and the next file says
+    how many.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        header: RecordingHeader,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Use ``folder``, which need not exist. Files that a crash left open are repaired."""
+        self._folder = folder
+        self._header = header
+        self._clock = clock
+        self._file: BinaryIO | None = None
+        self._writer: RecordingWriter | None = None
+        self._ticks = 0
+        self._lost, self._lost_why = 0, ""
+        self._retry_at = float("-inf")
+        self._before: State | None = None
+        self._newest = ""
+        self.unsynced = False
+        """Whether ``sync`` has anything to bring to the disk."""
+        _repair(folder)
+
+    def put(self, record: TickRecord) -> None:
+        """Write the record of a tick."""
+        if not self._opened():
+            self._lost += 1
+            return
+        assert self._writer is not None
+        try:
+            if self._lost:
+                self._writer.lost(record.t, self._lost, self._lost_why)
+                self._lost = 0
+            self._writer.put(record)
+            self._note_findings(record)
+        except OSError as error:
+            self._fail(error)
+            self._lost += 1
+            return
+        self._ticks += 1
+        self.unsynced = True
+
+    def _note_findings(self, record: TickRecord) -> None:
+        """Write an event for each finding that begins or ends with this tick."""
+        assert self._writer is not None
+        if record.submissions:
+            self._newest = type(record.submissions[-1].command).__name__
+        before, self._before = self._before, record.state
+        if before is None or before.findings == record.state.findings:
+            return
+        for entry in entries_between(before, record.state, None, self._newest):
+            found = entry.finding
+            what = {
+                "reason": found.reason.value,
+                "began": entry.began,
+                "amount": found.amount,
+                "axis": None if found.axis is None else found.axis + 1,
+                "parts": None if found.parts is None else list(found.parts),
+                "command": entry.command,
+            }
+            self._writer.event(entry.t, "finding", what)
+
+    def lost(self, t: float, ticks: int) -> None:
+        """Note that ``ticks`` ticks until ``t`` [s] never came."""
+        self._lost += ticks
+        self._lost_why = "The process that records could not keep up."
+        log.error("%d ticks until %.1f s were not recorded: %s", ticks, t, self._lost_why)
+
+    def sync(self) -> None:
+        """Bring everything to the disk, and begin a new file if this one is full."""
+        self.unsynced = False
+        if self._writer is None or self._file is None:
+            return
+        try:
+            self._writer.flush()
+            os.fsync(self._file.fileno())
+            full = self._file.tell() >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
+        except OSError as error:
+            self._fail(error)
+            return
+        if full:
+            self.close()
+
+    def close(self) -> None:
+        """End the present file."""
+        writer, file = self._writer, self._file
+        self._writer = self._file = None
+        if writer is None or file is None:
+            return
+        try:
+            writer.close()
+            os.fsync(file.fileno())
+        except OSError as error:
+            self._report(error)
+        with suppress(OSError):
+            file.close()
+
+    def _opened(self) -> bool:
+        """Begin a file if there is none; return whether there is one."""
+        if self._writer is not None:
+            return True
+        if self._clock() < self._retry_at:
+            return False
+        try:
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            for old in ring_files(self._folder)[: -(MAX_FILES - 1)]:
+                old.unlink(missing_ok=True)
+            path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
+            self._file = open(create_file(path, 0o600), "wb")  # noqa: SIM115 - open for a minute
+            with suppress(OSError):
+                # So that nobody repairs it before its end. Some file systems have no claims.
+                claim_file(self._file.fileno())
+            self._writer = RecordingWriter(self._file, self._header)
+        except OSError as error:
+            self._fail(error)
+            return False
+        self._ticks = 0
+        return True
+
+    def _fail(self, error: OSError) -> None:
+        """Give up the present file; what was synced of it can be recovered."""
+        self._report(error)
+        self._lost_why = f"The disk took nothing: {error.strerror or error}."
+        self._retry_at = self._clock() + RETRY_SECONDS
+        file, self._file, self._writer = self._file, None, None
+        if file is not None:
+            with suppress(OSError):
+                file.close()
+
+    def _report(self, error: OSError) -> None:
+        log.error("The recording in %s is interrupted: %s.", self._folder, error.strerror or error)
+
+
+def _repair(folder: Path) -> None:
+    """Make whole files of those that a crash left open."""
+    for path in ring_files(folder):
+        try:
+            found = recover(path, path)
+        except InputError as error:
+            # Another server may write it; otherwise it is removed in its turn.
+            log.warning("%s", error)
+        except OSError as error:
+            log.warning("%s could not be repaired: %s.", path, error.strerror or error)
+        else:
+            if found is not None:
+                log.warning("%s was repaired: %s.", path, found)

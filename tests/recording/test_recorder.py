@@ -1,0 +1,250 @@
+"""A real server records its arm: identical when simulated again, through kills, within bounds."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import pairwise
+from multiprocessing import Pipe
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.arm.runtime.tick import TickRecord
+from katana450.cli.main import main
+from katana450.extensions.recording.files.checking import session_for, verify_recording
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.live import record_end, ring
+from katana450.extensions.recording.live.places import ring_files
+from katana450.extensions.recording.live.record_end import RecordEnd, lost_records
+from katana450.extensions.recording.live.record_wire import RecordDeserializer
+from katana450.extensions.recording.live.ring import Ring
+from katana450.extensions.recording.topics import COMMANDS, EVENTS, STATE
+from tests.browser.server import RECORDING_APP, AppServer, ServerError
+from tests.conftest import LONG
+from tests.recording.recorded import header, run
+
+KILLS = 50 if LONG else 1
+RECORDER = "katana450 rec"
+MAX_LOSS = 1.1
+"""[s] Maximum time at the end of a recording that a kill can lose."""
+
+POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
+
+
+def waited_for(condition: Callable[[], object], what: str, seconds: float = 20.0) -> None:
+    """Wait until the function ``condition`` returns something true."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {seconds:g} s for {what}"
+        time.sleep(0.05)
+
+
+def verified(path: Path) -> int:
+    """Return the number of ticks of the recording, which is simulated again to the bit."""
+    with RecordingFile.open(path) as file:
+        result = verify_recording(file, session_for(file).session)
+    assert result.identical, str(result)
+    return result.ticks
+
+
+def tick_times(path: Path) -> list[float]:
+    with RecordingFile.open(path) as file:
+        return [each.t for each in file.messages(COMMANDS)]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "ring"
+
+
+@pytest.fixture
+def server(folder: Path) -> Iterator[AppServer]:
+    with AppServer((*RECORDING_APP, "--record", str(folder))) as running:
+        yield running
+
+
+def test_motion_is_recorded_and_simulated_again_to_the_bit(
+    server: AppServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert str(folder) in server.output
+    with katana450.connect(server.url, name="test") as client:
+        for posture in POSTURES:
+            state = client.joints(posture)
+        client.stop()
+        kept = tmp_path / "kept.mcap"
+        waited_for(lambda: list(folder.glob("*")), "the first file")
+        # After the delay of its start, and then a second for the disk.
+        waited_for(lambda: main(["record", "keep", str(folder), "--out", str(kept)]) == 0, "motion")
+        waited_for(lambda: _keeps(folder, kept, "Stop"), "the stop in the recording")
+    server.stop()
+    assert verified(kept) > 100
+    (path,) = ring_files(folder)
+    assert verified(path) > 100
+    recording = katana450.open(path)
+    assert np.abs(recording.q - state.q).max(axis=1).min() < 1e-9
+    # It begins with the first motion, although the process started later.
+    assert recording.t[-1] - recording.t[0] > 1.0
+    names = [type(each.command).__name__ for each in recording.commands]
+    assert names.count("SetJoints") == len(POSTURES)
+    assert "Stop" in names
+    assert path.stat().st_mode & 0o077 == 0
+    capsys.readouterr()
+
+
+def _keeps(folder: Path, kept: Path, command: str) -> bool:
+    """Keep the ring in the file ``kept``; return whether it contains ``command``."""
+    assert main(["record", "keep", str(folder), "--out", str(kept)]) == 0
+    with RecordingFile.open(kept) as file:
+        return any(f'"{command}"'.encode() in each.data for each in file.messages(COMMANDS))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_killed_recorder_loses_a_second_and_the_arm_nothing(
+    server: AppServer, folder: Path
+) -> None:
+    chance = random.Random(450)
+    with katana450.connect(server.url, name="test") as client:
+        client.joints(POSTURES[1])
+        waited_for(lambda: ring_files(folder), "the first file")
+        for kill in range(KILLS):
+            known = len(ring_files(folder))
+            for posture in POSTURES:
+                client.joints(posture)
+            time.sleep(chance.uniform(0.0, 1.0) if LONG else 0.0)
+            moved = time.perf_counter()
+            recorder = server.child(RECORDER)
+            os.kill(recorder, signal.SIGKILL)
+            # The motion goes on: the process that records is no part of the control.
+            client.joints(POSTURES[kill % 2])
+            waited_for(partial(_other_child, server, recorder), "another recorder")
+            client.joints(POSTURES[1 - kill % 2])
+            waited_for(partial(_has_files, folder, min(known + 1, ring.MAX_FILES)), "a file")
+            broken = ring_files(folder)[-2]
+            # Made whole by the next process. What was synced a second before is there.
+            assert verified(broken) > 0
+            assert moved - tick_times(broken)[-1] <= MAX_LOSS + 1.0
+    server.stop()
+    assert verified(ring_files(folder)[-1]) > 0
+
+
+def _other_child(server: AppServer, than: int) -> bool:
+    """Return whether the server has a process that records, other ``than`` that of this id."""
+    try:
+        return server.child(RECORDER) != than
+    except (ServerError, OSError):
+        return False
+
+
+def _has_files(folder: Path, count: int) -> bool:
+    return len(ring_files(folder)) >= count
+
+
+def test_ring_keeps_the_newest_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ring, "MAX_FILE_TICKS", 10)
+    kept = Ring(folder, header())
+
+    def put(record: TickRecord) -> None:
+        kept.put(record)
+        kept.sync()
+
+    run(400, 5, put)
+    kept.close()
+    files = ring_files(folder)
+    assert len(files) == ring.MAX_FILES
+    # The first tick of a file is that of its complete state.
+    assert verified(files[0]) == ring.MAX_FILE_TICKS - 1
+    assert verified(files[-1]) > 0
+    ends = [tick_times(path)[-1] for path in files]
+    assert ends == sorted(ends)
+    # No tick is missing between them.
+    ticks = [t for path in files for t in tick_times(path)]
+    assert max(after - before for before, after in pairwise(ticks)) < 0.1
+
+
+def test_disk_that_takes_nothing_is_reported_in_the_next_file(
+    folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    # A file stands where the folder should be.
+    folder.write_text("in the way")
+    now = [0.0]
+    kept = Ring(folder, header(), lambda: now[0])
+    records: list[TickRecord] = []
+    run(200, 6, records.append, odd=False)
+    for record in records[:20]:
+        kept.put(record)
+    assert "is interrupted" in caplog.text
+    folder.unlink()
+    # Not before the time of the next attempt.
+    kept.put(records[20])
+    assert not folder.exists()
+    now[0] = ring.RETRY_SECONDS
+    for record in records[21:]:
+        kept.put(record)
+    kept.close()
+    (path,) = ring_files(folder)
+    with RecordingFile.open(path) as file:
+        first = next(iter(file.messages(COMMANDS)))
+    assert b'"missing"' in first.data
+    assert b'"ticks":21' in first.data
+    assert verified(path) > 0
+
+
+def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record_end, "MAX_WAITING", 50)
+    ours, theirs = Pipe()
+    taken: list[TickRecord] = []
+    ends: list[RecordEnd] = []
+
+    def take(record: TickRecord) -> None:
+        taken.append(record)
+        if ends:
+            ends[0].put(record)
+
+    loop = run(1, 7, take)
+    ends.append(RecordEnd(ours, loop))
+    ends[0].start()
+    loop.record = None
+    began = time.monotonic()
+    # More than the pipe and the list hold, while nobody reads.
+    run(2000, 7, take)
+    assert time.monotonic() - began < 60.0
+    ends[0].close()
+    deserializer, received, lost = RecordDeserializer(), list[TickRecord](), 0
+    before_gap = 0
+    while theirs.poll(20.0):
+        try:
+            message = theirs.recv_bytes()
+        except EOFError:
+            break
+        gap = lost_records(message)
+        if gap is None:
+            received.append(deserializer.loaded(message))
+        else:
+            before_gap = before_gap or len(received)
+            lost += gap[0]
+    assert lost > 0
+    assert len(received) + lost == len(taken) - 1
+    assert received[0].t == taken[1].t
+    # The same objects in every record in which they were the same before.
+    same = [a.state.objects is b.state.objects for a, b in pairwise(received[:before_gap])]
+    were = [a.state.objects is b.state.objects for a, b in pairwise(taken[1 : before_gap + 1])]
+    assert same == were
+
+
+def test_findings_are_events(folder: Path) -> None:
+    kept = Ring(folder, header())
+    run(400, 8, kept.put)
+    kept.close()
+    (path,) = ring_files(folder)
+    with RecordingFile.open(path) as file:
+        events = [each.data for each in file.messages(EVENTS)]
+        assert file.counts()[STATE] > 0
+    assert any(b'"began":true' in each for each in events)
