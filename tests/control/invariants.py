@@ -16,15 +16,9 @@ from hypothesis.stateful import (
 )
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.following import Following
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.modes import (
-    Following,
-    Idle,
-    Jogging,
-    Leaving,
-    Positioning,
-    Servoing,
-)
+from katana450.arm.control.modes import Idle, Jogging, Leaving, Positioning, Servoing
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.arm.control.stopping import clear_refusal

@@ -10,7 +10,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.branch_options import branch_options
-from katana450.arm.control.modes import JointTarget, PoseTarget, ToolTarget
+from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.maths.geometry import se3, so3
@@ -19,6 +19,7 @@ from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
 
 TICK = 0.01
 SPLIT = np.array([0.4353, 0.0, 0.0323])

@@ -10,8 +10,9 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import AppearanceTrait
+from katana450.arm.control.following import Following
 from katana450.arm.control.messages import sentence
-from katana450.arm.control.modes import Following, JointTarget
+from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.outcome import NO_DETOUR
 from katana450.arm.control.plans import detour_from, plan_to
 from katana450.arm.control.session import Session

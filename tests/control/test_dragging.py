@@ -15,7 +15,6 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import NO_GRIPPER, ArmModel
 from katana450.arm.control.branch_options import current_target
-from katana450.arm.control.modes import ToolTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.arm.robot.loader import load
@@ -27,6 +26,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
+from katana450.maths.kinematics.tool import ToolTarget
 from tests.kinematics.family import random_member, random_pose
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"

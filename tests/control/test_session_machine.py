@@ -13,19 +13,15 @@ from hypothesis.stateful import (
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.branch_options import current_target
-from katana450.arm.control.modes import (
-    Following,
-    Jogging,
-    Positioning,
-    ToolTarget,
-    Tracking,
-)
+from katana450.arm.control.following import Following
+from katana450.arm.control.modes import Jogging, Positioning, Tracking
 from katana450.arm.control.plans import detour_from, plan_to
 from katana450.errors import KatanaError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.planning.plan import Plan
 from tests.conftest import LONG

@@ -11,9 +11,9 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import AppearanceTrait
+from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
     MODES,
-    Following,
     Idle,
     Jogging,
     Leaving,

@@ -57,9 +57,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         help="address of the reverse proxy in front of the server, e.g. https://arm.example.org",
     )
     parser.add_argument(
-        "--bare",
-        action="store_true",
-        help="the arm without its gripper, as in the paper's circle",
+        "--bare", action="store_true", help="the arm without its gripper, as in the paper's circle"
     )
     parser.add_argument(
         "--go-on-release",

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control.commands import ClearStop, Command, Servo
+from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
-    Following,
     Intent,
     JointTarget,
     Leaving,

@@ -16,24 +16,6 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
 
-__all__ = [
-    "IDLE",
-    "MODES",
-    "Following",
-    "Idle",
-    "Intent",
-    "Jogging",
-    "JointTarget",
-    "Leaving",
-    "Mode",
-    "PoseTarget",
-    "Positioning",
-    "Servoing",
-    "Target",
-    "ToolTarget",
-    "Tracking",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class JointTarget:

@@ -17,7 +17,6 @@ from katana450.arm.control.modes import (
     PoseTarget,
     Positioning,
     Target,
-    ToolTarget,
     Tracking,
 )
 from katana450.arm.control.motion_stepper import jog_twist
@@ -26,6 +25,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import track
 from katana450.maths.kinematics.velocity import JogFrame
 

@@ -7,16 +7,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.modes import (
-    MODES,
-    Following,
-    Idle,
-    Jogging,
-    Mode,
-    Positioning,
-    Servoing,
-    Tracking,
-)
+from katana450.arm.control.following import Following
+from katana450.arm.control.modes import MODES, Idle, Jogging, Mode, Positioning, Servoing, Tracking
 from katana450.arm.control.state import State
 
 

@@ -84,11 +84,7 @@ class Meshes:
     """A bounded, thread-safe store of meshes. Meshes in use are never removed."""
 
     def __init__(
-        self,
-        folder: Path | None = None,
-        *,
-        maximum: int = MAX_MESHES,
-        max_bytes: int = MAX_BYTES,
+        self, folder: Path | None = None, *, maximum: int = MAX_MESHES, max_bytes: int = MAX_BYTES
     ) -> None:
         """Create a store.
 

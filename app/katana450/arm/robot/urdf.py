@@ -188,8 +188,7 @@ def _visual(
         source = PrimitiveShape("box", {"extents": geometry.box.size})
     elif geometry.cylinder is not None:
         source = PrimitiveShape(
-            "cylinder",
-            {"radius": geometry.cylinder.radius, "height": geometry.cylinder.length},
+            "cylinder", {"radius": geometry.cylinder.radius, "height": geometry.cylinder.length}
         )
     elif geometry.sphere is not None:
         source = PrimitiveShape("icosphere", {"subdivisions": 3, "radius": geometry.sphere.radius})

@@ -124,11 +124,7 @@ class Mailbox:
         """Remove and return all waiting commands."""
         with self._lock:
             drained = Drained(
-                self._waiting,
-                self._of_waiting,
-                self._dropped,
-                self._tickets,
-                tuple(self._repeated),
+                self._waiting, self._of_waiting, self._dropped, self._tickets, tuple(self._repeated)
             )
             self._waiting, self._of_waiting, self._dropped, self._repeated = [], [], [], []
             self.stop_waits.clear()

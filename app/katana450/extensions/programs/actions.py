@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.modes import Following
+from katana450.arm.control.following import Following
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError

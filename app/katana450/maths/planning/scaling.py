@@ -57,10 +57,7 @@ class Bounds:
     tool_acceleration: float | None = None
 
     def __post_init__(self) -> None:
-        for name, value in (
-            ("speed", self.tool_speed),
-            ("acceleration", self.tool_acceleration),
-        ):
+        for name, value in (("speed", self.tool_speed), ("acceleration", self.tool_acceleration)):
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"The tool's {name} must be a number above 0, not {value!r}.")
 

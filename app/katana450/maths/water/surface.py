@@ -197,10 +197,7 @@ def blob() -> tuple[FloatArray, Faces]:
     faces = [(np.zeros_like(k), 1 + k, 1 + after)]
     for row in range(len(DOME) - 1):
         inner, outer = 1 + row * SPOKES, 1 + (row + 1) * SPOKES
-        faces += [
-            (inner + k, outer + k, outer + after),
-            (inner + k, outer + after, inner + after),
-        ]
+        faces += [(inner + k, outer + k, outer + after), (inner + k, outer + after, inner + after)]
     return np.concatenate((np.array([[0.0, 0.0, THICKNESS]]), *rings)), _stacked(faces)
 
 

@@ -154,12 +154,7 @@ class Request(
 
 
 class Answer(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    omit_defaults=True,
-    tag_field="is",
-    tag=tag_of,
+    msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="is", tag=tag_of
 ):
     """Base of all answers; ``is`` names the class, and ``id`` is that of the request."""
 

@@ -100,10 +100,7 @@ def _do(request: Any, answer: Any) -> dict[str, Any]:
                 "description": "The name of the program that others see.",
             },
         ],
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": request}},
-        },
+        "requestBody": {"required": True, "content": {"application/json": {"schema": request}}},
         "responses": {
             "200": _json_response("The request is done, or its answer.", answer),
             "409": _response("The request is refused at present.", answers.Refused),

@@ -44,12 +44,7 @@ class BranchList:
     """Table, ghosts and buttons of the branches. The choice of a ghost changes only the display."""
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        robot: Robot,
-        find: Find,
-        listen: Listen,
-        state: State,
+        self, server: viser.ViserServer, robot: Robot, find: Find, listen: Listen, state: State
     ) -> None:
         self._server = server
         self._find = find

@@ -17,13 +17,13 @@ import viser
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command, EndDrag, MoveTool, TurnTool
-from katana450.arm.control.modes import ToolTarget
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.freedoms import pitch_and_roll, pitched_frame
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.server.view.controls import GestureGate
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn

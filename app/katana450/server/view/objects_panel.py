@@ -91,9 +91,7 @@ class ObjectsPanel:
             hint="About the vertical, in degrees",
         )
         self._hidden = gui.add_checkbox(
-            "Hidden",
-            initial_value=False,
-            hint="Not drawn. The arm still keeps clear of it",
+            "Hidden", initial_value=False, hint="Not drawn. The arm still keeps clear of it"
         )
         self._mounts = gui.add_button_group(
             "Attach to",

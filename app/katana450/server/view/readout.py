@@ -5,13 +5,7 @@ from __future__ import annotations
 import math
 from html import escape
 
-from katana450.arm.control.messages import (
-    ROOM,
-    condition,
-    degrees,
-    limit_text,
-    signed,
-)
+from katana450.arm.control.messages import ROOM, condition, degrees, limit_text, signed
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray

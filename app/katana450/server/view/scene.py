@@ -180,12 +180,7 @@ class GhostNodes(FrameTree):
     """The translucent arm at the goal, or at a branch that can be chosen, in one colour."""
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        robot: Robot,
-        root: str,
-        colour: Colour,
-        opacity: float,
+        self, server: viser.ViserServer, robot: Robot, root: str, colour: Colour, opacity: float
     ) -> None:
         """Add the ghost below the new node ``root``, hidden."""
         super().__init__(server, root, robot)

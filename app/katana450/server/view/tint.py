@@ -22,11 +22,7 @@ class Tint:
     OPACITY = 0.55
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        robot: Robot,
-        path: Mapping[str, str],
-        props: Props,
+        self, server: viser.ViserServer, robot: Robot, path: Mapping[str, str], props: Props
     ) -> None:
         """Prepare the coats; ``path``: the scene node of each link. A prop's node is its name."""
         self._server = server

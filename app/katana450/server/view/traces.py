@@ -46,11 +46,7 @@ class Traces:
             "/path/desired", two, DESIRED, thickness=0.003, visible=False
         )
         self._traced = server.scene.add_line_segments(
-            "/path/traced",
-            two,
-            np.zeros((1, 2, 3), dtype=np.uint8),
-            thickness=0.006,
-            visible=False,
+            "/path/traced", two, np.zeros((1, 2, 3), dtype=np.uint8), thickness=0.006, visible=False
         )
         self._plan: Plan | None = None
         self._points: list[FloatArray] = []

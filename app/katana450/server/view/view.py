@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.messages import title
-from katana450.arm.control.modes import PoseTarget, ToolTarget
+from katana450.arm.control.modes import PoseTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State, Status
 from katana450.arm.robot.object_meshes import Meshes
@@ -19,6 +19,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.display_options import DisplayOptions
@@ -131,11 +132,7 @@ class View(ViewUpdater):
         self._folders = tuple(view_options.folders(tabs))
         with tabs.tab(SCENE):
             self._scene_tab = SceneTab(
-                server,
-                gestures,
-                shows,
-                lambda: state_publisher.snapshot.state,
-                session.environment,
+                server, gestures, shows, lambda: state_publisher.snapshot.state, session.environment
             )
         # At the end of the panel, because the element takes an empty line.
         server.gui.add_html(style())

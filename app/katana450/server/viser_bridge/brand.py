@@ -11,8 +11,5 @@ BRAND = (36, 119, 212)
 def dress(gui: viser.GuiApi) -> None:
     """Set our colours for the panel of every window."""
     gui.configure_theme(
-        control_width="medium",
-        show_logo=False,
-        show_share_button=False,
-        brand_color=BRAND,
+        control_width="medium", show_logo=False, show_share_button=False, brand_color=BRAND
     )

@@ -102,11 +102,7 @@ class Authenticator:
     """Identifies clients by their cookies and tokens."""
 
     def __init__(
-        self,
-        access: AccessFile | None,
-        port: int,
-        address: Address,
-        people: People | None = None,
+        self, access: AccessFile | None, port: int, address: Address, people: People | None = None
     ) -> None:
         """Check clients against ``access``; None makes every client an admin.
 
