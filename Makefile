@@ -18,7 +18,7 @@ CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
         bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures bench-planning \
-        bench-silence bench-start bench-stop bench-streams \
+        bench-recording bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -101,6 +101,9 @@ bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost t
 
 bench-silence: $(dev_ok)      ## time from a driver's last message until the arm brakes, alone and under attack
 	$(bin)/python -m benchmarks.silence $(ARGS)
+
+bench-recording: $(dev_ok)    ## lateness of the control loop with and without recording, and its cost
+	$(bin)/python -m benchmarks.recording $(ARGS)
 
 bench-stop: $(dev_ok)         ## time of STOP by both paths, alone and under attack
 	$(bin)/python -m benchmarks.stop $(ARGS)

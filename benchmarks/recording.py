@@ -1,0 +1,106 @@
+"""What recording costs: lateness of the control loop with and without it, and processor time.
+
+    python -m benchmarks.recording --rounds 5
+
+Servers with and without recording take turns. On each the arm swings all the time. The processor
+time is that of the process that records, and of the arm's process, divided by the wall time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.start_and_idle import cpu_seconds
+from katana450.client import connect
+from katana450.client.client import Client
+from katana450.client.files import RefusedError
+from katana450.server.api import answers, requests
+from tests.browser.server import RECORDING_APP, SIMULATION_APP, AppServer
+
+ENDS = ((-0.8, -1.2, 1.5, 0.1, 0.0), (0.8, -1.2, 1.5, 0.1, 0.0))
+
+WARM_UP = 8.0
+"""[s] Time in which the process that records starts."""
+
+POLL = 0.05
+"""[s] Interval at which the client looks at the state."""
+
+MIB = 2**20
+
+
+class Costs(NamedTuple):
+    """Lateness of the ticks [s], processor time as fractions of a core, memory and bytes."""
+
+    p50: float
+    p99: float
+    arm: float
+    recorder: float
+    memory: int
+    size: int
+
+
+def measured(folder: Path | None, seconds: float) -> Costs:
+    """Return the costs while an arm swings for ``seconds``; ``folder``: that of its recording."""
+    command = SIMULATION_APP if folder is None else (*RECORDING_APP, "--record", str(folder))
+    with AppServer(command) as server, connect(server.url, "Driver") as arm:
+        pids = [server.arm] if folder is None else [server.arm, server.child("katana450 rec")]
+        swing(arm, WARM_UP)
+        before = [cpu_seconds([pid]) for pid in pids]
+        swing(arm, seconds)
+        used = [(cpu_seconds([pid]) - t) / seconds for pid, t in zip(pids, before, strict=True)]
+        timing = arm.query(answers.Loop)
+        memory = 0
+        if folder is not None:
+            fields = Path(f"/proc/{pids[1]}/statm").read_text(encoding="ascii").split()
+            memory = 4096 * int(fields[1])
+    size = 0 if folder is None else sum(path.stat().st_size for path in folder.iterdir())
+    recorder = used[1] if len(used) > 1 else 0.0
+    return Costs(timing.late_p50, timing.late_p99, used[0], recorder, memory, size)
+
+
+def swing(arm: Client, seconds: float) -> None:
+    """Swing the arm from side to side for ``seconds``."""
+    end, swings = time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        if not arm.query(answers.State).moving:
+            with suppress(RefusedError):
+                arm.ask(requests.Joints(q=list(ENDS[swings % 2])))
+                swings += 1
+        time.sleep(POLL)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5, help="servers of each kind (default: 5)")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of each (default: 20)")
+    options = parser.parse_args()
+    without, with_it = [], []
+    for _ in range(options.rounds):
+        without.append(measured(None, options.seconds))
+        with tempfile.TemporaryDirectory() as folder:
+            with_it.append(measured(Path(folder) / "ring", options.seconds))
+        for name, each in (("without", without[-1]), ("with", with_it[-1])):
+            print(f"{name:8} p50 {1e3 * each.p50:.3f} ms  p99 {1e3 * each.p99:.3f} ms", flush=True)
+    for name in ("p50", "p99"):
+        a, b = (statistics.median(getattr(each, name) for each in x) for x in (without, with_it))
+        print(
+            f"lateness, {name}: {1e3 * a:.3f} ms without, {1e3 * b:.3f} ms with, {b / a:.2f} times"
+        )
+    arm = [100.0 * statistics.median(each.arm for each in x) for x in (without, with_it)]
+    print(f"the arm's process: {arm[0]:.1f} % of a core without, {arm[1]:.1f} % with")
+    recorder = 100.0 * statistics.median(each.recorder for each in with_it)
+    memory = statistics.median(each.memory for each in with_it) / MIB
+    rate = statistics.median(each.size for each in with_it) / (options.seconds + WARM_UP)
+    print(f"the process that records: {recorder:.1f} % of a core, {memory:.0f} MB")
+    print(f"size: {3600 * rate / 1e6:.0f} MB an hour")
+
+
+if __name__ == "__main__":
+    main()
