@@ -1,4 +1,4 @@
-// The small menu: the person's name, a picture of the scene, and a link to this view.
+// The small menu: the person's name, a picture, a recording, and a link to this view.
 "use strict";
 const More = (() => {
   const NAME = "katana450.name";
@@ -6,6 +6,7 @@ const More = (() => {
   const byId = (id) => document.getElementById(id);
   const [dialog, button, field, why] = ["more", "more-button", "own-name", "own-name-why"].map(byId);
   const ID = "name"; // id of the request for a name
+  const RECORDED = 600; // s of motion that the server keeps
   /** @type {(request: object) => void} */
   let say = () => {};
   /** @type {(words: string) => void} */
@@ -78,6 +79,10 @@ const More = (() => {
       const view = options.view();
       if (view) copyView(view);
       else toast("There is no view yet. Wait until the scene is shown.");
+    });
+    byId("keep-recording").addEventListener("click", async () => {
+      const { keep } = await import("./more/keep.js");
+      keep(toast, RECORDED);
     });
     byId("phone-button").addEventListener("click", async () => {
       const { toggle } = await import("./more/phone.js");

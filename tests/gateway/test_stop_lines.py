@@ -12,6 +12,7 @@ import pytest
 
 from katana450.arm.control.lease import Role
 from katana450.client import connect
+from katana450.client.client import Client
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.stop_connection import MAX_HEAD_BYTES
@@ -42,13 +43,21 @@ def answer(server: AppServer, *parts: bytes) -> dict[str, str]:
     return found
 
 
+def stopped(program: Client) -> str:
+    """Return the reason of the stop as soon as the main port has heard of it from the arm."""
+    deadline = time.monotonic() + 5.0
+    while (why := program.query(answers.State).stopped) is None:
+        assert time.monotonic() < deadline
+    return why
+
+
 def test_two_lines_stop_a_moving_arm(server: AppServer) -> None:
     with connect(server.url, "Driver") as program:
         under_way(program)
         confirmed = {"stop": "confirmed", "why": "Cell pressed STOP."}
         # Cut anywhere, as TCP may do.
         assert answer(server, HELLO[:9], HELLO[9:] + STOP[:3], STOP[3:]) == confirmed
-        assert program.query(answers.State).stopped == "Cell pressed STOP."
+        assert stopped(program) == "Cell pressed STOP."
         lines = program.query(answers.EventLog).lines
         assert any((line.who, line.command) == ("Cell", "Stop") for line in lines)
         program.clear_stop()
@@ -65,11 +74,7 @@ def test_sender_that_ends_its_half_is_answered(server: AppServer, end: bytes) ->
             line.shutdown(socket.SHUT_WR)
             with line.makefile("rb") as stream:
                 assert json.loads(stream.readline())["stop"] == "confirmed"
-        deadline = time.monotonic() + 5.0
-        # The main port hears of it from the arm, too.
-        while (stopped := program.query(answers.State).stopped) is None:
-            assert time.monotonic() < deadline
-        assert stopped == "Cell pressed STOP."
+        assert stopped(program) == "Cell pressed STOP."
         program.clear_stop()
         program.ask(requests.ReleaseLease())
 

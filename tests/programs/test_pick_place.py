@@ -9,6 +9,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import runner
@@ -254,3 +255,22 @@ def test_cup_is_poured_only_if_held_from_the_front(stage: Stage) -> None:
     text = "frame: base\nsteps:\n- pick: {object: cup, side: above}\n"
     with pytest.raises(ScriptError, match="from above the wrist could not pour it"):
         compiled(parse(text), stage.plan_context, stage.begin())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("corners", ["box", "wedge"])
+def test_imported_mesh_is_picked_and_placed(stage: Stage, corners: str) -> None:
+    size = (0.036, 0.04, 0.06)
+    x, y, z = np.array(size) / (2.0, 2.0, 1.0)
+    body = np.array([(i * x, j * y, k * z) for i in (-1, 1) for j in (-1, 1) for k in (0, 1)])
+    if corners == "wedge":
+        # Narrower at the top, as many castings are.
+        body[body[:, 2] > 0.0, :2] *= 0.9
+    part = replace(
+        box("part", NEAR, (36.0, 40.0, 60.0), yaw=18.0),
+        shape=Shape.MESH,
+        size=(),
+        solid=Solid("part", size, body),
+    )
+    end = played(stage, "- pick: part\n- place: {at: {x: 230, y: -120}}\n", part)
+    assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)

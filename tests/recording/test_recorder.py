@@ -29,6 +29,7 @@ from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, STATE
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.conftest import LONG
+from tests.gateway.client import ask, enter
 from tests.recording.recorded import header, run
 
 KILLS = 50 if LONG else 1
@@ -84,6 +85,14 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
         # After the delay of its start, and then a second for the disk.
         waited_for(lambda: main(["record", "keep", str(folder), "--out", str(kept)]) == 0, "motion")
         waited_for(lambda: _keeps(folder, kept, "Stop"), "the stop in the recording")
+        address, cookie = f"{server.url}/api/v1/recording", enter(server.url)
+        for query, status in (("?last=0", 400), ("?last=x", 400), ("", 200)):
+            answer = ask(address + query, Cookie=cookie)
+            assert answer[0] == status, answer[2]
+        assert ask(address)[0] == 403
+    downloaded = tmp_path / "downloaded.mcap"
+    downloaded.write_bytes(answer[2])
+    assert verified(downloaded) == verified(kept)
     server.stop()
     assert verified(kept) > 100
     (path,) = ring_files(folder)

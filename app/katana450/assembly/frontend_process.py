@@ -67,7 +67,11 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
     meshes = Meshes(config.folder)
     options = config.options
     parts = () if options is None else serve_extensions()
-    routes = [part.routes for part in parts if part.routes is not None]
+    routes = [
+        lambda context, given=part.routes: given(context._replace(options=options))
+        for part in parts
+        if part.routes is not None
+    ]
     runners = [part.runner() for part in parts if part.runner is not None]
     gateway = Gateway(
         config.settings,

@@ -35,9 +35,6 @@ log = logging.getLogger(__name__)
 PIPE_ERRORS = (EOFError, OSError)
 """Errors that a pipe raises when its other end is closed."""
 
-MIN_WATCH_INTERVAL = 0.005
-"""[s] Minimum time between two checks for silence."""
-
 PULSE_INTERVAL = 0.1
 """[s] Maximum time between two messages of the arm's process, as long as its control loop ticks."""
 
@@ -263,13 +260,13 @@ class ArmEnd:
         return tuple(named)
 
     def _watch(self) -> None:
-        wait = self._silence_timeout
-        while not self.cut.wait(wait):
+        # One check for each timeout in which the other end is heard, and a little after its end.
+        slack = self._silence_timeout / 8
+        silent = 0.0
+        while not self.cut.wait(max(self._silence_timeout - silent, 0.0) + slack):
             silent = time.monotonic() - self._heard
-            wait = max(self._silence_timeout - silent, MIN_WATCH_INTERVAL)
             if silent > self._silence_timeout:
                 self._loop.brake(Finding(Reason.SERVER_SILENT, silent), silent)
-                wait = self._silence_timeout / 4
 
 
 def _newer(event_log: tuple[LogEntry, ...], last: LogEntry | None) -> tuple[LogEntry, ...]:

@@ -18,7 +18,10 @@ from katana450.extension import (
 from katana450.extensions.recording.record_options import add_record_options
 
 if TYPE_CHECKING:
+    from starlette.routing import BaseRoute
+
     from katana450.arm.runtime.loop import ControlLoop
+    from katana450.server.web.http_api import RouteContext
 
 
 def add_serve_options(parser: ArgumentParser) -> None:
@@ -48,6 +51,17 @@ def _process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     )
 
 
+def _routes(context: RouteContext) -> list[BaseRoute]:
+    from katana450.extensions.recording.live.places import default_folder
+    from katana450.extensions.recording.live.route import recording_route
+
+    options = context.options
+    folder: Path | None = None
+    if options is not None and not options.no_record:
+        folder = options.record or default_folder(context.hub.stop_path.main_port)
+    return [recording_route(context, folder)]
+
+
 def _record_end(pipe: Connection, loop: ControlLoop) -> PipeEnd:
     from katana450.extensions.recording.live.record_end import RecordEnd
 
@@ -63,5 +77,11 @@ def _record(options: Namespace) -> int:
 EXTENSION = Extension(
     "recording",
     (CliCommand("record", "keep, verify, repair and cut recordings", add_record_options, _record),),
-    ServeExtension(add_serve_options, process=_process, record_end=_record_end),
+    ServeExtension(
+        add_serve_options,
+        routes=_routes,
+        process=_process,
+        record_end=_record_end,
+        needs=("programs",),
+    ),
 )

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import math
 import re
+from argparse import Namespace
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -59,11 +60,13 @@ class RouteContext(NamedTuple):
         hub: The hub with the arm and the lease.
         authenticator: Identifies clients by their cookies and links.
         identity: Returns the identity of a request's sender, or raises HTTPException.
+        options: Options of the extensions; None if no extension takes part.
     """
 
     hub: Hub
     authenticator: Authenticator
     identity: Callable[[Request], Identity]
+    options: Namespace | None = None
 
 
 RouteProvider = Callable[[RouteContext], list[BaseRoute]]
