@@ -1,4 +1,4 @@
-"""What recording costs: lateness of the control loop with and without it, and processor time.
+"""Costs of recording: lateness of the control loop with and without it, and processor time.
 
     python -m benchmarks.recording --rounds 5
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import random
 import signal
@@ -15,8 +16,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
 
 import katana450
+from katana450.arm.control.lease import Role
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.extensions.recording.files.checking import session_for, verify_recording
@@ -26,7 +30,10 @@ from katana450.extensions.recording.live.places import ring_files
 from katana450.extensions.recording.live.record_end import RecordEnd, lost_records
 from katana450.extensions.recording.live.record_wire import RecordDeserializer
 from katana450.extensions.recording.live.ring import Ring
+from katana450.extensions.recording.live.route import recording_route
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, STATE
+from katana450.server.service.identity import Identity
+from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.conftest import LONG
 from tests.gateway.client import ask, enter
@@ -89,7 +96,6 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
         for query, status in (("?last=0", 400), ("?last=x", 400), ("", 200)):
             answer = ask(address + query, Cookie=cookie)
             assert answer[0] == status, answer[2]
-        assert ask(address)[0] == 403
     downloaded = tmp_path / "downloaded.mcap"
     downloaded.write_bytes(answer[2])
     assert verified(downloaded) == verified(kept)
@@ -106,6 +112,18 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
     assert "Stop" in names
     assert path.stat().st_mode & 0o077 == 0
     capsys.readouterr()
+
+
+@pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])
+def test_viewers_get_no_recording(folder: Path, role: Role) -> None:
+    who = Identity("session", "Vera", role)
+    context = RouteContext(None, None, lambda _: who)  # type: ignore[arg-type]
+    request = Request({"type": "http", "query_string": b"", "headers": []})
+    with pytest.raises(HTTPException) as caught:
+        asyncio.run(recording_route(context, folder).endpoint(request))
+    # There is none yet, which an operator is told.
+    assert caught.value.status_code == (403 if role is Role.VIEWER else 409)
+    assert ("may watch" if role is Role.VIEWER else "has no recording") in caught.value.detail
 
 
 def _keeps(folder: Path, kept: Path, command: str) -> bool:

@@ -18,8 +18,8 @@ def keep(folder: Path, out: Path, last: float) -> tuple[float, float, str]:
     """Write the last seconds of the ring in ``folder`` to ``out``; return begin and end [s].
 
     The third value is a note for people, which is empty if the ring holds everything. The server
-    may go on writing: of the file that it writes now, the part that is on the disk is taken. Only
-    files of the newest run of the server are joined.
+    may still write: of its present file, the part that is on the disk is taken. Only files of the
+    newest run of the server are joined.
 
     Args:
         folder: folder of the ring.
