@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import os
 import re
 import socket
 import statistics
@@ -58,12 +57,13 @@ class Times(NamedTuple):
 
 
 def cpu_seconds(pids: Sequence[int]) -> float:
-    """Return the CPU time that processes and their threads have used [s]; Linux only."""
-    ticks = 0
+    """Return the CPU time that the present threads of processes have used [s]; Linux only."""
+    nanoseconds = 0
     for pid in pids:
-        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-        ticks += int(fields[11]) + int(fields[12])
-    return ticks / os.sysconf("SC_CLK_TCK")
+        # Exact, unlike the times in `stat`, which are sampled.
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            nanoseconds += int((thread / "schedstat").read_text(encoding="ascii").split()[0])
+    return 1e-9 * nanoseconds
 
 
 def over_the_wire(url: str) -> dict[str, int]:

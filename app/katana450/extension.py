@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from katana450.arm.control.session import Session
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
-    from katana450.arm.runtime.arm_listener import ArmAddress
-    from katana450.arm.runtime.loop import ControlLoop
+    from katana450.arm.runtime.arm_listener import ArmAddress, Greeting
+    from katana450.arm.runtime.tick import TickRecord
     from katana450.server.service.nodes import Nodes
     from katana450.server.service.recorder import Recorder
     from katana450.server.service.runner import Runner
@@ -79,17 +79,17 @@ class CliCommand:
     run: Callable[[Namespace], int]
 
 
-class PipeEnd(Protocol):
-    """End of a pipe that threads of its own serve."""
+class TickSender(Protocol):
+    """Sends the records of ticks to a further process of the server."""
 
-    def start(self) -> None:
-        """Start the threads."""
+    def put(self, record: TickRecord) -> None:
+        """Take ``record`` in the control thread; returns at once."""
+
+    def attach(self, pipe: Connection, greeting: Greeting, /) -> None:
+        """Send what waits, and all further records, by ``pipe`` in place of any previous one."""
 
     def close(self) -> None:
-        """Let the threads end after what waits to be sent."""
-
-    def join(self) -> None:
-        """Wait for the threads, for a short time."""
+        """End after what waits, or after a short time."""
 
 
 @dataclass(frozen=True)
@@ -151,8 +151,8 @@ class ServeExtension:
             returns the function that ends this. Called in the process of the view.
         process: Returns a further process of the server, or None. Called in the process that starts
             the others.
-        record_end: Returns the end of a pipe by which the record of each tick goes to that process.
-            Called in the process of the arm.
+        tick_sender: Returns the sender of the record of each tick to that process, or None. Called
+            in the process of the arm.
         needs: Built-in extensions that must be installed; without them this part is left out.
     """
 
@@ -167,7 +167,7 @@ class ServeExtension:
     send_records: Callable[[Namespace, Recorder, Connection], Callable[[], None] | None] | None = (
         None
     )
-    record_end: Callable[[Connection, ControlLoop], PipeEnd] | None = None
+    tick_sender: Callable[[Namespace], TickSender | None] | None = None
     process: Callable[[Namespace, ServerFacts], ExtraProcess | None] | None = None
     needs: tuple[str, ...] = ()
 

@@ -10,11 +10,10 @@ import sys
 import threading
 from argparse import Namespace
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmAddress, ArmListener
+from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmAddress, ArmListener, Roles
 from katana450.assembly.output import say
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
 from katana450.extension import serve_extensions
@@ -71,10 +70,12 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
     found = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
     again = kept is not None
     arm = RunningArm(config.settings, found, scene, again=again, kept=state)
-    roles = {FRONT: arm.attach, STOP: arm.attach_stop}
+    roles: Roles = {FRONT: arm.attach, STOP: arm.attach_stop}
     for part in () if config.options is None else serve_extensions():
-        if part.record_end is not None:
-            roles[RECORD] = partial(arm.attach_recorder, part.record_end)
+        sender = part.tick_sender(config.options) if part.tick_sender and config.options else None
+        if sender is not None:
+            arm.record(sender)
+            roles[RECORD] = sender.attach
     listener = ArmListener(config.address, roles)
     if not again:
         for note in arm.notes:

@@ -22,7 +22,7 @@ from katana450.settings import Settings
 OPEN = "open"
 """Status of the process: pages can be loaded. It is ready when the arm is connected too."""
 
-WAKE_INTERVAL = 0.1
+WAKE_INTERVAL = 0.25
 """[s] Interval at which a failure of the view is checked."""
 
 HANG_SECONDS = 5.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import threading
 import time
-from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import Connection
 
@@ -23,7 +22,7 @@ from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.state_publisher import StatePublisher
 from katana450.arm.runtime.stop_end import StopEnd
 from katana450.assembly.robot_session import DescribedRobot
-from katana450.extension import PipeEnd
+from katana450.extension import TickSender
 from katana450.platform_support import raise_priority
 from katana450.settings import Settings
 
@@ -77,7 +76,7 @@ class RunningArm:
         self._silence_timeout = settings.silence
         self._front_end: ArmEnd | None = None
         self._stop_end: StopEnd | None = None
-        self._recorders: list[PipeEnd] = []
+        self._tick_sender: TickSender | None = None
         self._attaching = threading.Lock()
         self._proven = -1
 
@@ -104,15 +103,9 @@ class RunningArm:
             self._stop_end = StopEnd(pipe, self._loop, self._mailbox, self._drivers)
             self._stop_end.start()
 
-    def attach_recorder(
-        self, end: Callable[[Connection, ControlLoop], PipeEnd], pipe: Connection, _: Greeting
-    ) -> None:
-        """Send the record of each further tick by ``pipe``, in place of any previous pipe."""
-        with self._attaching:
-            for each in self._recorders:
-                each.close()
-            self._recorders = [end(pipe, self._loop)]
-            self._recorders[0].start()
+    def record(self, sender: TickSender) -> None:
+        """Give the record of each further tick to ``sender``."""
+        self._tick_sender, self._loop.record = sender, sender.put
 
     def _drivers(self) -> tuple[str, ...]:
         return () if self._front_end is None else self._front_end.drivers
@@ -144,10 +137,9 @@ class RunningArm:
         while not self._stands_stopped() and self.running and time.monotonic() < end:
             time.sleep(0.01)
         self._loop.stop()
-        for recorder in self._recorders:
+        if self._tick_sender is not None:
             # Last, so that the brake is recorded too.
-            recorder.close()
-            recorder.join()
+            self._tick_sender.close()
         for each in ends:
             each.join()
         # Let Python collect reference cycles when it ends.

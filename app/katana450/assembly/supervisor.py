@@ -79,12 +79,14 @@ class ChildSpec:
         title: its name for people, at the beginning of a sentence.
         work: returns its function; None as its argument at the first start, later the kept state.
         deadline: silence [s] after which the process is ended, once it is ready.
+        late: whether it is started after all others are ready.
     """
 
     name: str
     title: str
     work: Callable[[Kept | None], Work]
     deadline: float
+    late: bool = False
 
 
 class Child:
@@ -232,7 +234,8 @@ class Supervisor:
         """Start all processes, in the given order."""
         self._turned = time.monotonic()
         for child in self._children.values():
-            child.start()
+            if not child.spec.late:
+                child.start()
 
     def wait_for(self, name: str, word: str) -> None:
         """Wait until the process ``name`` reports ``word``, at the start of the server.
@@ -243,6 +246,8 @@ class Supervisor:
             self._wait()
             for child in self._children.values():
                 alive = child.running
+                if child.due is not None:
+                    continue
                 if not alive:
                     child.collect()
                 if child.error is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing import AuthenticationError
@@ -65,6 +65,9 @@ class Greeting:
     number: int = 0
 
 
+Roles = dict[str, Callable[[Connection, Greeting], None]]
+
+
 def connect(address: ArmAddress, greeting: Greeting) -> Connection:
     """Return a new connection to the arm's process.
 
@@ -96,9 +99,7 @@ def connect_when_ready(
 class ArmListener:
     """Accepts connections in a thread of its own, and hands each to the function of its role."""
 
-    def __init__(
-        self, address: ArmAddress, roles: Mapping[str, Callable[[Connection, Greeting], None]]
-    ) -> None:
+    def __init__(self, address: ArmAddress, roles: Roles) -> None:
         """Listen at ``address``. Raises OSError if that is not possible.
 
         ``roles``: a function for each role. It is called in a thread of the connection.

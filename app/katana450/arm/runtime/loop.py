@@ -26,7 +26,7 @@ from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped, 
 
 log = logging.getLogger(__name__)
 
-REST_PERIOD = 0.05
+REST_PERIOD = 0.08
 """[s] Time between two ticks of a robot at rest, which the next command cuts short; not on Windows,
 where no command can end a sleep that is exact.
 """

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.stop_cause import StopCause
 
-STATUS_INTERVAL = 0.1
+STATUS_INTERVAL = 0.14
 """[s] Maximum time between two messages of the arm's process, as long as its control loop ticks."""
 
 NO_STATE = 0.3

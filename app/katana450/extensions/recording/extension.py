@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,16 +10,15 @@ from katana450.extension import (
     CliCommand,
     Extension,
     ExtraProcess,
-    PipeEnd,
     ServeExtension,
     ServerFacts,
+    TickSender,
 )
 from katana450.extensions.recording.record_options import add_record_options
 
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
-    from katana450.arm.runtime.loop import ControlLoop
     from katana450.server.web.http_api import RouteContext
 
 
@@ -62,10 +60,12 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
     return [recording_route(context, folder)]
 
 
-def _record_end(pipe: Connection, loop: ControlLoop) -> PipeEnd:
+def _tick_sender(options: Namespace) -> TickSender | None:
+    if options.no_record:
+        return None
     from katana450.extensions.recording.live.record_end import RecordEnd
 
-    return RecordEnd(pipe, loop)
+    return RecordEnd()
 
 
 def _record(options: Namespace) -> int:
@@ -81,7 +81,7 @@ EXTENSION = Extension(
         add_serve_options,
         routes=_routes,
         process=_process,
-        record_end=_record_end,
+        tick_sender=_tick_sender,
         needs=("programs",),
     ),
 )

@@ -11,8 +11,11 @@ from katana450.server.service.stop_path import StopPath
 
 log = logging.getLogger(__name__)
 
-CHECK_EVERY = 0.25
+CHECK_EVERY = 0.5
 """[s] Interval of the requests."""
+
+ARM_SILENCE = 0.25
+"""[s] Silence of the arm's process from which the server of STOP need not reach it either."""
 
 ANSWER_TIMEOUT = 0.5
 """[s] Timeout for an answer."""
@@ -39,7 +42,7 @@ async def watch_stop_path(
         host: address on which the server listens.
         port: its port.
         arm_age: returns the time since this process heard the arm's process [s]. While it is
-            CHECK_EVERY or longer, the server of STOP need not reach the arm either.
+            ARM_SILENCE or longer, the server of STOP need not reach the arm either.
         secure: whether the server uses TLS.
     """
     tls = None
@@ -54,7 +57,7 @@ async def watch_stop_path(
                 answer = await _answer(ANYWHERE.get(host, host), port, tls)
         except (OSError, EOFError, TimeoutError):
             answer = b""
-        serves = answer == WELL or (answer == WITHOUT_ARM and arm_age() >= CHECK_EVERY)
+        serves = answer == WELL or (answer == WITHOUT_ARM and arm_age() >= ARM_SILENCE)
         failures = 0 if serves else failures + 1
         if path.problem and serves:
             path.problem = ""

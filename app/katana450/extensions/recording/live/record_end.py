@@ -11,7 +11,6 @@ from collections import deque
 from contextlib import suppress
 from multiprocessing.connection import Connection
 
-from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.live.record_wire import RecordSerializer
 
@@ -26,35 +25,22 @@ JOIN_TIMEOUT = 1.0
 
 
 class RecordEnd:
-    """Sends the record of each tick of a control loop, and the number of those that were lost."""
+    """Sends the record of each tick, and the number of those that were lost.
 
-    def __init__(self, pipe: Connection, loop: ControlLoop) -> None:
-        """Create the end; ``start`` runs it."""
-        self._pipe = pipe
-        self._loop = loop
+    While no process receives them, records wait. So none is missing when that process starts later
+    than the arm, or is started again.
+    """
+
+    def __init__(self) -> None:
+        """Keep records until there is a pipe."""
         self._waiting: deque[TickRecord] = deque()
-        self._lost = 0
-        self._lost_until = 0.0
+        self._lost, self._lost_until = 0, 0.0
         self._losing = threading.Lock()
         self._any = threading.Event()
-        self._cut = threading.Event()
-        self._thread = threading.Thread(target=self._send, name="records out", daemon=True)
-
-    def start(self) -> None:
-        """Send the records of all further ticks, in a thread of its own, until the pipe is cut."""
-        self._loop.record = self.put
-        self._thread.start()
-
-    def close(self) -> None:
-        """End the records after those that wait."""
-        if self._loop.record == self.put:
-            self._loop.record = None
-        self._cut.set()
-        self._any.set()
-
-    def join(self) -> None:
-        """Wait until the records that waited are sent, or for a short time."""
-        self._thread.join(JOIN_TIMEOUT)
+        self._closed = threading.Event()
+        self._attaching = threading.Lock()
+        self._pipe: Connection | None = None
+        self._thread: threading.Thread | None = None
 
     def put(self, record: TickRecord) -> None:
         """Take ``record`` in the control thread."""
@@ -66,28 +52,59 @@ class RecordEnd:
         if not self._any.is_set():
             self._any.set()
 
-    def _send(self) -> None:
+    def attach(self, pipe: Connection, _greeting: object = None) -> None:
+        """Send what waits, and all further records, by ``pipe`` in place of any previous one."""
+        with self._attaching:
+            before, self._pipe = self._pipe, pipe
+            if before is not None:
+                with suppress(OSError):
+                    before.close()
+                self._end()
+            self._thread = threading.Thread(
+                target=self._send, args=(pipe,), name="records out", daemon=True
+            )
+            self._thread.start()
+            self._any.set()
+
+    def close(self) -> None:
+        """End after what waits, or after a short time."""
+        self._closed.set()
+        self._end()
+
+    def _end(self) -> None:
+        """Wait for the thread, which ends when its pipe is closed or nothing more comes."""
+        self._any.set()
+        if self._thread is not None:
+            self._thread.join(JOIN_TIMEOUT)
+
+    def _send(self, pipe: Connection) -> None:
         serializer = RecordSerializer()
         with suppress(EOFError, OSError):
-            while not (self._cut.is_set() and not self._waiting):
+            while pipe is self._pipe and not (self._closed.is_set() and not self._waiting):
                 self._any.wait()
                 self._any.clear()
                 while self._waiting:
-                    self._pipe.send_bytes(serializer.dumped(self._waiting.popleft()))
+                    pipe.send_bytes(serializer.dumped(self._waiting[0]))
+                    # Only now, so that a record whose pipe breaks goes by the next one.
+                    self._waiting.popleft()
                 if self._lost:
-                    self._report_lost()
-                self._cut.wait(COLLECTING)
-        if self._loop.record == self.put:
-            self._loop.record = None
+                    self._report_lost(pipe)
+                self._closed.wait(COLLECTING)
         with suppress(OSError):
-            self._pipe.close()
+            pipe.close()
 
-    def _report_lost(self) -> None:
+    def _report_lost(self, pipe: Connection) -> None:
         """Send the number of lost records. Until it is 0, the control thread adds no record."""
         with self._losing:
             lost, until, self._lost = self._lost, self._lost_until, 0
         # A record that was added since then is sent later, in this thread.
-        self._pipe.send_bytes(lost_message(lost, until))
+        try:
+            pipe.send_bytes(lost_message(lost, until))
+        except OSError:
+            # To be reported by the next pipe.
+            with self._losing:
+                self._lost += lost
+            raise
 
 
 def lost_message(count: int, until: float) -> bytes:

@@ -18,7 +18,7 @@ from katana450.extension import ServerFacts
 if TYPE_CHECKING:
     from katana450.extensions.recording.live.ring import Ring
 
-START_DELAY = 4.0
+START_DELAY = 3.0
 """[s] Time after the start of the arm in which the other processes have the processor alone."""
 
 SYNC_INTERVAL = 1.0
