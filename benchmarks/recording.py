@@ -49,8 +49,8 @@ def measured(folder: Path | None, seconds: float) -> Costs:
     """Return the costs while an arm swings for ``seconds``; ``folder``: that of its recording."""
     command = SIMULATION_APP if folder is None else (*RECORDING_APP, "--record", str(folder))
     with AppServer(command) as server, connect(server.url, "Driver") as arm:
-        pids = [server.arm] if folder is None else [server.arm, server.child("katana450 rec")]
         swing(arm, WARM_UP)
+        pids = [server.arm] if folder is None else [server.arm, server.child("katana450 rec")]
         before = [cpu_seconds([pid]) for pid in pids]
         swing(arm, seconds)
         used = [(cpu_seconds([pid]) - t) / seconds for pid, t in zip(pids, before, strict=True)]

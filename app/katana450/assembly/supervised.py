@@ -113,8 +113,8 @@ class SupervisorPipe:
         quiet = False
         due = time.monotonic()
         while True:
-            asked = False
-            if self._pipe.poll(max(due - time.monotonic(), 0.0)):
+            asked = self._pipe.poll(max(due - time.monotonic(), 0.0))
+            if asked:
                 message = self._pipe.recv_bytes()
                 self._heard = time.monotonic()
                 if message == END:

@@ -186,9 +186,8 @@ def _server_log(options: Namespace | None, port: int) -> ServerLog:
 
 def _extra_processes(options: Namespace | None, facts: ServerFacts) -> list[ExtraProcess]:
     """Return the processes that extensions add. Raises KatanaError."""
-    parts = () if options is None else serve_extensions()
-    found = [part.process(options, facts) for part in parts if part.process and options]
-    return [each for each in found if each is not None]
+    makes = [part.process for part in serve_extensions() if part.process and options]
+    return [found for make in makes if options and (found := make(options, facts))]
 
 
 def _private_folder() -> Path:
