@@ -16,13 +16,15 @@ from katana450.client import Client, RefusedError, connect
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT
-from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.server import RECORDING_APP, AppServer
 from tests.extensions.environments import distribution, without
 from tests.gateway.client import ask
 from tests.gateway.lines import post
 
 THERE = [0.4, -1.1, 1.3, 0.3, 0.2]
 FAR = [2.5, -1.1, 1.3, 0.3, 0.2]
+# Without programs, the recording is left out with its options.
+STRICT_APP = (*RECORDING_APP, "--strict-silence")
 
 STATION = """
 from katana450.arm.control import commands as cmd
@@ -76,7 +78,7 @@ EXTENSION = Extension("nodding", serve=ServeExtension(runner=runner, folder=Fold
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
     folder = tmp_path_factory.mktemp("blocking")
-    with without(folder, "programs"), AppServer(ATTENTIVE_APP) as server:
+    with without(folder, "programs"), AppServer(STRICT_APP) as server:
         yield server
 
 
@@ -178,7 +180,7 @@ def test_another_distribution_provides_the_runner(tmp_path: Path) -> None:
     distribution(tmp_path, "station:EXTENSION", STATION)
     with (
         without(tmp_path, "programs"),
-        AppServer((*ATTENTIVE_APP, "--silence", "2.0")) as server,
+        AppServer((*STRICT_APP, "--silence", "2.0")) as server,
         connect(server.url, "Watcher") as watcher,
     ):
         start = watcher.query(answers.State)
