@@ -116,13 +116,18 @@ class ExtraProcess:
     """A further process of the server. The supervisor starts it again when it ends.
 
     Attributes:
-        what: Name of the process, of up to 15 letters; its name for people, at the beginning of a
-            sentence; its function, of a module, which is called in the process with the next value
-            and a ``SupervisorPipe``, and ends when the server does; and that value.
+        name: Name of the process, of up to 15 letters.
+        title: Its name for people, at the beginning of a sentence.
+        run: Its function, of a module. It is called in the process with ``config`` and a
+            ``SupervisorPipe``, and ends when the server does.
+        config: A value that can be pickled.
         description: Line for the terminal.
     """
 
-    what: tuple[str, str, Callable[[Any, Any], None], Any]
+    name: str
+    title: str
+    run: Callable[[Any, Any], None]
+    config: Any
     description: str
 
 

@@ -244,10 +244,8 @@ class Supervisor:
         """
         while word not in self._children[name].statuses and not self._stopping.is_set():
             self._wait()
-            for child in self._children.values():
+            for child in [each for each in self._children.values() if each.due is None]:
                 alive = child.running
-                if child.due is not None:
-                    continue
                 if not alive:
                     child.collect()
                 if child.error is not None:

@@ -113,7 +113,12 @@ def serve(
         child_spec(STOP, "The process of STOP", run_stop, stop, STOP_DEADLINE),
         ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
         child_spec(ARM, "The arm's process", run_arm, arm, ARM_DEADLINE, keeps=True),
-        *(replace(child_spec(*each.what, EXTRA_DEADLINE), late=True) for each in extra),
+        *(
+            replace(
+                child_spec(each.name, each.title, each.run, each.config, EXTRA_DEADLINE), late=True
+            )
+            for each in extra
+        ),
     )
     supervisor = Supervisor(specs, stopping, event_log.restart)
     try:

@@ -38,20 +38,23 @@ def add_serve_options(parser: ArgumentParser) -> None:
 def _process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     if options.no_record:
         return None
-    from katana450.extensions.recording.live.places import default_folder
     from katana450.extensions.recording.live.recorder import RecorderConfig, run_recorder
+    from katana450.extensions.recording.places import default_folder
 
     folder = options.record or default_folder(facts.port)
     config = RecorderConfig(facts, folder)
     return ExtraProcess(
-        ("katana450 rec", "The process that records", run_recorder, config),
+        "katana450 rec",
+        "The process that records",
+        run_recorder,
+        config,
         f"Recording: the last ten minutes of motion are kept in {folder}",
     )
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
-    from katana450.extensions.recording.live.places import default_folder
     from katana450.extensions.recording.live.route import recording_route
+    from katana450.extensions.recording.places import default_folder
 
     options = context.options
     folder: Path | None = None

@@ -9,17 +9,15 @@ from pathlib import Path
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import is_whole, recover
-from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.files.trimming import Trimmed, trim
+from katana450.extensions.recording.places import recordings_in
 
-SUFFIX = "*.mcap"
 
+def keep(folder: Path, out: Path, last: float) -> Trimmed:
+    """Write the last seconds of the ring in ``folder`` to ``out``; return what was written.
 
-def keep(folder: Path, out: Path, last: float) -> tuple[float, float, str]:
-    """Write the last seconds of the ring in ``folder`` to ``out``; return begin and end [s].
-
-    The third value is a note for people, which is empty if the ring holds everything. The server
-    may still write: of its present file, the part that is on the disk is taken. Only files of the
-    newest run of the server are joined.
+    The server may still write: of its present file, the part that is on the disk is taken. Only
+    files of the newest run of the server are joined.
 
     Args:
         folder: folder of the ring.
@@ -32,7 +30,7 @@ def keep(folder: Path, out: Path, last: float) -> tuple[float, float, str]:
     with tempfile.TemporaryDirectory(prefix="katana450-") as temporary:
         copies: list[Path] = []
         run: str | None = None
-        for path in sorted(folder.glob(SUFFIX), reverse=True):
+        for path in reversed(recordings_in(folder)):
             copy = _whole(path, Path(temporary) / path.name)
             if copy is None:
                 continue
@@ -50,9 +48,7 @@ def keep(folder: Path, out: Path, last: float) -> tuple[float, float, str]:
             )
         with RecordingFile.open(copies[0]) as newest:
             end = newest.end
-        found = trim(copies, out, end - last, end)
-    note = "" if found.simulated_from is not None else " It cannot be verified: no complete state."
-    return found.start, found.end, note
+        return trim(copies, out, end - last, end)
 
 
 def _whole(path: Path, copy: Path) -> Path | None:

@@ -16,9 +16,8 @@ from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.table import write_csv
-from katana450.extensions.recording.files.trimming import trim
-
-SUFFIX = "*.mcap"
+from katana450.extensions.recording.files.trimming import Trimmed, trim
+from katana450.extensions.recording.places import recordings_in
 
 PROGRESS_STEP = 0.02
 """[1] Fraction of a recording after which the progress is shown again."""
@@ -49,15 +48,13 @@ def record(options: Namespace) -> int:
 
 
 def _keep(folder: Path, out: Path, last: float) -> int:
-    start, end, note = keep(folder, out, last)
-    print(printable(f"{out}: the last {end - start:.1f} s.{note}"))
-    return 0
+    return _written(out, keep(folder, out, last))
 
 
 def _list(folder: Path) -> int:
     if not folder.is_dir():
         raise InputError(f"There is no folder {folder}.")
-    for path in sorted(folder.glob(SUFFIX)):
+    for path in recordings_in(folder):
         try:
             with RecordingFile.open(path) as file:
                 length = f"{file.end - file.start:.1f} s"
@@ -128,8 +125,11 @@ def _trim(paths: list[Path], out: Path, start: float, end: float) -> int:
     for path in paths:
         with RecordingFile.open(path) as file:
             first = min(first, file.start)
-    found = trim(paths, out, first + start, first + end)
-    print(f"{out}: {found.end - found.start:.1f} s.")
+    return _written(out, trim(paths, out, first + start, first + end))
+
+
+def _written(out: Path, found: Trimmed) -> int:
+    print(printable(f"{out}: {found.end - found.start:.1f} s."))
     if found.simulated_from is None:
         print("No complete state lies before its end, so it cannot be verified.")
     return 0

@@ -17,7 +17,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.recovery import recover
-from katana450.extensions.recording.live.places import SUFFIX, ring_files
+from katana450.extensions.recording.places import SUFFIX, recordings_in
 from katana450.platform_support import claim_file, create_file
 
 MAX_FILE_TICKS = 6000
@@ -145,7 +145,7 @@ class Ring:
             return False
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            for old in ring_files(self._folder)[: -(MAX_FILES - 1)]:
+            for old in recordings_in(self._folder)[: -(MAX_FILES - 1)]:
                 old.unlink(missing_ok=True)
             path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
             self._file = open(create_file(path, 0o600), "wb")  # noqa: SIM115 - open for a minute
@@ -175,7 +175,7 @@ class Ring:
 
 def _repair(folder: Path) -> None:
     """Make whole files of those that a crash left open."""
-    for path in ring_files(folder):
+    for path in recordings_in(folder):
         try:
             found = recover(path, path)
         except InputError as error:

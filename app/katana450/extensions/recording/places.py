@@ -1,4 +1,4 @@
-"""Folder and file names of the ring, which is the recording of the last minutes."""
+"""Folders of recordings, and the names of the files in them."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ def default_folder(port: int) -> Path:
     return state_folder() / "katana450" / "recordings" / f"port-{port}"
 
 
-def ring_files(folder: Path) -> list[Path]:
-    """Return the files of the ring in ``folder``, the oldest first."""
+def recordings_in(folder: Path) -> list[Path]:
+    """Return the recordings in ``folder`` by their names, a server's oldest first."""
     return sorted(folder.glob(f"*{SUFFIX}"))
