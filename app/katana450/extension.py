@@ -56,6 +56,7 @@ BUILT_IN = (
     "media",
     "phone",
     "recording",
+    "kinematics",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 

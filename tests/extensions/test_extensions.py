@@ -96,6 +96,7 @@ def test_every_built_in_extension_is_found() -> None:
         ("experiments", ["run", "demo"]),
         ("programs", ["run", "demo"]),
         ("media", ["render"]),
+        ("kinematics", ["fk", "ik"]),
     ],
 )
 def test_commands_of_a_missing_extension_are_not_listed(
@@ -129,7 +130,13 @@ def test_core_commands_work_without_any_extension(blocking: Path) -> None:
     assert "serve" in helped
     assert "demo" not in helped
     assert "left out" not in helped
-    assert '"T": [[1.0, ' in katana450("fk", folder=blocking, blocked=blocked, text=LINE)
+    given = katana450(
+        *("access", "give", "--name", "Bench", "--file", str(blocking / "access.json")),
+        folder=blocking,
+        blocked=blocked,
+    )
+    assert given.startswith("0 ")
+    assert "Bench" in (blocking / "access.json").read_text(encoding="utf-8")
     assert "--workspace" not in katana450("serve", "--help", folder=blocking, blocked=blocked)
 
 

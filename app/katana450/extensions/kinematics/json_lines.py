@@ -17,9 +17,9 @@ from katana450.arm.control.messages import REASONS
 from katana450.arm.robot.collision import initial_objects, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
-from katana450.cli.numbers import numbers, shown
-from katana450.cli.pose_requests import KEYS, requested_pose
 from katana450.errors import InputError
+from katana450.extensions.kinematics.numbers import numbers, shown
+from katana450.extensions.kinematics.pose_requests import KEYS, requested_pose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch_metrics import BranchMetrics

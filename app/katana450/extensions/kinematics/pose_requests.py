@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.cli.numbers import numbers
 from katana450.errors import InputError
+from katana450.extensions.kinematics.numbers import numbers
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.branch import BRANCHES

@@ -1,0 +1,53 @@
+"""The extension ``kinematics``: forward and inverse kinematics for other programs."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from katana450.extension import CliCommand, Extension
+from katana450.extensions.kinematics.options import add_fk_options, add_ik_options
+
+
+def _fk(options: Namespace) -> int:
+    from katana450.extensions.kinematics.json_lines import Kinematics, answer_lines
+
+    in_base_frame = options.frame == "base"
+    return answer_lines(Kinematics(options.urdf, options.tool, in_base_frame=in_base_frame).fk)
+
+
+def _ik(options: Namespace) -> int:
+    from katana450.extensions.kinematics.json_lines import Kinematics, answer_lines
+    from katana450.maths.kinematics.priority import Priority
+
+    return answer_lines(
+        Kinematics(
+            options.urdf,
+            options.tool,
+            in_base_frame=options.frame == "base",
+            all_metrics=options.metrics,
+            priority=Priority[options.priority.upper()],
+            with_nearest=options.nearest,
+        ).ik
+    )
+
+
+EXTENSION = Extension(
+    "kinematics",
+    commands=(
+        CliCommand(
+            "fk",
+            "JSON lines from stdin to stdout, joints to poses: "
+            '{"q": [5 angles, rad], "tool": "tcp"} per line',
+            add_fk_options,
+            _fk,
+        ),
+        CliCommand(
+            "ik",
+            "JSON lines from stdin to stdout, poses to joints: "
+            '{"T": [[4x4, m]], "tool": "tcp"} per line, or "p" with "wxyz", "xyzw", "rpy", or '
+            '"pitch" and "roll"',
+            add_ik_options,
+            _ik,
+        ),
+    ),
+)
