@@ -176,3 +176,11 @@ def test_a_plan_to_a_limit_never_exceeds_it_by_rounding(arm: ArmModel, bounds: B
         close = made.span - np.geomspace(1e-9, 1e-2, 50)
         assert (np.array([made.q(tau) for tau in close.tolist()]) <= chain.upper).all()
         np.testing.assert_array_equal(made.end, chain.upper)
+
+
+def test_a_plan_ends_at_its_goal_to_the_bit(arm: ArmModel, bounds: Bounds) -> None:
+    chain, rng = arm.chain, np.random.default_rng(5)
+    for start, goal in rng.uniform(chain.lower, chain.upper, (20, 2, 5)):
+        made = plan([JointPath(chain, np.array([start, goal]))], bounds)
+        np.testing.assert_array_equal(made.q(0.0), start)
+        np.testing.assert_array_equal(made.q(made.span), goal)

@@ -58,6 +58,9 @@ class Segment:
         q, q1, q2 = (
             np.array(each) for each in zip(*(j.derivatives()[:3] for j in joints), strict=True)
         )
+        if tau >= self.scaling.span:
+            # The goal itself, not what rounding makes of it.
+            q = self.path.end
         # A path that touches a limit exceeds it by rounding. No setpoint may.
         q = self.path.chain.clamp(q)
         return PathMotion(frozen(q), q1 * pace.first, q2 * pace.first**2 + q1 * pace.second)
