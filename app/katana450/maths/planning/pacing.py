@@ -31,8 +31,8 @@ PATIENCE: Final = 8
 LEAST_GAIN: Final = 1e-4
 """Smallest fraction [1] of the time that counts as a gain."""
 
-TRIAL_ROUNDS: Final = 8
-"""The number of rounds that compare other values of a and j."""
+TRIAL_ROUNDS: Final = 6
+"""The number of rounds that compare starts, and values of a and j."""
 
 FIRST_ROUNDS: Final = 3
 """The number of rounds after which a trial must be nearly as fast as the best one."""
@@ -46,8 +46,8 @@ SLOWING_POWER: Final = 0.6
 SPEEDING_POWER: Final = 0.1
 """Power [1] for a place that is too slow: smaller, or the rounds would oscillate."""
 
-SMALLEST_DIVISOR: Final = 1e-300
-"""Smallest divisor, which avoids 0 / 0."""
+SMALLEST_ROOT: Final = 1e-100
+"""Smallest root, which avoids 0 / 0; its square is above 0."""
 
 SEARCH_FACTORS: Final = (1.5, 1.15)
 """Falling factors [1] by which a and j are varied, as long as it saves time."""
@@ -74,17 +74,19 @@ def fastest(path: Path, bounds: Bounds) -> Scaling:
     even = np.ones(len(sampled.first) + 3)
     # Uniform slowness, or the slowness that each place needs by itself: either may end up better.
     starts = even, sampled.near(sampled.excess(even, a, j))
-    best = min((sampled.fitted(a, j, each, ROUNDS) for each in starts), key=lambda f: f.time)
+    best = min((sampled.fitted(a, j, each, TRIAL_ROUNDS) for each in starts), key=lambda f: f.time)
     for factor in SEARCH_FACTORS:
-        improved = True
+        improved, back = True, (0, 0)
         while improved:
             improved = False
             for x, y in ((1, 1), (-1, -1), (1, 0), (-1, 0), (0, 1), (0, -1)):
-                fa, fj = factor**x, factor**y
-                a, j = best.acceleration * fa, best.jerk * fj
+                if (x, y) == back:
+                    # It leads to the a and j of the best one before.
+                    continue
+                a, j = best.acceleration * factor**x, best.jerk * factor**y
                 other = sampled.fitted(a, j, best.coefficients, TRIAL_ROUNDS, NEARLY * best.time)
                 if other.time < (1.0 - 1e-3) * best.time:
-                    best, improved = other, True
+                    best, improved, back = other, True, (-x, -y)
     best = sampled.fitted(best.acceleration, best.jerk, best.coefficients, ROUNDS)
     best = sampled.smoothed(best)
     return Scaling(best.coefficients, best.acceleration, best.jerk)
@@ -105,7 +107,10 @@ class _Sampled:
     Attributes:
         pressing: first two derivatives (2, 5, N) of the joints by sigma, as fractions of the limits
             of their accelerations.
-        jerking: first three derivatives (3, 5, N), as fractions of the limits of their jerks.
+        jerking: first derivative, three times the second one, and the third one (3, 5, N), as
+            fractions of the limits of their jerks.
+        slopes: absolute values (2, 5, N) of the first ones of `pressing` and `jerking`.
+        ratio: three times the limit of each acceleration by that of the jerk, (5, 1) [s].
         moving: largest fraction (N,) of a limit of speed, of the joints and of the tool point.
         pushing: derivatives (2, 3, N) of the tool point by sigma, as fractions of the limit of its
             acceleration; None without one.
@@ -116,6 +121,8 @@ class _Sampled:
 
     pressing: FloatArray
     jerking: FloatArray
+    slopes: FloatArray
+    ratio: FloatArray
     moving: FloatArray
     pushing: FloatArray | None
     index: npt.NDArray[np.int64]
@@ -146,9 +153,14 @@ class _Sampled:
         )
         tool = np.sqrt(np.einsum("kn,kn->n", p[0], p[0])) / (LIMIT_FRACTION * bounds.tool_speed)
         pushed = bounds.tool_acceleration
+        pressing = np.ascontiguousarray(q[:2] / acceleration)
+        jerking = np.ascontiguousarray(q / jerk)
+        jerking[1] *= 3.0
         return _Sampled(
-            np.ascontiguousarray(q[:2] / acceleration),
-            np.ascontiguousarray(q / jerk),
+            pressing,
+            jerking,
+            np.abs([pressing[0], jerking[0]]),
+            3.0 * acceleration / jerk,
             np.maximum((np.abs(q[0]) / speed).max(axis=0), tool),
             None if pushed is None else np.ascontiguousarray(p / (LIMIT_FRACTION * pushed)),
             piece + np.arange(4)[:, None],
@@ -226,25 +238,26 @@ class _Sampled:
         # Second and third derivative of sigma by tau.
         second = -w1 / w
         third = 3.0 * second * second - w2 / w
+        accelerating, jerky = self.slopes
         q1, q2 = self.pressing
         bend = np.abs(q2 + second * q1)
-        found = _quadratic(bend, a * np.abs(q1)).max(axis=0)
+        found = _quadratic(bend, 0.5 * a * accelerating).max(axis=0)
         np.maximum(found, self.moving, out=found)
         q1, q2, q3 = self.jerking
-        jerk = np.abs(q3 + 3.0 * second * q2 + third * q1)
-        cubic = _cubic(jerk, 3.0 * a * np.abs(q2 + second * q1), j * np.abs(q1))
+        jerk = np.abs(q3 + second * q2 + third * q1)
+        cubic = _cubic(jerk, a * self.ratio * bend, j * jerky)
         np.maximum(found, cubic.max(axis=0), out=found)
         if self.pushing is not None:
             p1, p2 = self.pushing
             pushed = p2 + second * p1
             push, pull = (np.sqrt(np.einsum("kn,kn->n", each, each)) for each in (pushed, p1))
-            np.maximum(found, _quadratic(push, a * pull), out=found)
+            np.maximum(found, _quadratic(push, 0.5 * a * pull), out=found)
         return np.asarray(found / w)
 
 
-def _quadratic(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the r > 0 with x / r^2 + y / r = 1."""
-    return np.asarray(0.5 * (y + np.sqrt(y * y + 4.0 * x)))
+def _quadratic(x: FloatArray, h: FloatArray) -> FloatArray:
+    """Return the r > 0 with x / r^2 + 2 h / r = 1."""
+    return np.asarray(h + np.sqrt(h * h + x))
 
 
 def _cubic(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
@@ -253,8 +266,10 @@ def _cubic(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     The value is approached from above, so that no limit is exceeded.
     """
     # r^3 - z r^2 - y r - x is convex and rises beyond its root, and the start is beyond it.
-    r = np.cbrt(x) + np.sqrt(y) + z
+    r = np.cbrt(x) + np.sqrt(y) + z + SMALLEST_ROOT
     for _ in range(3):
-        value = ((r - z) * r - y) * r - x
-        r = r - value / ((3.0 * r - 2.0 * z) * r - y + SMALLEST_DIVISOR)
+        # Horner's scheme gives the value and, from its partial sums, the derivative.
+        linear = r - z
+        quadratic = linear * r - y
+        r = r - (quadratic * r - x) / ((linear + r) * r + quadratic)
     return r
