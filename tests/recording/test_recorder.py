@@ -23,7 +23,6 @@ import katana450
 from katana450.arm.control.lease import Role
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
-from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.live import record_end, ring
 from katana450.extensions.recording.live.record_end import RecordEnd, lost_records
@@ -57,8 +56,7 @@ def waited_for(condition: Callable[[], object], what: str, seconds: float = 20.0
 
 def verified(path: Path) -> int:
     """Return the number of ticks of the recording, which is simulated again to the bit."""
-    with RecordingFile.open(path) as file:
-        result = verify_recording(file, session_for(file).session)
+    result = katana450.open(path).verify()
     assert result.identical, str(result)
     return result.ticks
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -235,37 +232,3 @@ def test_digest_sees_every_bit(records: list[TickRecord]) -> None:
     found = {digest, *(digester.digest(each) for each in changes)}
     assert len(found) == len(changes) + 1
     assert digester.digest(state) == digest == Digester().digest(state)
-
-
-SCRIPT = "import sys; from katana450.cli.main import main; sys.exit(main(sys.argv[1:]))"
-
-
-def verified_by(environment: dict[str, str], path: Path) -> str:
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, "record", "verify", str(path)],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
-    assert done.returncode in (0, 1), done.stderr
-    return done.stdout
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", ["0", "1", "4711"])
-def test_other_processes_find_the_same_bits(
-    path: Path, records: list[TickRecord], seed: str
-) -> None:
-    text = verified_by({"PYTHONHASHSEED": seed}, path)
-    assert f"identical to the bit over {len(records) - 1} ticks" in text
-
-
-@pytest.mark.long
-def test_other_processor_is_named_if_it_differs(path: Path, records: list[TickRecord]) -> None:
-    """OpenBLAS rounds otherwise for other processors: the result says so and is small."""
-    text = verified_by({"OPENBLAS_CORETYPE": "Sandybridge"}, path)
-    if "identical" not in text:
-        assert "blas_core" in text
-        assert f" of {len(records) - 1} ticks differ, by up to " in text

@@ -18,12 +18,11 @@ from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.recording.files.checking import (
     MissingMessage,
     TickReader,
-    session_for,
     state_numbers,
-    verify_recording,
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
+from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.replay import Verification
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, PLANS, SOLIDS
 from katana450.maths.geometry.arrays import FloatArray
@@ -147,8 +146,8 @@ class Recording:
     def verify(self, urdf: str | os.PathLike[str] | None = None) -> Verification:
         """Simulate the commands again, and return the comparison with every recorded tick.
 
-        The result is a sentence by ``str``; its ``identical`` tells whether every bit is the same,
-        which only the same kind of machine with the same libraries can give.
+        The result is a sentence by ``str``; its ``identical`` tells whether every bit is the same.
+        That needs the same libraries, and for recordings that no server made the same processor.
 
         Args:
             urdf: file of the recorded robot, if it is not the Katana450 of this package.
@@ -156,9 +155,7 @@ class Recording:
         Raises:
             InputError: the file is damaged, or is of another robot.
         """
-        with RecordingFile.open(self.path) as file:
-            found = session_for(file, None if urdf is None else Path(urdf))
-            return verify_recording(file, found.session)
+        return verified(self.path, None if urdf is None else Path(urdf))
 
     def to_dataframe(self) -> Any:
         """Return the states as a pandas DataFrame with the index ``t`` [s].

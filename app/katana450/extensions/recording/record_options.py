@@ -50,6 +50,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="the recorded robot, if it is not the Katana450 of this program",
     )
+    verify.add_argument("--json", action="store_true", help="print the result as JSON")
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
     export = acts.add_parser("export", help="write a recording for other programs")

@@ -1,7 +1,7 @@
 """Simulation of recorded ticks, and comparison with the states that were recorded.
 
 The rules are a pure function, so the same commands at the same times give the same states, to the
-bit, on the same kind of processor with the same libraries.
+bit, with the same libraries and rounding.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Fingerprint of the machine and the libraries on which a session runs.
 
-The same commands give the same bits only with the same libraries on the same kind of processor:
-BLAS and libm choose other code, and so another order of rounding, for other processors.
+The same commands give the same bits with the same libraries, if the process rounds alike on every
+processor. Otherwise BLAS and libm choose other code, with another order of rounding.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import math
+import os
 import platform
 import struct
 import sys
@@ -20,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from katana450.cli.version import version
+from katana450.portable_rounding import rounds_portably
 
 RELEVANT = (
     *("version", "python", "numpy", "blas", "blas_core", "libc", "machine", "cpu"),
@@ -29,6 +31,9 @@ RELEVANT = (
 
 PROBES = 2000
 """Number of arguments with which the rounding of functions is tried."""
+
+ROUNDING, PORTABLE = "rounding", "portable"
+"""Entry that tells whether the process rounded alike on all x86-64 processors, and its value."""
 
 HASH_DIGITS = 12
 UNKNOWN = "unknown"
@@ -46,6 +51,7 @@ def fingerprint() -> dict[str, str]:
         "machine": f"{sys.platform} {platform.machine()}",
         "cpu": _cpu(),
         "cpu_features": _cpu_features(),
+        ROUNDING: PORTABLE if rounds_portably(os.environ) else "of the processor",
         "libm_rounding": _libm_rounding(),
         "blas_rounding": _blas_rounding(),
     }

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from argparse import Namespace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
+
 from katana450.assembly.log_lines import printable
-from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import session_for, verify_recording
+from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.files.fingerprint import differences
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.table import write_csv
 from katana450.extensions.recording.files.trimming import Trimmed, trim
+from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.places import recordings_in
 
 PROGRESS_STEP = 0.02
@@ -40,7 +43,7 @@ def record(options: Namespace) -> int:
         case "recover":
             return _recover(options.file, options.out or options.file)
         case "verify":
-            return _verify(options.file, options.urdf)
+            return _verify(options.file, options.urdf, as_json=options.json)
         case "trim":
             return _trim(options.files, options.out, options.start, options.end)
         case _:
@@ -86,10 +89,11 @@ def _recover(path: Path, out: Path) -> int:
     return 0
 
 
-def _verify(path: Path, urdf: Path | None) -> int:
+def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
+    if as_json:
+        return _verify_for_programs(path, urdf)
     with RecordingFile.open(path) as file:
-        found = session_for(file, urdf)
-        result = verify_recording(file, found.session, _Progress(file))
+        result = verified(path, urdf, _Progress())
         print(f"{path}: {result}.")
         if result.ticks == 0:
             raise InputError(f"{path} has no tick that can be simulated.")
@@ -105,16 +109,26 @@ def _verify(path: Path, urdf: Path | None) -> int:
     return 1
 
 
+def _verify_for_programs(path: Path, urdf: Path | None) -> int:
+    """Print the result, or what is wrong with the recording, as a JSON object."""
+    try:
+        result = verified(path, urdf, _Progress())
+    except KatanaError as error:
+        print(json.dumps({"error": str(error)}))
+        return 1
+    print(msgspec.json.encode(result).decode())
+    return 0 if result.identical and result.ticks else 1
+
+
 class _Progress:
     """Shows the progress on a terminal."""
 
-    def __init__(self, file: RecordingFile) -> None:
-        self._start, self._length = file.start, max(file.end - file.start, PROGRESS_STEP)
+    def __init__(self) -> None:
         self._shown = -1.0 if sys.stderr.isatty() else math.inf
 
-    def __call__(self, t: float) -> None:
-        """Show the progress at ``t`` [s] of the recording."""
-        fraction = (t - self._start) / self._length
+    def __call__(self, t: float, length: float) -> None:
+        """Show that ``t`` of ``length`` seconds are simulated."""
+        fraction = t / max(length, PROGRESS_STEP)
         if fraction >= self._shown + PROGRESS_STEP:
             self._shown = fraction
             print(f"\r{100.0 * fraction:3.0f} %", end="\r", file=sys.stderr, flush=True)

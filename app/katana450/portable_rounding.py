@@ -1,0 +1,41 @@
+"""Environment of processes in which numbers are rounded alike on every x86-64 processor.
+
+OpenBLAS and glibc's libm choose other code for other processors, with sums in another order and
+with or without fused multiply-add. The last bits of a result then depend on the machine. With these
+variables both use the code that every x86-64 processor runs. They are read when a process begins,
+so they are for processes that are yet to be started.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+
+PROCESSORS = ("x86_64", "AMD64")
+
+BLAS = "OPENBLAS_CORETYPE"
+BLAS_CORE = "Nehalem"
+"""The oldest processor for which numpy is built."""
+
+LIBM = "GLIBC_TUNABLES"
+LIBM_CHOICE = "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"
+
+
+def portable_rounding(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return ``environment`` with the variables that make rounding independent of the processor.
+
+    On processors other than x86-64 it is returned unchanged.
+    """
+    found = dict(environment)
+    if platform.machine() in PROCESSORS:
+        tunables = found.get(LIBM, "")
+        if not tunables.endswith(LIBM_CHOICE):
+            # The last one counts.
+            found[LIBM] = f"{tunables}:{LIBM_CHOICE}".lstrip(":")
+        found[BLAS] = BLAS_CORE
+    return found
+
+
+def rounds_portably(environment: Mapping[str, str]) -> bool:
+    """Return whether processes with ``environment`` round independently of the processor."""
+    return BLAS in environment and portable_rounding(environment) == dict(environment)
