@@ -26,7 +26,7 @@ END, NOTICE = b"e", b"n"
 notice, which follows."""
 
 HEARTBEAT_INTERVAL = 0.1
-"""[s] Interval of the heartbeats, in both directions: each one is answered."""
+"""[s] Shortest interval of the heartbeats, in both directions: each one is answered."""
 
 QUIET_SECONDS = 1.0
 """[s] Silence of the supervisor after which its processes report it."""
@@ -43,9 +43,10 @@ log = logging.getLogger(__name__)
 class SupervisorPipe:
     """The pipe from a process to its supervisor, as the process sees it."""
 
-    def __init__(self, pipe: Connection) -> None:
-        """Create the pipe's end; ``start`` runs it."""
+    def __init__(self, pipe: Connection, interval: float = HEARTBEAT_INTERVAL) -> None:
+        """Create the pipe's end; ``start`` runs it. ``interval``: that of the heartbeats [s]."""
         self._pipe = pipe
+        self._interval = interval
         self._sending = threading.Lock()
         self._heard = time.monotonic()
         self._alive: Callable[[], bool] = lambda: True
@@ -124,7 +125,7 @@ class SupervisorPipe:
                 asked = message == HEARTBEAT
             # The answer to a heartbeat saves a turn of this thread. Without any it comes by itself.
             if asked or time.monotonic() >= due:
-                due = time.monotonic() + 1.5 * HEARTBEAT_INTERVAL
+                due = time.monotonic() + 1.5 * self._interval
                 # A supervisor that hangs reads nothing, and the pipe fills.
                 if self._alive() and writable(self._pipe.fileno()):
                     self._send(HEARTBEAT)
@@ -139,20 +140,23 @@ class SupervisorPipe:
         return problem is not None
 
 
-def run_supervised(name: str, work: Callable[[SupervisorPipe], None], pipe: Connection) -> None:
+def run_supervised(
+    name: str, work: Callable[[SupervisorPipe], None], pipe: Connection, interval: float
+) -> None:
     """Do ``work`` in this process, which the supervisor has just started.
 
     Args:
         name: name of the process.
         work: ends when ``SupervisorPipe.ended`` is set. A KatanaError is reported.
         pipe: the pipe to the supervisor.
+        interval: that of the heartbeats [s].
     """
     # Ctrl-C reaches all processes of a terminal; the supervisor ends this one.
     for number in stop_signals():
         signal.signal(number, signal.SIG_IGN)
     name_process(name)
     start_log()
-    supervisor = SupervisorPipe(pipe)
+    supervisor = SupervisorPipe(pipe, interval)
     supervisor.start()
     try:
         work(supervisor)

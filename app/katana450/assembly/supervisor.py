@@ -34,6 +34,11 @@ from katana450.assembly.supervised import (
 )
 from katana450.errors import ConfigurationError, KatanaError
 
+BEATS_BEFORE_DEADLINE = 8
+
+MAX_HEARTBEAT_INTERVAL = 0.4
+"""[s] Longest interval of the heartbeats; a process soon reports that its supervisor hangs."""
+
 TURN = HEARTBEAT_INTERVAL
 """[s] Interval at which signals and silence are checked; the end of a process wakes earlier."""
 
@@ -88,6 +93,12 @@ class ChildSpec:
     deadline: float
     late: bool = False
 
+    @property
+    def heartbeat_interval(self) -> float:
+        """Interval of the heartbeats [s]: several before the deadline, and no more than needed."""
+        wanted = self.deadline / BEATS_BEFORE_DEADLINE
+        return min(max(wanted, HEARTBEAT_INTERVAL), MAX_HEARTBEAT_INTERVAL)
+
 
 class Child:
     """One process of a kind at a time, as the supervisor sees it."""
@@ -115,7 +126,7 @@ class Child:
         kept = None if self._first else self.kept if self._early_ends <= MAX_KEPT_STARTS else {}
         self.process = spawn.Process(
             target=run_supervised,
-            args=(self.spec.name, self.spec.work(kept), theirs),
+            args=(self.spec.name, self.spec.work(kept), theirs, self.spec.heartbeat_interval),
             name=self.spec.name,
             daemon=True,
         )
@@ -180,7 +191,7 @@ class Child:
     def beat(self) -> None:
         """Send a heartbeat to the process, unless one was sent in this turn already."""
         now = time.monotonic()
-        if now - self._beaten >= HEARTBEAT_INTERVAL / 2:
+        if now - self._beaten >= self.spec.heartbeat_interval - TURN / 2:
             self._beaten = now
             self.send(HEARTBEAT)
 
