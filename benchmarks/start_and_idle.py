@@ -32,7 +32,9 @@ from tests.browser.page import ViserPage
 from tests.browser.server import BARE_APP, RECORDING_APP, AppServer
 from tests.gateway.client import SUBPROTOCOL, ask, enter, page_name, websocket
 
-SETTLE_SECONDS = 3.0
+SETTLE_SECONDS = 40.0
+"""[s] Time before the rest is measured, in which the scripts of the library are planned."""
+
 SCENE_SECONDS = 1.0
 """[s] Silence after which a scene is complete: at rest no more messages come."""
 OPEN_SECONDS = 30.0

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from katana450.client import Client, connect
+from katana450.extensions.programs.server.idle_planner import DELAY
 from katana450.server.api import answers
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
-from tests.browser.server import AppServer
+from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.session import bar
 
 pytestmark = pytest.mark.long
@@ -153,3 +154,20 @@ def test_pause_during_planning_lasts_until_resume(
     wait(arm, lambda state: state.stopped is not None and not state.moving)
     page.press_in_bar("Clear stop")
     until(page, "On target", 5.0)
+
+
+def test_demonstration_was_planned_while_nobody_used_the_server(windows: Windows) -> None:
+    with (
+        AppServer(RECORDING_APP) as server,
+        windows.open(server.url, nodes=("/arm", "/target/move")) as page,
+        connect(server.url, "Test") as arm,
+    ):
+        page.open_tab("Programs")
+        page.choose("Script", "Pour")
+        page.page.wait_for_timeout(1000.0 * (DELAY + 30.0))
+        begun = time.monotonic()
+        page.click_button("Run")
+        wait(arm, lambda state: state.program is not None and state.program.status == "running")
+        assert time.monotonic() - begun < 1.0
+        page.press_in_bar("STOP")
+        assert page.errors == []

@@ -30,7 +30,7 @@ SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 def made(hub: Hub) -> ProgramRunner:
     """Make the runner as ``katana450 serve`` does."""
-    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=False)
+    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=False, no_idle_planning=False)
     return ProgramRunner(hub, options)
 
 

@@ -140,7 +140,8 @@ def test_forbidden_program_runs_on_while_its_owner_is_there(table: Staged) -> No
 
 def test_server_option_forbids_unattended_programs(session: Session) -> None:
     def made(hub: Hub) -> ProgramRunner:
-        return ProgramRunner(hub, Namespace(owner_silence=OWNER_SILENCE, no_unattended=True))
+        options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=True, no_idle_planning=True)
+        return ProgramRunner(hub, options)
 
     table = Staged(session)
     table.programs = made(table.hub)

@@ -11,6 +11,7 @@ from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.server.idle_planner import IdlePlanner
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.server.script_parts import ScriptParts
@@ -29,13 +30,18 @@ class ProgramPlanner:
         then: the order that is carried out as soon as the planning has succeeded; None for none.
     """
 
-    def __init__(self, hub: Hub, owner: ProgramOwner) -> None:
-        """Prepare to plan for the arm of ``hub``."""
+    def __init__(self, hub: Hub, owner: ProgramOwner, *, idly: bool) -> None:
+        """Prepare to plan for the arm of ``hub``.
+
+        ``idly``: whether to plan the library while nobody uses the server.
+        """
         self.planning: Planning | None = None
         self.then: ProgramOrder | None = None
         self._hub = hub
         self._owner = owner
         self._parts = ScriptParts()
+        self._idly = idly
+        self._idle: IdlePlanner | None = None
         # Name of the script that the breakpoints belong to, and the indices of their steps.
         self._breakpoints: tuple[str, frozenset[int]] = "", frozenset()
 
@@ -71,11 +77,32 @@ class ProgramPlanner:
             before.refused, before.note = None, ""
             self._own(participant)
             return True
+        prepared = None if self._idle is None else self._idle.take(script, speed, arm.state)
+        if prepared is not None:
+            self.planning = prepared
+            self._own(participant)
+            return True
         changed = ""
         if before is not None and (before.text, before.speed) == (script, speed) and before.program:
             changed = before.changed_to(arm.state)
         self.plan(participant, script, speed, changed)
         return True
+
+    def plan_idly(self, t: float, *, used: bool) -> None:
+        """Plan the scripts of the library if nobody uses the server; see ``IdlePlanner.tick``."""
+        arm = self._hub.arm
+        used = used or not self._hub.watching or (self.planning is not None and self.planning.busy)
+        if self._idle is None:
+            if not self._idly or used or arm is None or arm.robot.arm is None:
+                return
+            self._idle = IdlePlanner(self._started, with_gripper=arm.robot.arm.gripper.moves)
+        if arm is not None:
+            self._idle.tick(arm.state, t, used=used)
+
+    def stop_idle_planning(self) -> None:
+        """Leave the processor to a command that the arm was given."""
+        if self._idle is not None:
+            self._idle.cancel()
 
     def require(self) -> Planning:
         """Return the planning of the present program. Raises LeaseError if none is planned."""
@@ -129,6 +156,11 @@ class ProgramPlanner:
         earlier plan is void.
         """
         note = f"Planned again: {changed}." if changed else ""
+        self.planning = self._started(text, speed, note, first_step)
+        self._own(participant)
+
+    def _started(self, text: str, speed: float, note: str = "", first_step: int = 0) -> Planning:
+        """Return the planning of ``text`` from the present state, which has begun."""
         context, state = self._context(), self._hub.present().state
 
         def job(planning: Planning) -> Program:
@@ -138,10 +170,7 @@ class ProgramPlanner:
                 script.scene.check_present(context.session, state)
             return compiled(script, context, state, speed, planning.report, first_step=first_step)
 
-        self.planning = Planning(
-            text, speed, state, job, self._hub.clock, note, first_step=first_step
-        )
-        self._own(participant)
+        return Planning(text, speed, state, job, self._hub.clock, note, first_step=first_step)
 
     def plan_rest(
         self, participant: Participant, interruption: Interruption, before: Planning

@@ -52,11 +52,12 @@ class ProgramRunner(Runner):
 
         ``options.owner_silence`` is the heartbeat timeout of the owner [s], after which a program
         ends. A page that reloads returns sooner. ``options.no_unattended``: see ``ProgramOwner``.
+        ``options.no_idle_planning``: scripts are planned only when they are asked for.
         """
         super().__init__(hub, options)
         allowed = not options.no_unattended
         self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
-        self._planner = ProgramPlanner(hub, self._owner)
+        self._planner = ProgramPlanner(hub, self._owner, idly=not options.no_idle_planning)
         self._interruption: Interruption | None = None
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
@@ -190,6 +191,7 @@ class ProgramRunner(Runner):
 
     def redirected(self) -> None:
         """Cancel a run that waits for its planning, after another command to the arm."""
+        self._planner.stop_idle_planning()
         self._planner.forget_run("the arm was given another command during planning")
 
     def leave(self, participant: Participant) -> None:
@@ -211,6 +213,7 @@ class ProgramRunner(Runner):
     def tick(self) -> None:
         """Advance the running program by one step, or end it if owner, lease or stop demand it."""
         hub, t = self.hub, self.hub.clock()
+        self._planner.plan_idly(t, used=self.running)
         if self.waits and self._owner.is_silent(t):
             self._planner.forget_run("its owner sends no heartbeats")
         if self.program is not None and self.waits:
