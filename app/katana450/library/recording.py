@@ -15,6 +15,8 @@ import numpy as np
 
 from katana450.arm.control.commands import Command
 from katana450.errors import ConfigurationError, InputError
+from katana450.extensions.recording.episodes.episode import Episode
+from katana450.extensions.recording.episodes.episode_file import episodes_in
 from katana450.extensions.recording.files.checking import (
     MissingMessage,
     TickReader,
@@ -133,6 +135,12 @@ class Recording:
         """All events, each with its time ``t`` [s] and its ``kind``. Raises InputError."""
         with RecordingFile.open(self.path) as file:
             return tuple(state_numbers(message) for message in file.messages(EVENTS))
+
+    @cached_property
+    def episodes(self) -> tuple[Episode, ...]:
+        """All episodes, by number; the file of an episode has one. Raises InputError."""
+        with RecordingFile.open(self.path) as file:
+            return episodes_in(file)
 
     @property
     def settings(self) -> Mapping[str, Any]:

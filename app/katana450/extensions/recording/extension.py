@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from katana450.errors import ConfigurationError
 from katana450.extension import (
     CliCommand,
     Extension,
@@ -33,23 +34,41 @@ def add_serve_options(parser: ArgumentParser) -> None:
         "start)",
     )
     recorded.add_argument("--no-record", action="store_true", help="record nothing")
+    parser.add_argument(
+        "--episodes",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for episodes, which people mark on the page (default: one for each port)",
+    )
 
 
 def _process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     if options.no_record:
+        if options.episodes:
+            raise ConfigurationError("--episodes needs the recording: leave out --no-record.")
         return None
     from katana450.extensions.recording.live.recorder import RecorderConfig, run_recorder
     from katana450.extensions.recording.places import default_folder
 
     folder = options.record or default_folder(facts.port)
-    config = RecorderConfig(facts, folder)
+    config = RecorderConfig(facts, folder, _episodes_folder(options, facts.port))
     return ExtraProcess(
         "katana450 rec",
         "The process that records",
         run_recorder,
         config,
-        f"Recording: the last ten minutes of motion are kept in {folder}",
+        f"Recording: the last ten minutes of motion are kept in {folder}, "
+        f"episodes in {config.episodes}",
     )
+
+
+def _episodes_folder(options: Namespace, port: int) -> Path:
+    """Return the folder of the episodes of the server on ``port``."""
+    from katana450.extensions.recording.places import default_episodes_folder
+
+    folder: Path = options.episodes or default_episodes_folder(port)
+    # Each process of the server may have another working directory.
+    return folder.absolute()
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
@@ -57,10 +76,17 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
     from katana450.extensions.recording.places import default_folder
 
     options = context.options
-    folder: Path | None = None
-    if options is not None and not options.no_record:
-        folder = options.record or default_folder(context.hub.stop_path.main_port)
-    return [recording_route(context, folder)]
+    if options is None or options.no_record:
+        return [recording_route(context, None)]
+    from katana450.extensions.recording.episodes.routes import EpisodeRoutes, follow_episodes
+
+    port = context.hub.stop_path.main_port
+    episodes = _episodes_folder(options, port)
+    follow_episodes(context.hub, episodes, port)
+    return [
+        recording_route(context, options.record or default_folder(port)),
+        *EpisodeRoutes(context, episodes, port).routes(),
+    ]
 
 
 def _tick_sender(options: Namespace) -> TickSender | None:

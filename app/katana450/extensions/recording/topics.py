@@ -179,7 +179,24 @@ TOPICS: Final = (
     Topic(
         EPISODES,
         "katana450.Episode",
-        _object("begin, end or outcome of an episode", ("t", "kind"), t=T, kind=_text("kind")),
+        _object(
+            "description of an episode; the last one of each number counts",
+            ("t", "kind", "number", "begin", "outcome"),
+            t=T,
+            kind=_text("begun, ended, judged, noted, trimmed or unfinished"),
+            number={"type": "integer", "description": "number of the episode, from 1"},
+            task=_text("task in words"),
+            begin=_number("first moment [s]"),
+            end={"type": ["number", "null"], "description": "last moment [s]; null while it runs"},
+            outcome=_text("running, unjudged, success, failure or unfinished"),
+            note=_text("remarks"),
+            by=_object(
+                "person who began it",
+                name=_text("name"),
+                role=_text("role"),
+                key=_text("pseudonym, as in the commands"),
+            ),
+        ),
     ),
 )
 """All topics of a recording, in the order of their channels."""

@@ -86,6 +86,8 @@ class Hub:
         self._driver_watch = DriverWatch(self.gate, self._ticked)
         self.supervisor_problem: Callable[[], str | None] = lambda: None
         """Returns what is wrong with the supervisor of this process, in words."""
+        self.shown: dict[str, Any] = {}
+        """Entries of extensions in the status of all pages. It is replaced, never changed."""
 
     @property
     def held_up(self) -> float:

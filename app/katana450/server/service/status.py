@@ -109,6 +109,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "revocations": hub.gate.revocations,
         # A robot without a tool has only joints, which scripts do not move.
         "scripts": bool(hub.runner.request_types) and state is not None and state.tool != "",
+        **hub.shown,
     }
 
 

@@ -31,7 +31,7 @@ def keep(folder: Path, out: Path, last: float) -> Trimmed:
         copies: list[Path] = []
         run: str | None = None
         for path in reversed(recordings_in(folder)):
-            copy = _whole(path, Path(temporary) / path.name)
+            copy = whole_copy(path, Path(temporary) / path.name)
             if copy is None:
                 continue
             with RecordingFile.open(copy) as file:
@@ -51,7 +51,7 @@ def keep(folder: Path, out: Path, last: float) -> Trimmed:
         return trim(copies, out, end - last, end)
 
 
-def _whole(path: Path, copy: Path) -> Path | None:
+def whole_copy(path: Path, copy: Path) -> Path | None:
     """Return a whole copy of ``path`` at ``copy``; None if nothing of it can be read."""
     try:
         shutil.copyfile(path, copy)

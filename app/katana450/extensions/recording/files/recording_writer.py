@@ -25,6 +25,7 @@ from katana450.extensions.recording.tick_form import tick_form
 from katana450.extensions.recording.topics import (
     CHECKPOINTS,
     COMMANDS,
+    EPISODES,
     EVENTS,
     JOINT_STATES,
     SHARED_TOPICS,
@@ -125,6 +126,10 @@ class RecordingWriter:
     def event(self, t: float, kind: str, what: Mapping[str, Any]) -> None:
         """Record an event at ``t`` [s] with further fields, which are JSON values."""
         self._add(EVENTS, t, {"t": t, "kind": kind, **what})
+
+    def episode(self, t: float, message: Mapping[str, Any]) -> None:
+        """Record the description of an episode at ``t`` [s]; see ``episodes.episode``."""
+        self._add(EPISODES, t, message)
 
     def flush(self) -> None:
         """Give everything to the system. ``os.fsync`` of the file then brings it to the disk."""

@@ -18,6 +18,7 @@ from katana450.extensions.recording.files.recording_file import (
     RecordingFile,
     nanoseconds_of,
 )
+from katana450.extensions.recording.state_message import nanoseconds
 from katana450.extensions.recording.topics import (
     CHECKPOINTS,
     COMMANDS,
@@ -55,12 +56,15 @@ class Trimmed:
     simulated_from: float | None
 
 
-def trim(sources: Sequence[Path], out: Path, start: float, end: float) -> Trimmed:
+def trim(
+    sources: Sequence[Path], out: Path, start: float, end: float, episode: bytes | None = None
+) -> Trimmed:
     """Write the part from ``start`` to ``end`` [s] of ``sources`` to ``out``.
 
     The sources are files of one session, which are put into the order of their times. The ticks
     from the last complete state before ``start`` on are kept too, so that the part can be simulated
-    again. Raises InputError if there is nothing in that time, or a file cannot be read.
+    again. ``episode``: message on ``/episodes`` that replaces all those of the sources. Raises
+    InputError if there is nothing in that time, or a file cannot be read.
     """
     with ExitStack() as stack:
         files = [stack.enter_context(RecordingFile.open(path)) for path in sources]
@@ -74,7 +78,7 @@ def trim(sources: Sequence[Path], out: Path, start: float, end: float) -> Trimme
         if len({file.metadata.get("utc_offset_ns") for file in files}) > 1:
             raise InputError("The files are not of one run of the server, so their times differ.")
         begin = _checkpoint_before(files, first)
-        write_files({out: lambda target: _write(target, files, (first, last), begin)})
+        write_files({out: lambda target: _write(target, files, (first, last), begin, episode)})
     return Trimmed(first, last, begin)
 
 
@@ -92,6 +96,7 @@ def _write(
     files: Sequence[RecordingFile],
     part: tuple[float, float],
     begin: float | None,
+    episode: bytes | None,
 ) -> None:
     start, end = part
     metadata = {**files[0].metadata, PART_START: repr(start)}
@@ -108,11 +113,21 @@ def _write(
                 copy.add(message)
     copy.flush()
     chunk_ends = start
+    if episode is not None:
+        # The part begins with it, although an arm at rest may have no states until later.
+        copy.add(Message(EPISODES, 0, nanoseconds(start), episode))
+    number = 0
     for message in _merged(files, begin, start, end):
-        copy.add(message)
+        number = message.number
+        if episode is None or message.topic != EPISODES:
+            copy.add(message)
         if message.t >= chunk_ends:
             copy.flush()
             chunk_ends = message.t + CHUNK_SECONDS
+    if episode is not None:
+        # In a chunk of its own, which is found at once.
+        copy.flush()
+        copy.add(Message(EPISODES, number, nanoseconds(end), episode))
     copy.close()
 
 

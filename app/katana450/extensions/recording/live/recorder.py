@@ -5,6 +5,7 @@ It imports little until the server has started, and the arm's process keeps the 
 
 from __future__ import annotations
 
+import logging
 import time
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -13,9 +14,12 @@ from typing import TYPE_CHECKING
 
 from katana450.assembly.record_pipe import connected_to_ticks
 from katana450.assembly.supervised import READY, SupervisorPipe
+from katana450.errors import InputError
 from katana450.extension import ServerFacts
 
 if TYPE_CHECKING:
+    from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
+    from katana450.extensions.recording.files.header import RecordingHeader
     from katana450.extensions.recording.live.ring import Ring
 
 START_DELAY = 3.0
@@ -23,6 +27,8 @@ START_DELAY = 3.0
 
 SYNC_INTERVAL = 1.0
 """[s] Maximum age of what a crash of the machine loses."""
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -32,10 +38,12 @@ class RecorderConfig:
     Attributes:
         facts: what it knows of the server.
         folder: folder of the ring.
+        episodes: folder of the episodes.
     """
 
     facts: ServerFacts
     folder: Path
+    episodes: Path
 
 
 def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
@@ -45,19 +53,22 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
     try:
         pipe = connected_to_ticks(facts.address, supervisor.ended)
         supervisor.ended.wait(START_DELAY)
-        ring = _ring(config)
+        ring, header = _ring(config)
+        keeper = _keeper(config, ring, header)
         try:
             while True:
                 _receive(pipe, ring)
                 pipe = connected_to_ticks(facts.address, supervisor.ended)
         finally:
+            if keeper is not None:
+                keeper.close()
             ring.close()
     except EOFError:
         # The server ends.
         return
 
 
-def _ring(config: RecorderConfig) -> Ring:
+def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
     from katana450.assembly.robot_session import find_robot
     from katana450.extensions.recording.files.header import header_of
     from katana450.extensions.recording.live.ring import Ring
@@ -67,7 +78,25 @@ def _ring(config: RecorderConfig) -> Ring:
     header = header_of(
         found.robot, facts.settings, facts.urdf, facts.tool, found.session.environment
     )
-    return Ring(config.folder, header)
+    return Ring(config.folder, header), header
+
+
+def _keeper(config: RecorderConfig, ring: Ring, header: RecordingHeader) -> EpisodeKeeper | None:
+    """Return the keeper of the episodes, which takes requests; None if the folder forbids it."""
+    from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
+    from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
+    from katana450.extensions.recording.episodes.link import EpisodeListener
+
+    folder = EpisodeFolder(config.episodes)
+    try:
+        folder.claim()
+        keeper = EpisodeKeeper(folder, ring, config.folder, header.metadata["utc_offset_ns"])
+        address = f"{config.facts.address.name}-episodes"
+        EpisodeListener(keeper, config.episodes, address, config.facts.port, header.salt)
+    except (InputError, OSError) as error:
+        log.error("Episodes cannot be recorded: %s", error)
+        return None
+    return keeper
 
 
 def _receive(pipe: Connection, ring: Ring) -> None:
@@ -83,15 +112,18 @@ def _receive(pipe: Connection, ring: Ring) -> None:
             if not ring.unsynced or pipe.poll(left):
                 message = pipe.recv_bytes()
                 lost = lost_records(message)
-                if lost is None:
-                    ring.put(deserializer.loaded(message))
-                else:
-                    count, until = lost
-                    ring.lost(until, count)
+                with ring.lock:
+                    if lost is None:
+                        ring.put(deserializer.loaded(message))
+                    else:
+                        count, until = lost
+                        ring.lost(until, count)
             if ring.unsynced and time.monotonic() - synced >= SYNC_INTERVAL:
-                ring.sync()
+                with ring.lock:
+                    ring.sync()
                 synced = time.monotonic()
     except (EOFError, OSError):
-        ring.sync()
-        # The next process of the arm begins with another state.
-        ring.close()
+        with ring.lock:
+            ring.sync()
+            # The next process of the arm begins with another state.
+            ring.close()

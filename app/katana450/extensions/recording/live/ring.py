@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from katana450.arm.control.event_log import entries_between
 from katana450.arm.control.state import State
@@ -25,6 +26,9 @@ MAX_FILE_TICKS = 6000
 
 MAX_FILES = 11
 """Number of files: the last ten minutes of motion, and the one that is being written."""
+
+MAX_HELD_FILES = 80
+"""Number of files while an episode needs older ones: an hour of motion, and some more."""
 
 MAX_FILE_BYTES = 20_000_000
 """Size after which a file ends, whatever it contains, so that the ring is bounded."""
@@ -61,6 +65,14 @@ class Ring:
         self._newest = ""
         self.unsynced = False
         """Whether ``sync`` has anything to bring to the disk."""
+        self.lock = threading.RLock()
+        """Held by each thread that uses the ring."""
+        self.held: str | None = None
+        """Name of the first file that an episode needs; None if none is needed."""
+        self.problem = ""
+        """Why the disk takes nothing now, as a sentence; empty while it does."""
+        self.last_t = float("-inf")
+        """Time of the newest tick [s]."""
         _repair(folder)
 
     def put(self, record: TickRecord) -> None:
@@ -81,6 +93,32 @@ class Ring:
             return
         self._ticks += 1
         self.unsynced = True
+        self.last_t = record.t
+
+    def describe(self, t: float, episode: Mapping[str, Any]) -> None:
+        """Write and sync the message ``episode`` about an episode at ``t`` [s]."""
+        if not self._opened():
+            return
+        assert self._writer is not None
+        try:
+            self._writer.episode(t, episode)
+        except OSError as error:
+            self._fail(error)
+        self.sync()
+
+    @property
+    def newest(self) -> str:
+        """Name of the newest file; empty without any."""
+        return max((path.name for path in recordings_in(self._folder)), default="")
+
+    def size_from(self, first: str) -> int:
+        """Return the length [bytes] of the file ``first`` and all later ones."""
+        found = 0
+        for path in recordings_in(self._folder):
+            if path.name >= first:
+                with suppress(OSError):
+                    found += path.stat().st_size
+        return found
 
     def _note_findings(self, record: TickRecord) -> None:
         """Write an event for each finding that begins or ends with this tick."""
@@ -117,6 +155,7 @@ class Ring:
             self._writer.flush()
             os.fsync(self._file.fileno())
             full = self._file.tell() >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
+            self.problem = ""
         except OSError as error:
             self._fail(error)
             return
@@ -145,8 +184,10 @@ class Ring:
             return False
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            for old in recordings_in(self._folder)[: -(MAX_FILES - 1)]:
-                old.unlink(missing_ok=True)
+            files = recordings_in(self._folder)
+            for old in files[: -(MAX_FILES - 1)]:
+                if self.held is None or old.name < self.held or old in files[:-MAX_HELD_FILES]:
+                    old.unlink(missing_ok=True)
             path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
             self._file = open(create_file(path, 0o600), "wb")  # noqa: SIM115 - open for a minute
             with suppress(OSError):
@@ -163,6 +204,7 @@ class Ring:
         """Give up the present file; what was synced of it can be recovered."""
         self._report(error)
         self._lost_why = f"The disk took nothing: {error.strerror or error}."
+        self.problem = f"Nothing is recorded now: {error.strerror or error}. Free some disk space."
         self._retry_at = self._clock() + RETRY_SECONDS
         file, self._file, self._writer = self._file, None, None
         if file is not None:

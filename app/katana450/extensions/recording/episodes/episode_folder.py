@@ -1,0 +1,262 @@
+"""A folder of episodes on disk. Its files are the only truth: nothing else counts them."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from katana450.atomic import write_files, writer_of
+from katana450.errors import InputError
+from katana450.extensions.recording.codec import json_text
+from katana450.extensions.recording.episodes.episode import Episode, episode_of, message_of
+from katana450.extensions.recording.episodes.episode_file import only_episode, with_episode
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.places import SUFFIX
+from katana450.platform_support import claim_file
+
+NAME = re.compile(r"episode-(\d{4,9})\.(?:running\.json|mcap)")
+"""Names of episode files, and of the marker of one that runs."""
+
+DISCARDED = "discarded"
+"""Name of the folder of discarded episodes."""
+
+MARKER_SUFFIX = ".running.json"
+
+LOCK = ".lock"
+
+MAX_MARKER_BYTES = 100_000
+
+
+@dataclass(frozen=True)
+class KeptEpisode:
+    """An episode with its file.
+
+    Attributes:
+        path: its file.
+        episode: its description.
+        start, stop: first and last moment of the file [s], which bound begin and end.
+        size: length of the file [bytes].
+        discarded: whether the file is in the folder of discarded ones.
+    """
+
+    path: Path
+    episode: Episode
+    start: float
+    stop: float
+    size: int
+    discarded: bool
+
+
+@dataclass(frozen=True)
+class EpisodeMarker:
+    """An episode that runs, or ran when the process that records ended.
+
+    Attributes:
+        episode: its description so far.
+        ring: folder of the ring with its ticks.
+        first: name of the first file of the ring that belongs to it; empty for any.
+        run: text that names the run of the server, see ``utc_offset_ns`` of a recording.
+    """
+
+    episode: Episode
+    ring: Path
+    first: str
+    run: str
+
+
+def episode_files(folder: Path) -> list[Path]:
+    """Return the files of the kept episodes in ``folder``, by number."""
+    found = [path for path in folder.glob(f"episode-*{SUFFIX}") if NAME.fullmatch(path.name)]
+    return sorted(found, key=number_of)
+
+
+def number_of(path: Path) -> int:
+    """Return the number of the episode in the name of ``path``; 0 for another file."""
+    found = NAME.fullmatch(path.name)
+    return 0 if found is None else int(found[1])
+
+
+class EpisodeFolder:
+    """The episodes in a folder. One process at a time may change it, see ``claim``."""
+
+    def __init__(self, folder: Path) -> None:
+        """Use ``folder``, which need not exist."""
+        self.folder = folder
+        self._lock: BinaryIO | None = None
+        self._known: dict[tuple[Path, int, int], KeptEpisode] = {}
+
+    def claim(self) -> None:
+        """Create the folder, and claim it until this process ends.
+
+        Raises InputError if another process has claimed it, or it cannot be written.
+        """
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            (self.folder / DISCARDED).mkdir(mode=0o700, exist_ok=True)
+            lock = open(self.folder / LOCK, "ab")  # noqa: SIM115 - open until the process ends
+        except OSError as error:
+            raise InputError(
+                f"The folder of episodes {self.folder} cannot be written: "
+                f"{error.strerror or error}. Name another one by `serve --episodes FOLDER`."
+            ) from error
+        try:
+            claim_file(lock.fileno())
+        except (BlockingIOError, PermissionError) as error:
+            lock.close()
+            raise InputError(
+                f"Another server uses the folder of episodes {self.folder}. Name another one by "
+                "`serve --episodes FOLDER`."
+            ) from error
+        except OSError:
+            # Some file systems have no claims.
+            pass
+        self._lock = lock
+
+    def release(self) -> None:
+        """End the claim."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def path(self, number: int, *, discarded: bool = False) -> Path:
+        """Return the path of the file of episode ``number``."""
+        folder = self.folder / DISCARDED if discarded else self.folder
+        return folder / f"episode-{number:04d}{SUFFIX}"
+
+    def kept(self) -> list[KeptEpisode]:
+        """Return the kept episodes, by number. Files that cannot be read are left out."""
+        return list(self._read(episode_files(self.folder), discarded=False))
+
+    def discarded(self) -> list[KeptEpisode]:
+        """Return the discarded episodes, by number. Files that cannot be read are left out."""
+        return list(self._read(episode_files(self.folder / DISCARDED), discarded=True))
+
+    def count(self) -> int:
+        """Return the number of kept episodes."""
+        return len(episode_files(self.folder))
+
+    def unreadable(self) -> list[str]:
+        """Return what is wrong with each file of an episode that cannot be read."""
+        found = []
+        for path in episode_files(self.folder):
+            try:
+                self._kept(path, discarded=False)
+            except InputError as error:
+                found.append(str(error))
+        return found
+
+    def next_number(self) -> int:
+        """Return the number of the next episode, which no file has had since the last one."""
+        paths = [*self.folder.glob("episode-*"), *(self.folder / DISCARDED).glob("episode-*")]
+        return max(map(number_of, paths), default=0) + 1
+
+    def find(self, number: int) -> KeptEpisode:
+        """Return episode ``number``, kept or discarded. Raises InputError if there is none."""
+        for discarded in (False, True):
+            path = self.path(number, discarded=discarded)
+            if path.exists():
+                return self._kept(path, discarded=discarded)
+        raise InputError(f"There is no episode {number} in {self.folder}.")
+
+    def change(self, number: int, kind: str, **changes: Any) -> Episode:
+        """Write a new description of a kept episode, with ``changes`` of its fields.
+
+        Raises InputError if there is no such episode, or it was discarded.
+        """
+        found = self.find(number)
+        if found.discarded:
+            raise InputError(f"Episode {number} was discarded. Bring it back first.")
+        episode = replace(found.episode, **changes)
+        if episode != found.episode:
+            with_episode(found.path, episode, kind)
+        return episode
+
+    def discard(self, number: int) -> None:
+        """Move the file of a kept episode to the discarded ones. Raises InputError."""
+        self._move(number, discard=True)
+
+    def restore(self, number: int) -> None:
+        """Move the file of a discarded episode back. Raises InputError."""
+        self._move(number, discard=False)
+
+    def _move(self, number: int, *, discard: bool) -> None:
+        source, target = (self.path(number, discarded=each) for each in (not discard, discard))
+        if not source.exists():
+            state = "kept" if discard else "discarded"
+            raise InputError(f"There is no {state} episode {number} in {self.folder}.")
+        if target.exists():
+            raise InputError(f"{target} exists already. Move one of the two files away.")
+        try:
+            target.parent.mkdir(mode=0o700, exist_ok=True)
+            source.rename(target)
+        except OSError as error:
+            raise InputError(f"{source} cannot be moved: {error.strerror or error}.") from error
+
+    # The marker of an episode that runs
+
+    def mark(self, marker: EpisodeMarker) -> None:
+        """Write the marker of an episode that runs. Raises InputError."""
+        episode = marker.episode
+        text = json_text(
+            {
+                "episode": message_of(episode, episode.begin, "begun"),
+                "ring": str(marker.ring),
+                "first": marker.first,
+                "run": marker.run,
+            }
+        )
+        write_files({self._marker(episode.number): writer_of(text)}, mode=0o600)
+
+    def unmark(self, number: int) -> None:
+        """Remove the marker of episode ``number``."""
+        with suppress(OSError):
+            self._marker(number).unlink()
+
+    def markers(self) -> list[EpisodeMarker]:
+        """Return the markers in the folder, by number. Wrong ones are left out."""
+        found = []
+        for path in sorted(self.folder.glob(f"episode-*{MARKER_SUFFIX}")):
+            with suppress(InputError, OSError):
+                found.append(_marker_in(path))
+        return found
+
+    def _marker(self, number: int) -> Path:
+        return self.folder / f"episode-{number:04d}{MARKER_SUFFIX}"
+
+    def _read(self, paths: list[Path], *, discarded: bool) -> Iterator[KeptEpisode]:
+        for path in paths:
+            # It may have been moved meanwhile; ``unreadable`` reports the others.
+            with suppress(InputError):
+                yield self._kept(path, discarded=discarded)
+
+    def _kept(self, path: Path, *, discarded: bool) -> KeptEpisode:
+        """Return the episode in ``path``, which is read again only if the file is another one."""
+        try:
+            about = path.stat()
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+        key = path, about.st_mtime_ns, about.st_ino
+        if key not in self._known:
+            with RecordingFile.open(path) as file:
+                self._known[key] = KeptEpisode(
+                    path, only_episode(file), file.start, file.end, file.size, discarded
+                )
+        return self._known[key]
+
+
+def _marker_in(path: Path) -> EpisodeMarker:
+    if path.stat().st_size > MAX_MARKER_BYTES:
+        raise InputError(f"{path} is too large for the marker of an episode.")
+    try:
+        found = json.loads(path.read_bytes())
+        episode = episode_of(json.dumps(found["episode"]))
+        return EpisodeMarker(
+            episode, Path(str(found["ring"])), str(found["first"]), str(found["run"])
+        )
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError(f"{path} is no marker of an episode: {error}.") from error

@@ -1,0 +1,141 @@
+"""Requests about episodes: JSON objects whose ``do`` names the request."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from katana450.errors import InputError
+from katana450.extensions.recording.episodes.episode import (
+    MAX_NOTE_LENGTH,
+    MAX_NUMBER,
+    MAX_TASK_LENGTH,
+)
+
+MAX_REQUEST_BYTES = 8192
+"""Maximum size of a request [bytes]."""
+
+Number = Annotated[int, Meta(ge=1, le=MAX_NUMBER)]
+Task = Annotated[str, Meta(max_length=MAX_TASK_LENGTH)]
+Remark = Annotated[str, Meta(max_length=MAX_NOTE_LENGTH)]
+Judgement = Literal["unjudged", "success", "failure"]
+
+
+class EpisodeRequest(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="do"
+):
+    """Base of the requests about episodes."""
+
+
+class StartEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="start"):
+    """Begin an episode.
+
+    Attributes:
+        task: What is to be done; None for that of the last episode.
+    """
+
+    task: Task | None = None
+
+
+class StopEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="stop"):
+    """End the episode that runs, and keep it in its file.
+
+    Attributes:
+        outcome: Its outcome, if it is known already.
+    """
+
+    outcome: Judgement = "unjudged"
+
+
+class JudgeEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="judge"):
+    """Judge an episode. One that runs is ended first.
+
+    Attributes:
+        number: The episode; None for the one that runs, or else the last one.
+        outcome: The outcome.
+    """
+
+    number: Number | None = None
+    outcome: Judgement
+
+
+class DiscardEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="discard"):
+    """Move an episode to the discarded ones. One that runs is ended first.
+
+    Attributes:
+        number: The episode; None for the one that runs, or else the last one.
+    """
+
+    number: Number | None = None
+
+
+class RestoreEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="restore"):
+    """Bring a discarded episode back.
+
+    Attributes:
+        number: The episode.
+    """
+
+    number: Number
+
+
+class UndoEpisode(EpisodeRequest, frozen=True, tag="undo"):
+    """Undo the last judgement or discard, up to 10 s after it."""
+
+
+class RerecordEpisode(EpisodeRequest, frozen=True, tag="rerecord"):
+    """Discard the episode that runs, or else the last one, and begin it again."""
+
+
+class DescribeEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="describe"):
+    """Change the texts of an episode.
+
+    Attributes:
+        number: The episode.
+        task: The new task; None to keep it.
+        note: The new remarks; None to keep them.
+    """
+
+    number: Number
+    task: Task | None = None
+    note: Remark | None = None
+
+
+class TrimEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="trim"):
+    """Give an episode another begin and end. Nothing is deleted, so it can be widened again.
+
+    Attributes:
+        number: The episode.
+        begin: First moment, in seconds after the begin of its file.
+        end: Last moment, in seconds after the begin of its file.
+    """
+
+    number: Number
+    begin: Annotated[float, Meta(ge=0.0)]
+    end: Annotated[float, Meta(ge=0.0)]
+
+
+AnyEpisodeRequest = (
+    StartEpisode
+    | StopEpisode
+    | JudgeEpisode
+    | DiscardEpisode
+    | RestoreEpisode
+    | UndoEpisode
+    | RerecordEpisode
+    | DescribeEpisode
+    | TrimEpisode
+)
+
+_decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(AnyEpisodeRequest)
+
+
+def episode_request(text: bytes | str) -> EpisodeRequest:
+    """Return the request in the JSON ``text``. Raises InputError with the reason if it is wrong."""
+    try:
+        found: EpisodeRequest = _decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise InputError(f"This is no valid request about episodes: {error}.") from error
+    return found

@@ -1,0 +1,163 @@
+"""Routes about episodes, and their state for all pages."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+import time
+from dataclasses import replace
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import BaseRoute, Route
+
+from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.errors import InputError
+from katana450.extensions.recording.episodes.episode import EpisodeGiver, message_of
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode
+from katana450.extensions.recording.episodes.episode_requests import (
+    MAX_REQUEST_BYTES,
+    episode_request,
+)
+from katana450.extensions.recording.episodes.link import connect_to_episodes, request_episode
+from katana450.server.api.fields import ROOT
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import PAGE
+from katana450.server.service.participants import actor_of
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, body_of
+from katana450.server.web.http_api import RouteContext
+
+MAX_WAITING = 8
+"""Maximum number of requests that wait for the process that records."""
+
+RECONNECT_SECONDS = 0.5
+"""[s] Time between two attempts to reach the process that records."""
+
+ENTRY = "episodes"
+"""Name of the state of episodes in the status of all pages."""
+
+
+class EpisodeRoutes:
+    """The HTTP routes of episodes."""
+
+    def __init__(self, context: RouteContext, folder: Path, port: int) -> None:
+        """Serve the episodes in ``folder`` of the server on ``port`` to clients of ``context``."""
+        self._context = context
+        self._folder, self._port = folder, port
+        self._read = EpisodeFolder(folder)
+        self._waiting = 0
+
+    def routes(self) -> list[BaseRoute]:
+        """Return all routes."""
+        return [
+            Route(f"{ROOT}/episodes", self._list),
+            Route(f"{ROOT}/episodes", self._request, methods=["POST"]),
+            Route(f"{ROOT}/episodes/{{number:int}}", self._file),
+        ]
+
+    async def _list(self, request: Request) -> Response:
+        """Return all episodes, and the state of the one that runs."""
+        self._context.identity(request)
+        return JSONResponse(await asyncio.to_thread(self._listed))
+
+    def _listed(self) -> dict[str, Any]:
+        return {
+            "episodes": [described(each) for each in self._read.kept()],
+            "discarded": [described(each) for each in self._read.discarded()],
+            "unreadable": self._read.unreadable(),
+            "folder": str(self._folder),
+            "state": self._context.hub.shown.get(ENTRY),
+        }
+
+    async def _file(self, request: Request) -> Response:
+        """Return the file of an episode."""
+        if not self._context.identity(request).role.may_drive:
+            raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not record.")
+        path = self._read.path(request.path_params["number"])
+        if not path.exists():
+            raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such episode.")
+        return FileResponse(path, filename=path.name, media_type="application/octet-stream")
+
+    async def _request(self, request: Request) -> Response:
+        """Execute the request in the body, and return the episode."""
+        sender = self._context.identity(request)
+        if not sender.role.may_drive:
+            raise HTTPException(
+                HTTPStatus.FORBIDDEN, "Your role may watch, but not record episodes."
+            )
+        body = await body_of(request, MAX_REQUEST_BYTES)
+        actor = actor_of(sender, CommandChannel.HTTP)
+        page = request.query_params.get("page", "")
+        if PAGE.fullmatch(page):
+            # The name that the person has chosen on the page.
+            actor = replace(actor, person=self._context.hub.person_of(sender, page))
+        try:
+            decoded = episode_request(body)
+        except InputError as error:
+            return JSONResponse({"why": str(error)}, NOT_UNDERSTOOD)
+        if self._waiting >= MAX_WAITING:
+            raise HTTPException(TOO_MANY, "Too many requests at once. Wait a moment.")
+        self._waiting += 1
+        try:
+            done = await asyncio.to_thread(
+                request_episode, self._folder, self._port, body.decode(), giver_of(actor)
+            )
+        except InputError as error:
+            self._context.hub.recorder.refuse("episode", actor, error)
+            return JSONResponse({"why": str(error)}, NOT_NOW)
+        finally:
+            self._waiting -= 1
+        what = {"do": decoded.__struct_config__.tag, "number": done["number"]}
+        self._context.hub.recorder.note("episode", actor, what)
+        return JSONResponse(done)
+
+
+def giver_of(actor: Actor) -> EpisodeGiver:
+    """Return ``actor`` as the giver of an episode, with a key that is still no pseudonym."""
+    return EpisodeGiver(actor.name, actor.person.role.value, actor.key)
+
+
+def described(kept: KeptEpisode) -> dict[str, Any]:
+    """Return an episode for a list, with times in seconds after the begin of its file."""
+    episode = kept.episode
+    end = kept.stop if episode.end is None else episode.end
+    return {
+        **{
+            name: value
+            for name, value in message_of(episode, kept.stop, "").items()
+            if name in ("number", "task", "outcome", "note", "by")
+        },
+        "begin": round(episode.begin - kept.start, 3),
+        "end": round(end - kept.start, 3),
+        "recorded": round(kept.stop - kept.start, 3),
+        "bytes": kept.size,
+        "file": kept.path.name,
+    }
+
+
+def follow_episodes(hub: Hub, folder: Path, port: int) -> threading.Thread:
+    """Show the state of the episodes to all pages of ``hub``, in a thread of its own."""
+
+    def follow() -> None:
+        while True:
+            try:
+                connection = connect_to_episodes(folder, port)
+            except InputError:
+                hub.shown = {**hub.shown, ENTRY: None}
+                time.sleep(RECONNECT_SECONDS)
+                continue
+            try:
+                connection.send_bytes(json.dumps({"watch": True}).encode())
+                while True:
+                    hub.shown = {**hub.shown, ENTRY: json.loads(connection.recv_bytes())}
+            except (OSError, EOFError, ValueError):
+                connection.close()
+
+    thread = threading.Thread(target=follow, name="episodes", daemon=True)
+    thread.start()
+    return thread

@@ -1,0 +1,371 @@
+"""Episodes are cut out of recordings, judged, discarded, brought back, and survive crashes."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+import katana450
+from katana450.arm.runtime.tick import TickRecord
+from katana450.errors import InputError
+from katana450.extensions.recording.episodes import keeper as keeper_module
+from katana450.extensions.recording.episodes.episode import (
+    Episode,
+    EpisodeGiver,
+    EpisodeOutcome,
+    episode_of,
+    episodes_of,
+    message_of,
+)
+from katana450.extensions.recording.episodes.episode_file import (
+    episode_in,
+    with_episode,
+    write_episode,
+)
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episode_files
+from katana450.extensions.recording.episodes.episode_requests import episode_request
+from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
+from katana450.extensions.recording.files.checking import session_for, verify_recording
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.live import ring as ring_module
+from katana450.extensions.recording.live.ring import Ring
+from katana450.extensions.recording.topics import EPISODES, STATE
+from tests.recording.recorded import header, record, run
+
+ADA = EpisodeGiver("Ada", "operator", "0a1b2c3d4e5f")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "run.mcap"
+    record(path, 300, 3)
+    return path
+
+
+def attempt(path: Path, number: int = 1, **changes: object) -> Episode:
+    """Return an episode in the middle of the recording ``path``."""
+    with RecordingFile.open(path) as file:
+        begin, end = file.start + 1.0, file.start + 2.5
+    fields = {"task": "pour", "begin": begin, "end": end, "note": "", **changes}
+    return Episode(number=number, outcome=EpisodeOutcome.UNJUDGED, by=ADA, **fields)  # type: ignore[arg-type]
+
+
+def test_episode_is_cut_out_of_a_recording(recorded: Path, tmp_path: Path) -> None:
+    path, episode = tmp_path / "episode-0001.mcap", attempt(recorded)
+    write_episode([recorded], path, episode)
+    assert episode_in(path) == episode
+    opened = katana450.open(path)
+    assert opened.episodes == (episode,)
+    assert (opened.start, opened.end) == (episode.begin, episode.end)
+    assert opened.t[0] >= episode.begin
+    with RecordingFile.open(path) as file:
+        assert file.counts()[STATE] > 50
+        assert verify_recording(file, session_for(file).session).identical
+
+
+def test_description_is_appended_without_changing_the_rest(recorded: Path, tmp_path: Path) -> None:
+    path = tmp_path / "episode-0001.mcap"
+    before = attempt(recorded)
+    write_episode([recorded], path, before)
+    content = path.read_bytes()
+    for outcome in (EpisodeOutcome.SUCCESS, EpisodeOutcome.FAILURE):
+        after = attempt(recorded, note=outcome.value)
+        after = Episode(**{**after.__dict__, "outcome": outcome})
+        with_episode(path, after, "judged")
+        assert episode_in(path) == after
+    with RecordingFile.open(path) as file:
+        assert file.counts()[EPISODES] == 4
+        assert verify_recording(file, session_for(file).session).identical
+        # The data before is the same, byte for byte.
+        assert path.read_bytes()[: len(content) // 2] == content[: len(content) // 2]
+    with path.open("rb") as stream:
+        messages = list(make_reader(stream, validate_crcs=True).iter_messages(topics=[EPISODES]))
+    assert [json.loads(each[2].data)["outcome"] for each in messages][-1] == "failure"
+    with pytest.raises(InputError, match="is of episode 1, not 2"):
+        with_episode(path, attempt(recorded, 2), "judged")
+
+
+def test_episode_without_motion_in_its_time_is_refused(recorded: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="There is nothing"):
+        write_episode([recorded], tmp_path / "x.mcap", attempt(recorded, begin=1.0, end=2.0))
+    assert not list(tmp_path.iterdir())
+
+
+texts = st.text(max_size=20)
+outcomes = st.sampled_from([each for each in EpisodeOutcome if each is not EpisodeOutcome.RUNNING])
+episodes = st.builds(
+    lambda number, task, begin, length, outcome, note: Episode(
+        number, task, begin, begin + length, outcome, note, ADA
+    ),
+    st.integers(1, 5),
+    texts,
+    st.floats(-1e6, 1e6),
+    st.floats(0, 1e4),
+    outcomes,
+    texts,
+)
+
+
+@settings(max_examples=30)
+@given(st.lists(episodes, max_size=12))
+def test_last_description_of_each_number_counts(found: list[Episode]) -> None:
+    messages = [json.dumps(message_of(each, 0.0, "judged")) for each in found]
+    last = {each.number: each for each in found}
+    assert episodes_of(messages) == tuple(last[number] for number in sorted(last))
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("[", "is no JSON"),
+        ("[]", "no JSON object"),
+        ('{"number": 0}', "not a whole number"),
+        ('{"number": 1, "outcome": "won"}', "not one of running"),
+        ('{"number": 1, "outcome": "success", "begin": "x"}', "not a number of seconds"),
+        ('{"number": 1, "outcome": "success", "begin": 1e400}', "not a number of seconds"),
+        ('{"number": 1, "outcome": "success", "begin": 1}', "no end"),
+        ('{"number": 1, "outcome": "success", "begin": 2, "end": 1}', "before its begin"),
+        ('{"number": 1, "outcome": "running", "begin": 2, "task": 3}', "not a text"),
+        ("[" * 100_000, "is no JSON"),
+    ],
+)
+def test_wrong_description_is_refused(text: str, why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        episode_of(text)
+
+
+@cache
+def motion() -> tuple[TickRecord, ...]:
+    """Return the ticks of a random session."""
+    found: list[TickRecord] = []
+    run(450, 9, found.append, odd=False)
+    return tuple(found)
+
+
+class Bench:
+    """A ring on a test clock, and the episodes that are marked in it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.t = 1000.0
+        self.ring_folder, self.folder = folder / "ring", EpisodeFolder(folder / "episodes")
+        self.header = header()
+        self.ring = Ring(self.ring_folder, self.header)
+        self.records = list(motion())
+        self.folder.claim()
+        self.keeper = self.made()
+
+    def made(self) -> EpisodeKeeper:
+        run_name = self.header.metadata["utc_offset_ns"]
+        return EpisodeKeeper(self.folder, self.ring, self.ring_folder, run_name, lambda: self.t)
+
+    def move(self, ticks: int) -> None:
+        """Record the next ``ticks``."""
+        for each in self.records[:ticks]:
+            self.ring.put(each)
+            self.t = each.t
+        del self.records[:ticks]
+
+    def ask(self, **request: object) -> dict[str, object]:
+        return self.keeper.handle(episode_request(json.dumps(request)), ADA)
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    monkeypatch.setattr(keeper_module, "LATE_SECONDS", 0.0)
+    found = Bench(tmp_path)
+    yield found
+    found.keeper.close()
+    found.ring.close()
+
+
+def test_episode_is_begun_judged_and_undone(bench: Bench) -> None:
+    bench.move(50)
+    begun = bench.ask(do="start", task="pour")
+    assert begun["number"] == 1
+    bench.move(100)
+    running = bench.keeper.status()["running"]
+    assert running["number"] == 1
+    assert running["seconds"] == int(bench.t - 1000.0 - (begun["begin"] - 1000.0))  # type: ignore[operator]
+    with pytest.raises(InputError, match="runs already"):
+        bench.ask(do="start", task="again")
+    bench.ask(do="judge", outcome="success")
+    (kept,) = bench.folder.kept()
+    assert kept.episode.outcome is EpisodeOutcome.SUCCESS
+    assert kept.episode.task == "pour"
+    assert kept.episode.begin == begun["begin"]
+    assert kept.episode.end == bench.t
+    # All ticks between are there, and nothing is held any more.
+    assert len(katana450.open(kept.path).t) > 50
+    assert bench.ring.held is None
+    assert not bench.folder.markers()
+    bench.ask(do="undo")
+    assert bench.folder.find(1).episode.outcome is EpisodeOutcome.UNJUDGED
+    bench.ask(do="judge", outcome="failure")
+    bench.t += keeper_module.UNDO_SECONDS
+    assert bench.keeper.status()["undo"] is None
+    with pytest.raises(InputError, match="nothing to undo"):
+        bench.ask(do="undo")
+
+
+def test_discarded_episodes_come_back_and_numbers_are_not_used_twice(bench: Bench) -> None:
+    for _ in range(2):
+        bench.ask(do="start", task="pour")
+        bench.move(40)
+        bench.ask(do="stop")
+    bench.ask(do="discard")
+    assert bench.keeper.status()["count"] == 1
+    assert [each.episode.number for each in bench.folder.discarded()] == [2]
+    bench.ask(do="undo")
+    assert bench.keeper.status()["count"] == 2
+    # Again: the last one is discarded, and the next has its task.
+    again = bench.ask(do="rerecord")
+    assert (again["number"], again["task"]) == (3, "pour")
+    bench.move(40)
+    again = bench.ask(do="rerecord")
+    assert again["number"] == 4
+    bench.move(40)
+    bench.ask(do="stop", outcome="success")
+    assert [each.episode.number for each in bench.folder.kept()] == [1, 4]
+    assert [each.episode.number for each in bench.folder.discarded()] == [2, 3]
+    bench.ask(do="restore", number=2)
+    assert bench.keeper.status()["count"] == 3
+    with pytest.raises(InputError, match="no discarded episode 2"):
+        bench.ask(do="restore", number=2)
+    with pytest.raises(InputError, match="no episode 9"):
+        bench.ask(do="judge", number=9, outcome="success")
+
+
+def test_episode_is_trimmed_described_and_widened_again(bench: Bench) -> None:
+    bench.ask(do="start", task="pour")
+    bench.move(150)
+    bench.ask(do="stop")
+    (kept,) = bench.folder.kept()
+    size = kept.size
+    bench.ask(do="trim", number=1, begin=0.2, end=0.9)
+    trimmed = bench.folder.find(1)
+    assert trimmed.episode.length == pytest.approx(0.7)
+    assert trimmed.size > size
+    bench.ask(do="describe", number=1, note="spilled", task="pour more")
+    described = bench.folder.find(1).episode
+    assert (described.note, described.task) == ("spilled", "pour more")
+    bench.ask(do="trim", number=1, begin=0.0, end=kept.stop - kept.start)
+    assert bench.folder.find(1).episode.length == pytest.approx(kept.episode.length)
+    for begin, end in ((1.0, 1.0), (0.0, 1000.0)):
+        with pytest.raises(InputError, match="choose a begin"):
+            bench.ask(do="trim", number=1, begin=begin, end=end)
+
+
+def test_episode_longer_than_the_ring_is_whole(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ring_module, "MAX_FILE_TICKS", 20)
+    bench.ask(do="start", task="long")
+    first = bench.records[0].t
+    for _ in range(20):
+        bench.move(20)
+        bench.ring.sync()
+    assert len(list(bench.ring_folder.glob("*.mcap"))) > ring_module.MAX_FILES
+    bench.ask(do="stop")
+    (kept,) = bench.folder.kept()
+    with RecordingFile.open(kept.path) as file:
+        assert verify_recording(file, session_for(file).session).ticks >= 399
+        assert next(iter(file.messages(STATE))).t == pytest.approx(first, abs=0.2)
+    # The next file of the ring removes what is not needed any more.
+    for _ in range(3):
+        bench.move(20)
+        bench.ring.sync()
+    assert len(list(bench.ring_folder.glob("*.mcap"))) <= ring_module.MAX_FILES
+
+
+def test_episode_ends_by_itself_at_the_maximum(bench: Bench) -> None:
+    bench.ask(do="start", task="long")
+    bench.move(60)
+    bench.t += keeper_module.MAX_SECONDS - 60.0
+    assert bench.keeper.status()["running"]["left"] <= 60
+    bench.t += 60.0
+    bench.keeper.tick()
+    assert bench.keeper.status()["running"] is None
+    assert "after 60 minutes" in bench.keeper.status()["notice"]
+    assert bench.folder.count() == 1
+
+
+def test_full_disk_is_reported_and_the_episode_saved_later(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.ask(do="start", task="pour")
+    bench.move(60)
+    # A folder stands where the file should be.
+    blocked = bench.folder.path(1)
+    blocked.mkdir()
+    with pytest.raises(InputError, match="not saved yet"):
+        bench.ask(do="stop", outcome="success")
+    assert "not saved yet" in bench.keeper.status()["problem"]
+    assert bench.ring.held is not None
+    blocked.rmdir()
+    monkeypatch.setattr(keeper_module, "RETRY_SECONDS", 0.0)
+    bench.keeper._retry_at = 0.0
+    bench.keeper.tick()
+    assert bench.keeper.status()["problem"] == ""
+    assert bench.folder.find(1).episode.outcome is EpisodeOutcome.SUCCESS
+
+
+def test_crash_leaves_the_running_episode_unfinished(bench: Bench) -> None:
+    bench.ask(do="start", task="first")
+    bench.move(60)
+    bench.ask(do="stop", outcome="success")
+    bench.ask(do="start", task="second")
+    bench.move(100)
+    bench.ring.sync()
+    begun = bench.keeper.status()["running"]["number"]
+    # As after kill -9: nothing was ended, and the newest file of the ring has no end.
+    again = bench.made()
+    assert begun == 2
+    assert "unfinished" in again.status()["notice"]
+    first, second = bench.folder.kept()
+    assert first.episode.outcome is EpisodeOutcome.SUCCESS
+    assert second.episode.outcome is EpisodeOutcome.UNFINISHED
+    assert second.episode.length > 0.5
+    assert not bench.folder.markers()
+    assert bench.made().status()["notices"] == 0
+    bench.keeper = again
+    again.handle(episode_request('{"do": "judge", "number": 2, "outcome": "failure"}'), ADA)
+    assert bench.folder.find(2).episode.outcome is EpisodeOutcome.FAILURE
+
+
+def test_only_one_server_uses_a_folder(bench: Bench) -> None:
+    other = EpisodeFolder(bench.folder.folder)
+    with pytest.raises(InputError, match="Another server uses"):
+        other.claim()
+    bench.folder.release()
+    other.claim()
+    other.release()
+
+
+def test_folder_lists_files_only(bench: Bench, recorded: Path) -> None:
+    bench.ask(do="start", task="pour")
+    bench.move(50)
+    bench.ask(do="stop")
+    folder = bench.folder.folder
+    shutil.copy(folder / "episode-0001.mcap", folder / "episode-0007.mcap")
+    (folder / "episode-0008.mcap").write_bytes(b"broken")
+    (folder / "notes.txt").write_text("mine")
+    shutil.copy(recorded, folder / "other.mcap")
+    assert [path.name for path in episode_files(folder)] == [
+        "episode-0001.mcap",
+        "episode-0007.mcap",
+        "episode-0008.mcap",
+    ]
+    assert len(bench.folder.kept()) == 2
+    assert "episode-0008.mcap" in bench.folder.unreadable()[0]
+    assert bench.folder.next_number() == 9
+    os.remove(folder / "episode-0001.mcap")
+    assert [each.path.name for each in bench.folder.kept()] == ["episode-0007.mcap"]
