@@ -121,7 +121,7 @@
       // A key that stays pressed is one click.
     } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
       if (!event.repeat) say({ do: "go" });
-    } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event))) return;
+    } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event) || episodes?.key(event))) return;
     event.preventDefault();
     event.stopImmediatePropagation();
   }
@@ -153,7 +153,8 @@
     byId("poster").querySelector("p").textContent =
       "This browser cannot draw the scene: WebGL 2 is off or missing. Turn on hardware acceleration in its settings, or use another browser. STOP and Jog work without it.";
   }
-  const closeSheets = () => ["jog", "objects", "teach"].forEach((id) => byId(id)?.hidden === false && show(id, false));
+  const SHEETS = ["jog", "objects", "teach", "episodes"];
+  const closeSheets = () => SHEETS.forEach((id) => byId(id)?.hidden === false && show(id, false));
   window.katana = { key, blur, toast, drawn, closeSheets, view: null };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
@@ -388,14 +389,14 @@
     if (shown) scene.contentWindow.katanaScene?.fold?.();
     if (id === "teach") teach.show(shown);
   }
-  // The sheets lie in the same corner. On a high screen Teach has room above Jog.
+  // The sheets lie in the same corner. On a high screen Teach or Episodes have room above Jog.
   const high = matchMedia("(min-width: 561px) and (min-height: 700px)");
-  for (const id of ["jog", "objects", "teach"])
+  for (const id of SHEETS)
     byId(`${id}-button`).addEventListener("click", async () => {
       if (id === "teach") await loadTeach();
       const shown = byId(id).hidden;
-      for (const other of ["jog", "objects", "teach"])
-        if (other !== id && byId(other) && !(high.matches && id !== "objects" && other !== "objects")) show(other, false);
+      for (const other of SHEETS)
+        if (other !== id && byId(other) && !(high.matches && [id, other].includes("jog") && ![id, other].includes("objects"))) show(other, false);
       show(id, shown);
     });
   // The sheet of taught poses, loaded on first use.
@@ -418,6 +419,14 @@
     const { Stage } = await import("./scene/stage.js");
     stage ??= new Stage(byId("stage"), scene, { say, toast, status: () => (up ? status : null) });
   }
+  // REC and the episodes, loaded when the server records.
+  let episodes = null;
+  window.addEventListener("status", async ({ detail }) => {
+    if (!episodes && !detail.episodes) return;
+    const { Episodes } = await import("./episodes/episodes.js");
+    episodes ??= new Episodes(byId("stage"), { page, toast });
+    episodes.draw(status);
+  });
   // Who is connected, for admins; loaded on first use.
   byId("people-button").addEventListener("click", async () => {
     help.close();

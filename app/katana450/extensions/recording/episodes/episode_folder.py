@@ -136,6 +136,13 @@ class EpisodeFolder:
         """Return the discarded episodes, by number. Files that cannot be read are left out."""
         return list(self._read(episode_files(self.folder / DISCARDED), discarded=True))
 
+    def last(self) -> KeptEpisode | None:
+        """Return the kept episode with the highest number; None if none can be read."""
+        for path in reversed(episode_files(self.folder)):
+            with suppress(InputError):
+                return self._kept(path, discarded=False)
+        return None
+
     def count(self) -> int:
         """Return the number of kept episodes."""
         return len(episode_files(self.folder))

@@ -144,6 +144,7 @@ class EpisodeKeeper:
             "saving": self._saving,
             "count": self._folder.count(),
             "task": self._task,
+            "last": self._last_kept(),
             "undo": None
             if undo is None
             else {"number": undo.number, "discarded": undo.before is None},
@@ -163,6 +164,18 @@ class EpisodeKeeper:
                 "by": episode.by.name,
             }
         return status
+
+    def _last_kept(self) -> dict[str, Any] | None:
+        """Return the last kept episode for the state; None without any."""
+        kept = self._folder.last()
+        if kept is None:
+            return None
+        episode = kept.episode
+        return {
+            "number": episode.number,
+            "outcome": episode.outcome.value,
+            "seconds": round(episode.length, 1),
+        }
 
     def _undo(self) -> UndoableJudgement | None:
         undo = self._undoable
@@ -303,10 +316,10 @@ class EpisodeKeeper:
         if number is None and self._marker is not None and self._marker.episode.end is None:
             return self._stop(EpisodeOutcome.UNJUDGED, t)
         if number is None:
-            kept = self._folder.kept()
-            if not kept:
+            kept = self._folder.last()
+            if kept is None:
                 raise InputError("There is no episode yet.")
-            return kept[-1].episode
+            return kept.episode
         if self._marker is not None and self._marker.episode.number == number:
             return self._stop(EpisodeOutcome.UNJUDGED, t)
         return self._folder.find(number).episode

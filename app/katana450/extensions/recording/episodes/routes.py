@@ -93,9 +93,10 @@ class EpisodeRoutes:
         body = await body_of(request, MAX_REQUEST_BYTES)
         actor = actor_of(sender, CommandChannel.HTTP)
         page = request.query_params.get("page", "")
-        if PAGE.fullmatch(page):
+        visitor = self._context.authenticator.identity(request.cookies)
+        if visitor is not None and PAGE.fullmatch(page):
             # The name that the person has chosen on the page.
-            actor = replace(actor, person=self._context.hub.person_of(sender, page))
+            actor = replace(actor, person=self._context.hub.person_of(visitor, page))
         try:
             decoded = episode_request(body)
         except InputError as error:

@@ -1,0 +1,187 @@
+// Episodes: REC, the judgement of attempts, and their list. Loaded when the server records.
+import { html, set, write } from "../instruments/shape.js";
+
+const OUTCOMES = { success: "Success", failure: "Failure", unjudged: "Not judged", unfinished: "Unfinished" };
+// Name and key of each button below REC.
+const ACTS = { success: ["Success", "Y"], failure: ["Failure", "N"], discard: ["Discard", "X"], rerecord: ["Re-record", "B"], undo: ["Undo", "U"] };
+const MEGA = 1e6; // bytes
+const button = document.getElementById("episodes-button");
+const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
+const size = (bytes) => (bytes < MEGA ? `${Math.round(bytes / 1000)} kB` : `${(bytes / MEGA).toFixed(1)} MB`);
+const key = (letter) => html("kbd", {}, letter);
+
+export class Episodes {
+  #state = null; // state of the server
+  #may = false; // whether this person may record
+  #listed = -1; // revision of the list that is shown
+  #open = new Set(); // numbers of the episodes whose fields are shown
+  #task = html("input", { maxlength: 200, placeholder: "What is to be done", autocomplete: "off" });
+  #rec = html("button", { type: "button", class: "rec" });
+  #says = html("p", {});
+  #acts = html("div", { class: "acts", role: "group", "aria-label": "How did it go?" });
+  #list = html("ol", {});
+  #about = html("p", { class: "about" });
+
+  // `page` is the name of this page, `toast` shows a sentence to the person.
+  constructor(stage, { page, toast }) {
+    this.page = page;
+    this.toast = toast;
+    const style = html("link", { rel: "stylesheet", href: new URL("episodes.css", import.meta.url).href });
+    document.head.append(style);
+    for (const [act, [label, letter]] of Object.entries(ACTS)) {
+      const made = html("button", { type: "button", "data-act": act, "aria-keyshortcuts": letter }, label, key(letter));
+      made.addEventListener("click", () => this.#act(act));
+      this.#acts.append(made);
+    }
+    this.#rec.addEventListener("click", () => this.#act("rec"));
+    this.#task.addEventListener("keydown", (event) => event.key === "Enter" && this.#act("rec"));
+    this.#list.addEventListener("focusout", () => setTimeout(() => this.#fill()));
+    const task = html("label", { class: "task" }, "Task", this.#task);
+    this.sheet = html("section", { id: "episodes", class: "sheet", "aria-label": "Episodes", hidden: "" }, task, this.#rec, this.#says, this.#acts, this.#list, this.#about);
+    stage.querySelector("#toast").before(this.sheet);
+    new MutationObserver(() => this.#show()).observe(this.sheet, { attributeFilter: ["hidden"] });
+  }
+
+  #show() {
+    if (this.sheet.hidden) return;
+    this.#fill();
+    // On a touch screen this would open its keyboard.
+    if (this.#may && matchMedia("(hover: hover)").matches) (this.#task.value ? this.#rec : this.#task).focus();
+  }
+
+  // Show the state in a status.
+  draw({ episodes: state, role }) {
+    const [before, first] = [this.#state, !this.#state];
+    this.#state = state;
+    this.#may = role !== "viewer";
+    button.hidden = !state;
+    if (!state) return;
+    const { running, saving, last, undo, problem, notice, notices } = state;
+    button.classList.toggle("on", Boolean(running));
+    const parts = running ? [`REC ${clock(running.seconds)}`, size(running.bytes)] : ["REC", ""];
+    [...button.children].forEach((each, i) => write(each, parts[i]));
+    set(button, "aria-label", running ? `Episodes: ${parts.join(", ")}` : "Episodes");
+    for (const each of [this.#task.parentElement, this.#rec, this.#acts]) each.hidden = !this.#may;
+    if (document.activeElement !== this.#task && (first || before?.task !== state.task)) this.#task.value = state.task;
+    this.#rec.replaceChildren(saving ? "Saving…" : running ? `End episode ${running.number}, ${clock(running.seconds)}` : "Start an episode", key("T"));
+    this.#rec.disabled = saving;
+    this.#rec.classList.toggle("on", Boolean(running));
+    const asks = running || last;
+    for (const each of this.#acts.children) each.hidden = each.dataset.act === "undo" ? !undo : !asks;
+    const left = running?.left != null ? ` It ends by itself in ${clock(running.left)}: an episode has at most an hour.` : "";
+    const one = last && `Episode ${last.number}, ${last.seconds.toFixed(1)} s: `;
+    const now = running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode yet.";
+    write(this.#says, problem || now);
+    this.#says.classList.toggle("bad", Boolean(problem));
+    if (!first) this.#tell(before, notices !== before.notices && notice);
+    this.#fill();
+  }
+
+  // Say what has changed, also by other people.
+  #tell(before, notice) {
+    const { running, problem } = this.#state;
+    if (problem && problem !== before.problem) this.toast(problem);
+    else if (notice) this.toast(notice);
+    else if (running?.left != null && before.running?.left == null) this.toast(this.#says.textContent);
+    else if (running && running.number !== before.running?.number) this.toast(`Recording episode ${running.number}, by ${running.by}.`);
+  }
+
+  // Return whether the key was handled.
+  key(event) {
+    if (!this.#state || !this.#may || event.ctrlKey || event.metaKey || event.altKey) return false;
+    // The letter on the key, which is elsewhere on other keyboards.
+    const letter = /^[a-z]$/i.test(event.key) ? event.key.toUpperCase() : event.code.slice(3);
+    const { running, last, undo } = this.#state;
+    const judged = last && !["unjudged", "unfinished"].includes(last.outcome);
+    const act = letter === "T" ? "rec" : Object.keys(ACTS).find((each) => ACTS[each][1] === letter);
+    const asks = act === "undo" ? undo : running || (last && (!judged || !this.sheet.hidden));
+    if (!act || (act !== "rec" && !asks)) return false;
+    if (event.type === "keydown" && !event.repeat) this.#act(act);
+    return true;
+  }
+
+  async #act(act) {
+    const { running, saving } = this.#state;
+    if (act === "rec" && saving) return;
+    const request =
+      act === "rec" ? (running ? { do: "stop" } : { do: "start", task: this.#task.value })
+      : act in OUTCOMES ? { do: "judge", outcome: act }
+      : { do: act };
+    const done = await this.#ask(request);
+    if (!done) return;
+    // The next key may come before the next state.
+    const { number, outcome, begin, end } = done;
+    const last = { number, outcome, seconds: end - begin };
+    this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: act === "undo" ? null : { number } };
+    const name = `Episode ${number}`;
+    if (act === "rec" && running) this.toast(`${name} has ended: Success (Y), Failure (N) or Discard (X)?`);
+    else if (act in OUTCOMES) this.toast(`${name}: ${act}. Undo: U`);
+    else if (act === "discard") this.toast(`${name} is discarded. Undo: U`);
+    else if (act === "undo") this.toast(`${name} is as before.`);
+  }
+
+  // Send `request`; return the episode, or null after a refusal, which is shown.
+  async #ask(request) {
+    try {
+      const answer = await fetch(`api/v1/episodes?page=${this.page}`, { method: "POST", body: JSON.stringify(request) });
+      const words = await answer.text();
+      if (answer.ok) return JSON.parse(words);
+      this.toast(words.startsWith("{") ? JSON.parse(words).why : words);
+    } catch {
+      this.toast("No connection: nothing was changed.");
+    }
+    this.#listed = -1;
+    this.#fill();
+    return null;
+  }
+
+  // Show the list, if it has changed and nobody types in it.
+  async #fill() {
+    const { revision } = this.#state ?? {};
+    if (this.sheet.hidden || revision === this.#listed || document.activeElement?.matches("#episodes ol :is(input, select)")) return;
+    this.#listed = revision;
+    const answer = await fetch("api/v1/episodes");
+    if (!answer.ok) return (this.#listed = -1);
+    const { episodes, discarded, unreadable, folder } = await answer.json();
+    const kept = document.activeElement?.closest("#episodes ol [data-key]")?.dataset.key;
+    this.#list.replaceChildren(...episodes.reverse().map((each) => this.#row(each)), ...discarded.reverse().map((each) => this.#gone(each)));
+    this.#list.querySelector(`[data-key="${kept}"]`)?.focus();
+    const wrong = unreadable.length ? ` ${unreadable.join(" ")}` : "";
+    write(this.#about, `${episodes.length} kept, ${discarded.length} discarded, in ${folder}.${wrong}`);
+  }
+
+  #row(each) {
+    const { number, outcome, begin, end, recorded, bytes, task, note, file } = each;
+    const length = `${(end - begin).toFixed(1)} s`;
+    const summary = html("summary", { "data-key": number }, html("b", {}, `${number}`), html("span", {}, length), html("i", { class: outcome }, OUTCOMES[outcome]), html("span", {}, task));
+    const row = html("details", this.#open.has(number) ? { open: "" } : {}, summary);
+    row.addEventListener("toggle", () => this.#open[row.open ? "add" : "delete"](number));
+    if (!this.#may) return html("li", {}, row);
+    const field = (label, attributes, change) => {
+      const input = html("input", attributes);
+      input.addEventListener("change", () => change(input.value));
+      return html("label", {}, label, input);
+    };
+    const ask = (request) => this.#ask({ ...request, number });
+    const seconds = (value) => ({ type: "number", step: 0.1, min: 0, max: recorded.toFixed(1), value: value.toFixed(1) });
+    const select = html("select", {}, ...Object.entries(OUTCOMES).slice(0, outcome === "unfinished" ? 4 : 3).map(([value, words]) => html("option", { value, ...(value === outcome && { selected: "" }) }, words)));
+    select.addEventListener("change", () => ask({ do: "judge", outcome: select.value }));
+    const discard = html("button", { type: "button" }, "Discard");
+    discard.addEventListener("click", () => ask({ do: "discard" }));
+    row.append(
+      html("label", {}, "Outcome", select),
+      field("Task", { maxlength: 200, value: task }, (value) => ask({ do: "describe", task: value })),
+      field("Note", { maxlength: 500, value: note }, (value) => ask({ do: "describe", note: value })),
+      field("From, s", seconds(begin), (value) => ask({ do: "trim", begin: Number(value), end })),
+      field("To, s", seconds(end), (value) => ask({ do: "trim", begin, end: Number(value) })),
+      html("div", {}, discard, html("a", { href: `api/v1/episodes/${number}`, download: file }, `Download, ${size(bytes)}`)),
+    );
+    return html("li", {}, row);
+  }
+
+  #gone({ number, task }) {
+    const back = html("button", { type: "button", "aria-label": `Restore episode ${number}` }, "Restore");
+    back.addEventListener("click", () => this.#ask({ do: "restore", number }));
+    return html("li", { class: "gone" }, html("b", {}, `${number}`), html("span", {}, `discarded ${task}`), ...(this.#may ? [back] : []));
+  }
+}

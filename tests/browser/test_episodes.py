@@ -1,0 +1,240 @@
+"""Episodes on the page: by keyboard alone, by touch, in two windows, and over a reload."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import katana450
+from katana450.arm.control.lease import Role
+from katana450.extensions.recording.episodes.episode import EpisodeOutcome
+from katana450.server.web.access_links import AccessFile
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import RECORDING_APP, AppServer
+from tests.browser.session import bar
+from tests.browser.sizes import PHONE, PORTRAIT, SCHEMES, WIDE
+from tests.gateway.client import ask, enter
+
+LEAST_FINGER = 44.0
+"""Minimum width and height of a control on a phone [px]."""
+
+POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "episodes"
+
+
+@pytest.fixture
+def server(tmp_path: Path, folder: Path) -> Iterator[AppServer]:
+    options = ("--silence", "2.0", "--record", str(tmp_path / "ring"), "--episodes", str(folder))
+    with AppServer((*RECORDING_APP, *options)) as running:
+        yield running
+
+
+def move(server: AppServer, *postures: tuple[float, ...]) -> None:
+    with katana450.connect(server.url, name="Driver") as arm:
+        for posture in postures:
+            arm.joints(posture)
+
+
+def listed(server: AppServer) -> dict[str, Any]:
+    """Return the episodes of the server, queried without a browser."""
+    status, _, body = ask(f"{server.url}/api/v1/episodes", Cookie=enter(server.url))
+    assert status == 200, body
+    found: dict[str, Any] = json.loads(body)
+    return found
+
+
+def outcomes(server: AppServer) -> list[str]:
+    return [each["outcome"] for each in listed(server)["episodes"]]
+
+
+def ready(page: ViserPage) -> None:
+    """Wait for the process that records."""
+    page.page.wait_for_selector("#episodes-button:not([hidden])", timeout=30_000)
+
+
+def rec(page: ViserPage) -> str:
+    return bar(page, "episodes-button")
+
+
+def toast(page: ViserPage, words: str) -> None:
+    page.wait_until(lambda: words in bar(page, "toast"), f"the words {words!r}")
+
+
+def test_whole_flow_by_keyboard_alone(
+    open_page: OpenPage, server: AppServer, folder: Path, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=WIDE)
+    ready(page)
+    keys = page.page.keyboard
+    page.page.focus("#episodes-button")
+    keys.press("Enter")
+    # The first field of the sheet takes the focus.
+    page.wait_until(
+        lambda: page.page.evaluate("document.activeElement.matches('#episodes input')"), "the focus"
+    )
+    keys.type("Pour the water")
+    keys.press("Enter")
+    toast(page, "Recording episode 1, by Window 1.")
+    page.wait_until(lambda: rec(page).startswith("REC 0:0"), "the time in the bar")
+    move(server, *POSTURES)
+    page.wait_until(lambda: "kB" in rec(page), "the size in the bar")
+    page.keep(artefacts / "episodes-running.png")
+    # The letter belongs to the field until the focus has left it.
+    keys.press("Tab")
+    keys.press("t")
+    toast(page, "Success (Y), Failure (N) or Discard (X)?")
+    assert outcomes(server) == ["unjudged"]
+    keys.press("y")
+    toast(page, "Episode 1: success")
+    keys.press("u")
+    toast(page, "as before")
+    assert outcomes(server) == ["unjudged"]
+    keys.press("n")
+    page.wait_until(lambda: outcomes(server) == ["failure"], "the failure")
+    keys.press("b")
+    page.wait_until(lambda: rec(page).startswith("REC 0:0"), "the next attempt")
+    move(server, *POSTURES)
+    keys.press("y")
+    page.wait_until(lambda: outcomes(server) == ["success"], "the success")
+    keys.press("x")
+    toast(page, "Episode 2 is discarded")
+    keys.press("u")
+    page.wait_until(lambda: outcomes(server) == ["success"], "the episode again")
+    # STOP is the same as ever.
+    assert bar(page, "mode").startswith("On target")
+    (path,) = folder.glob("*.mcap")
+    assert path.name == "episode-0002.mcap"
+    (episode,) = katana450.open(path).episodes
+    assert episode.task == "Pour the water"
+    assert episode.outcome is EpisodeOutcome.SUCCESS
+    assert page.errors == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_whole_flow_on_a_phone(
+    open_page: OpenPage, server: AppServer, scheme: str, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=PORTRAIT, **PHONE, color_scheme=scheme)
+    ready(page)
+    sheet = page.page.locator("#episodes")
+    page.page.tap("#episodes-button")
+    # The keyboard of the phone must not cover the button.
+    assert page.page.evaluate("document.activeElement.tagName") != "INPUT"
+    tap(page, "Start an episode")
+    toast(page, "Recording episode 1")
+    move(server, *POSTURES)
+    page.keep(artefacts / f"episodes-phone-running-{scheme}.png")
+    assert_fits(page)
+    tap(page, "Success")
+    page.wait_until(lambda: outcomes(server) == ["success"], "the success")
+    sheet.locator("summary").first.tap()
+    page.keep(artefacts / f"episodes-phone-list-{scheme}.png")
+    assert_fits(page)
+    tap(page, "Undo")
+    page.wait_until(lambda: outcomes(server) == ["unjudged"], "the undo")
+    note = sheet.get_by_label("Note")
+    note.tap()
+    note.fill("a little spilled")
+    sheet.get_by_label("To, s").tap()
+    page.wait_until(lambda: listed(server)["episodes"][0]["note"] == "a little spilled", "the note")
+    sheet.get_by_label("To, s").fill("1.0")
+    sheet.get_by_label("From, s").tap()
+    page.wait_until(lambda: listed(server)["episodes"][0]["end"] == 1.0, "the end")
+    sheet.get_by_label("Outcome").select_option("failure")
+    page.wait_until(lambda: outcomes(server) == ["failure"], "the failure")
+    tap(page, "Discard")
+    page.wait_until(lambda: len(listed(server)["discarded"]) == 1, "the discarded one")
+    page.wait_until(lambda: sheet.locator(".gone").count() == 1, "it in the list")
+    page.keep(artefacts / f"episodes-phone-discarded-{scheme}.png")
+    sheet.get_by_role("button", name="Restore episode 1").tap()
+    page.wait_until(lambda: outcomes(server) == ["failure"], "the episode again")
+    assert page.errors == []
+
+
+def tap(page: ViserPage, name: str) -> None:
+    page.page.locator("#episodes").get_by_role("button", name=name).first.tap()
+
+
+def assert_fits(page: ViserPage) -> None:
+    """Check that a finger hits every control, and that nothing is cut or scrolled sideways."""
+    small = page.page.evaluate(
+        """() => [...document.querySelectorAll(
+          "#episodes-button, #episodes :is(button, input, select, summary, a)")]
+          .filter((each) => each.offsetParent && each.getBoundingClientRect().height < 43.9)
+          .map((each) => each.textContent || each.outerHTML)"""
+    )
+    assert small == []
+    assert page.page.evaluate(
+        "() => { const each = document.getElementById('episodes');"
+        " return each.scrollWidth <= each.clientWidth + 1 }"
+    )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_windows_agree_and_a_reload_keeps_rec(
+    open_page: OpenPage, server: AppServer, scheme: str, artefacts: Path
+) -> None:
+    first, second = (
+        open_page(server.url, nodes=("/arm",), window=WIDE, color_scheme=scheme) for _ in range(2)
+    )
+    ready(first)
+    first.page.keyboard.press("t")
+    for page in (first, second):
+        toast(page, "Recording episode 1, by Window 1")
+        page.wait_until(lambda page=page: rec(page).startswith("REC 0:"), "REC")
+    move(server, *POSTURES)
+    first.page.reload()
+    first.wait_ready(("/arm",))
+    first.wait_until(lambda: rec(first).startswith("REC 0:"), "REC after the reload")
+    # The other window ends it.
+    second.page.click("#episodes-button")
+    second.page.click("#jog-button")
+    second.page.wait_for_selector("#jog [name=step]", state="attached")
+    second.press_in_bar("Success Y")
+    second.wait_until(lambda: outcomes(server) == ["success"], "the success")
+    first.wait_until(lambda: rec(first) == "REC", "the end")
+    second.page.locator("#episodes summary").first.click()
+    second.keep(artefacts / f"episodes-desk-{scheme}.png")
+    assert second.page.locator("#episodes i.success").inner_text() == "Success"
+    # While Jog is open, its keys move the arm, and those of episodes are others.
+    second.page.focus("#jog-button")
+    second.page.keyboard.press("x")
+    first.page.click("#episodes-button")
+    first.wait_until(lambda: first.page.locator("#episodes .gone").count() == 1, "the discarded")
+    assert first.errors == second.errors == []
+
+
+@pytest.mark.long
+def test_viewer_sees_and_changes_nothing(open_page: OpenPage, tmp_path: Path, folder: Path) -> None:
+    file = AccessFile.create(tmp_path / "access.json")
+    viewer, operator = (
+        file.give(role.value, role, time.time() + 600.0) for role in (Role.VIEWER, Role.OPERATOR)
+    )
+    command = (*RECORDING_APP, "--access", str(file.path), "--episodes", str(folder))
+    with AppServer((*command, "--record", str(tmp_path / "ring"))) as server:
+        page = open_page(f"{server.url}/#{viewer}", nodes=("/arm",))
+        ready(page)
+        url = f"{server.url}/api/v1/episodes"
+        start = json.dumps({"do": "start", "task": "pour"}).encode()
+        for token, status in ((viewer, 403), (operator, 200)):
+            answer = ask(url, data=start, Authorization=f"Bearer {token}")
+            assert answer[0] == status, answer[2]
+        assert ask(url)[0] == 401
+        toast(page, "Recording episode 1, by operator")
+        page.page.click("#episodes-button")
+        assert page.page.locator("#episodes button:visible").count() == 0
+        page.page.keyboard.press("t")
+        page.page.wait_for_timeout(1000)
+        assert rec(page).startswith("REC 0:")
