@@ -8,7 +8,10 @@ const MEGA = 1e6; // bytes
 const button = document.getElementById("episodes-button");
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 const size = (bytes) => (bytes < MEGA ? `${Math.round(bytes / 1000)} kB` : `${(bytes / MEGA).toFixed(1)} MB`);
-const key = (letter) => html("kbd", {}, letter);
+const touch = matchMedia("(any-pointer: coarse)").matches;
+// The name of a key, where there may be one.
+const by = (words, letter) => (touch ? words : `${words}${letter}`);
+const key = (letter) => html("kbd", { "aria-hidden": true }, letter);
 
 export class Episodes {
   #state = null; // state of the server
@@ -70,7 +73,7 @@ export class Episodes {
     for (const each of this.#acts.children) each.hidden = each.dataset.act === "undo" ? !undo : !asks;
     const left = running?.left != null ? ` It ends by itself in ${clock(running.left)}: an episode has at most an hour.` : "";
     const one = last && `Episode ${last.number}, ${last.seconds.toFixed(1)} s: `;
-    const now = running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode yet.";
+    const now = running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
     write(this.#says, problem || now);
     this.#says.classList.toggle("bad", Boolean(problem));
     if (!first) this.#tell(before, notices !== before.notices && notice);
@@ -114,9 +117,9 @@ export class Episodes {
     const last = { number, outcome, seconds: end - begin };
     this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: act === "undo" ? null : { number } };
     const name = `Episode ${number}`;
-    if (act === "rec" && running) this.toast(`${name} has ended: Success (Y), Failure (N) or Discard (X)?`);
-    else if (act in OUTCOMES) this.toast(`${name}: ${act}. Undo: U`);
-    else if (act === "discard") this.toast(`${name} is discarded. Undo: U`);
+    if (act === "rec" && running) this.toast(by(`${name} has ended.`, " Y: success, N: failure, X: discard"));
+    else if (act in OUTCOMES) this.toast(by(`${name}: ${act}.`, " U: undo"));
+    else if (act === "discard") this.toast(by(`${name} is discarded.`, " U: undo"));
     else if (act === "undo") this.toast(`${name} is as before.`);
   }
 

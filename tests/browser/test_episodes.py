@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+from playwright.sync_api import Browser
 
 import katana450
 from katana450.arm.control.lease import Role
@@ -66,6 +68,10 @@ def rec(page: ViserPage) -> str:
     return bar(page, "episodes-button")
 
 
+def recording(page: ViserPage) -> bool:
+    return rec(page).startswith("REC 0:")
+
+
 def toast(page: ViserPage, words: str) -> None:
     page.wait_until(lambda: words in bar(page, "toast"), f"the words {words!r}")
 
@@ -92,7 +98,7 @@ def test_whole_flow_by_keyboard_alone(
     # The letter belongs to the field until the focus has left it.
     keys.press("Tab")
     keys.press("t")
-    toast(page, "Success (Y), Failure (N) or Discard (X)?")
+    toast(page, "Y: success, N: failure, X: discard")
     assert outcomes(server) == ["unjudged"]
     keys.press("y")
     toast(page, "Episode 1: success")
@@ -175,6 +181,12 @@ def assert_fits(page: ViserPage) -> None:
           .map((each) => each.textContent || each.outerHTML)"""
     )
     assert small == []
+    cut = page.page.evaluate(
+        "() => [...document.querySelectorAll('nav button:not([hidden])')].filter((each) =>"
+        " each.scrollWidth > each.clientWidth + 1"
+        " || each.getBoundingClientRect().right > innerWidth - 12).map((each) => each.textContent)"
+    )
+    assert cut == []
     assert page.page.evaluate(
         "() => { const each = document.getElementById('episodes');"
         " return each.scrollWidth <= each.clientWidth + 1 }"
@@ -189,20 +201,20 @@ def test_windows_agree_and_a_reload_keeps_rec(
     first, second = (
         open_page(server.url, nodes=("/arm",), window=WIDE, color_scheme=scheme) for _ in range(2)
     )
-    ready(first)
+    for page in (first, second):
+        ready(page)
     first.page.keyboard.press("t")
     for page in (first, second):
         toast(page, "Recording episode 1, by Window 1")
-        page.wait_until(lambda page=page: rec(page).startswith("REC 0:"), "REC")
+        page.wait_until(partial(recording, page), "REC")
     move(server, *POSTURES)
     first.page.reload()
-    first.wait_ready(("/arm",))
     first.wait_until(lambda: rec(first).startswith("REC 0:"), "REC after the reload")
     # The other window ends it.
     second.page.click("#episodes-button")
     second.page.click("#jog-button")
     second.page.wait_for_selector("#jog [name=step]", state="attached")
-    second.press_in_bar("Success Y")
+    second.press_in_bar("Success")
     second.wait_until(lambda: outcomes(server) == ["success"], "the success")
     first.wait_until(lambda: rec(first) == "REC", "the end")
     second.page.locator("#episodes summary").first.click()
@@ -217,14 +229,16 @@ def test_windows_agree_and_a_reload_keeps_rec(
 
 
 @pytest.mark.long
-def test_viewer_sees_and_changes_nothing(open_page: OpenPage, tmp_path: Path, folder: Path) -> None:
+def test_viewer_sees_and_changes_nothing(browser: Browser, tmp_path: Path, folder: Path) -> None:
     file = AccessFile.create(tmp_path / "access.json")
     viewer, operator = (
         file.give(role.value, role, time.time() + 600.0) for role in (Role.VIEWER, Role.OPERATOR)
     )
     command = (*RECORDING_APP, "--access", str(file.path), "--episodes", str(folder))
     with AppServer((*command, "--record", str(tmp_path / "ring"))) as server:
-        page = open_page(f"{server.url}/#{viewer}", nodes=("/arm",))
+        window = browser.new_page()
+        window.goto(f"{server.url}/#{viewer}")
+        page = ViserPage(window, window.main_frame, [])
         ready(page)
         url = f"{server.url}/api/v1/episodes"
         start = json.dumps({"do": "start", "task": "pour"}).encode()
@@ -238,3 +252,4 @@ def test_viewer_sees_and_changes_nothing(open_page: OpenPage, tmp_path: Path, fo
         page.page.keyboard.press("t")
         page.page.wait_for_timeout(1000)
         assert rec(page).startswith("REC 0:")
+        window.close()

@@ -18,6 +18,7 @@ from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
+from katana450.client.episodes import EpisodeClient
 from katana450.client.files import STOP_TIMEOUT, LostError, RefusedError, Site
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
@@ -247,6 +248,11 @@ class AsyncClient:
         scene = await asyncio.to_thread(self._site.scene, data)
         await self.ask(requests.Load(scene=scene.key))
         return scene
+
+    @property
+    def episodes(self) -> EpisodeClient:
+        """Episodes of the server. Each call blocks, so use ``asyncio.to_thread``."""
+        return EpisodeClient(self._site)
 
     async def people(self) -> tuple[answers.ConnectedPerson, ...]:
         """Return everybody who is connected, muted or kept out. For admins only."""

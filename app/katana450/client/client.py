@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy.typing as npt
 
 from katana450.client.asynchronous import ANSWER_TIMEOUT, FOLLOW_RATE, AsyncClient, aconnect
+from katana450.client.episodes import EpisodeClient
 from katana450.server.api import answers, requests
 
 T = TypeVar("T")
@@ -73,6 +74,11 @@ class Client:
     def load_scene(self, data: bytes) -> answers.Scene:
         """See ``AsyncClient.load_scene``."""
         return self._wait(self._client.load_scene(data))
+
+    @property
+    def episodes(self) -> EpisodeClient:
+        """Episodes of the server: record, judge and list them."""
+        return self._client.episodes
 
     def people(self) -> tuple[answers.ConnectedPerson, ...]:
         """See ``AsyncClient.people``."""

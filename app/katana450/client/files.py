@@ -53,6 +53,14 @@ class Site:
         """See ``AsyncClient.save_scene``."""
         return self._ask(f"{ROOT}/scene", None)
 
+    def fetched(self, path: str, data: bytes | None = None) -> bytes:
+        """Return the content at ``path``, the answer to ``data`` if that is sent.
+
+        Raises RefusedError or LostError.
+        """
+        name = self.name if self.name.isascii() else "Program"
+        return self._ask(path, data, {"X-Name": name})
+
     def stop(self, press: str, port: int | None = None) -> str:
         """Send STOP over HTTP; return whether the arm has ``confirmed`` it, or ``requested``.
 

@@ -6,13 +6,17 @@ import argparse
 import math
 from pathlib import Path
 
+from katana450.extensions.recording.episodes.episode_options import add_episode_options
+
 FORMATS = ("csv", "mcap")
 
 
 def add_record_options(parser: argparse.ArgumentParser) -> None:
     """Add the subcommands of ``katana450 record`` to ``parser``."""
     acts = parser.add_subparsers(
-        dest="act", required=True, metavar="keep | list | info | recover | verify | trim | export"
+        dest="act",
+        required=True,
+        metavar="keep | list | info | recover | verify | trim | export | episodes",
     )
     keep = acts.add_parser(
         "keep", help="keep what a server has just recorded, whether it still runs or not"
@@ -61,6 +65,9 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         default=FORMATS[0],
         help="csv: t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it; "
         "mcap: a recording (default: %(default)s)",
+    )
+    add_episode_options(
+        acts.add_parser("episodes", help="record, judge and list the episodes of a server")
     )
     for each in (trim, export):
         each.add_argument("--out", type=Path, required=True, metavar="FILE", help="new file")

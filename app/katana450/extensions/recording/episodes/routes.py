@@ -25,11 +25,12 @@ from katana450.extensions.recording.episodes.episode_requests import (
     episode_request,
 )
 from katana450.extensions.recording.episodes.link import connect_to_episodes, request_episode
+from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of
-from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, body_of
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
 from katana450.server.web.http_api import RouteContext
 
 MAX_WAITING = 8
@@ -100,7 +101,7 @@ class EpisodeRoutes:
         try:
             decoded = episode_request(body)
         except InputError as error:
-            return JSONResponse({"why": str(error)}, NOT_UNDERSTOOD)
+            return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
         if self._waiting >= MAX_WAITING:
             raise HTTPException(TOO_MANY, "Too many requests at once. Wait a moment.")
         self._waiting += 1
@@ -110,7 +111,7 @@ class EpisodeRoutes:
             )
         except InputError as error:
             self._context.hub.recorder.refuse("episode", actor, error)
-            return JSONResponse({"why": str(error)}, NOT_NOW)
+            return as_json(answers.Refused(why=str(error)), NOT_NOW)
         finally:
             self._waiting -= 1
         what = {"do": decoded.__struct_config__.tag, "number": done["number"]}

@@ -13,6 +13,9 @@ import msgspec
 
 from katana450.assembly.log_lines import printable
 from katana450.errors import InputError, KatanaError
+from katana450.extensions.recording.episodes.episode import Episode
+from katana450.extensions.recording.episodes.episode_command import episodes
+from katana450.extensions.recording.episodes.episode_file import episodes_in
 from katana450.extensions.recording.files.fingerprint import differences
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
@@ -46,6 +49,8 @@ def record(options: Namespace) -> int:
             return _verify(options.file, options.urdf, as_json=options.json)
         case "trim":
             return _trim(options.files, options.out, options.start, options.end)
+        case "episodes":
+            return episodes(options)
         case _:
             return _export(options)
 
@@ -61,10 +66,16 @@ def _list(folder: Path) -> int:
         try:
             with RecordingFile.open(path) as file:
                 length = f"{file.end - file.start:.1f} s"
-                print(f"{path}  {_began(file)}  {length}  {file.size / MB:.1f} MB")
+                line = f"{path}  {_began(file)}  {length}  {file.size / MB:.1f} MB"
+                print(printable("  ".join((line, *map(_about, episodes_in(file))))))
         except InputError as error:
             print(printable(f"{path}  {error}"), file=sys.stderr)
     return 0
+
+
+def _about(episode: Episode) -> str:
+    """Return number, outcome and task of ``episode`` in words."""
+    return f"episode {episode.number}, {episode.outcome.value}: {episode.task}"
 
 
 def _info(path: Path) -> int:

@@ -1,0 +1,131 @@
+"""Episodes of a server, for programs: record, judge and list them. Every call is over HTTP."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from katana450.atomic import write_files, writer_of
+from katana450.client.files import LostError, Site
+from katana450.server.api.fields import ROOT
+
+PATH = f"{ROOT}/episodes"
+
+
+class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
+    """An episode in the list of a server.
+
+    Attributes:
+        number: Its number.
+        task: What is to be done.
+        outcome: ``success``, ``failure``, ``unjudged``, or ``unfinished`` after a crash.
+        note: Remarks.
+        begin: First moment [s] after the begin of its file.
+        end: Last moment [s] after the begin of its file.
+        recorded: Length of its file [s], which bounds both.
+        bytes: Length of its file [bytes].
+        file: Name of its file.
+    """
+
+    number: int
+    task: str
+    outcome: str
+    note: str
+    begin: float
+    end: float
+    recorded: float
+    bytes: int
+    file: str
+
+
+class _List(msgspec.Struct):
+    episodes: list[ListedEpisode]
+    discarded: list[ListedEpisode]
+    folder: str
+
+
+class EpisodeClient:
+    """Records and judges the episodes of a server.
+
+    Each method waits for the answer; an asyncio program calls it by ``asyncio.to_thread``. Raises
+    RefusedError with the reason if the server refuses, and LostError if there is no server.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+
+    def list(self) -> tuple[ListedEpisode, ...]:
+        """Return the kept episodes, by number."""
+        return tuple(self._listed().episodes)
+
+    def discarded(self) -> tuple[ListedEpisode, ...]:
+        """Return the discarded episodes, by number."""
+        return tuple(self._listed().discarded)
+
+    def folder(self) -> Path:
+        """Return the folder of the episodes, on the machine of the server."""
+        return Path(self._listed().folder)
+
+    def start(self, task: str | None = None) -> int:
+        """Begin an episode and return its number. ``task``: None for that of the last one."""
+        return self._number({"do": "start", "task": task})
+
+    def stop(self, outcome: str = "unjudged") -> int:
+        """End the episode that runs and return its number.
+
+        ``outcome``: unjudged, success or failure.
+        """
+        return self._number({"do": "stop", "outcome": outcome})
+
+    def judge(self, outcome: str, number: int | None = None) -> int:
+        """Judge an episode and return its number.
+
+        Args:
+            outcome: unjudged, success or failure.
+            number: the episode; None for the one that runs, which then ends, or else the last one.
+        """
+        return self._number({"do": "judge", "outcome": outcome, "number": number})
+
+    def discard(self, number: int | None = None) -> int:
+        """Discard an episode and return its number; see ``judge``."""
+        return self._number({"do": "discard", "number": number})
+
+    def restore(self, number: int) -> int:
+        """Bring the discarded episode ``number`` back; return ``number``."""
+        return self._number({"do": "restore", "number": number})
+
+    def undo(self) -> int:
+        """Undo the last judgement or discard, up to 10 s after it; return its number."""
+        return self._number({"do": "undo"})
+
+    def rerecord(self) -> int:
+        """Discard the last episode and begin it again; return the new number."""
+        return self._number({"do": "rerecord"})
+
+    def describe(self, number: int, *, task: str | None = None, note: str | None = None) -> int:
+        """Change the texts of the episode ``number``; None keeps one. Return ``number``."""
+        return self._number({"do": "describe", "number": number, "task": task, "note": note})
+
+    def trim(self, number: int, begin: float, end: float) -> int:
+        """Give the episode ``number`` another begin and end [s after the begin of its file].
+
+        Nothing is deleted. Returns ``number``.
+        """
+        return self._number({"do": "trim", "number": number, "begin": begin, "end": end})
+
+    def download(self, number: int, out: Path) -> None:
+        """Write the file of the kept episode ``number`` to ``out``."""
+        content = self._site.fetched(f"{PATH}/{number}")
+        write_files({out: writer_of(content)})
+
+    def _listed(self) -> _List:
+        try:
+            return msgspec.json.decode(self._site.fetched(PATH), type=_List)
+        except msgspec.MsgspecError as error:
+            raise LostError(f"The list of episodes is not understood: {error}.") from error
+
+    def _number(self, request: dict[str, Any]) -> int:
+        done = msgspec.json.decode(self._site.fetched(PATH, msgspec.json.encode(request)))
+        return int(done["number"])

@@ -1,0 +1,180 @@
+"""Episodes of a real server: by the client and the command, through kills, without a lost one."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import katana450
+from katana450.cli.main import main
+from katana450.client import RefusedError
+from katana450.client.episodes import EpisodeClient
+from katana450.client.files import Site
+from katana450.extensions.recording.episodes.episode import EpisodeOutcome
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
+from katana450.extensions.recording.files.checking import session_for, verify_recording
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from tests.browser.server import RECORDING_APP, AppServer, ServerError
+from tests.conftest import LONG
+from tests.recording.test_recorder import MAX_LOSS, POSTURES, RECORDER, waited_for
+
+KILLS = 8 if LONG else 1
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "episodes"
+
+
+@pytest.fixture
+def command(tmp_path: Path, folder: Path) -> tuple[str, ...]:
+    return (*RECORDING_APP, "--record", str(tmp_path / "ring"), "--episodes", str(folder))
+
+
+@pytest.fixture
+def server(command: tuple[str, ...]) -> Iterator[AppServer]:
+    with AppServer(command) as running:
+        yield running
+
+
+def started(server: AppServer, task: str) -> EpisodeClient:
+    """Begin an episode as soon as the process that records is there."""
+    client = EpisodeClient(Site(server.url, name="Ada"))
+
+    def start() -> bool:
+        with suppress(RefusedError):
+            return client.start(task) > 0
+        return False
+
+    waited_for(start, "the process that records")
+    return client
+
+
+def move(server: AppServer, *postures: tuple[float, ...]) -> float:
+    """Drive the arm, and return the time of the last motion."""
+    with katana450.connect(server.url, name="Ada") as arm:
+        for posture in postures:
+            arm.joints(posture)
+    return time.perf_counter()
+
+
+def test_client_and_command_record_episodes(
+    server: AppServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert f"episodes in {folder}" in server.output
+    client = started(server, "pour")
+    with pytest.raises(RefusedError, match="Episode 1 runs already"):
+        client.start()
+    move(server, *POSTURES)
+    client.stop("success")
+    (episode,) = client.list()
+    assert (episode.number, episode.task, episode.outcome) == (1, "pour", "success")
+    assert episode.end - episode.begin > 1.0
+    capsys.readouterr()
+    url = ("--url", server.url)
+    for arguments, words in (
+        (("describe", "1", "--note", "half a cup"), "is described"),
+        (("trim", "1", "--from", "0.1", "--to", "0.9"), "from 0.1 to 0.9 s"),
+        (("judge", "failure"), "Episode 1: failure"),
+        (("undo",), "as before"),
+        (("list",), "0.8 s  success     pour  (half a cup)"),
+        (("discard", "1"), "discarded"),
+        (("restore", "1"), "kept again"),
+    ):
+        assert main(["record", "episodes", *arguments, *url]) == 0
+        assert words in capsys.readouterr().out
+    assert main(["record", "episodes", "discard", "7", *url]) == 1
+    assert "There is no episode 7" in capsys.readouterr().err
+    client.download(1, tmp_path / "mine.mcap")
+    (downloaded,) = katana450.open(tmp_path / "mine.mcap").episodes
+    assert downloaded.outcome is EpisodeOutcome.SUCCESS
+    assert downloaded.by.name == "Ada"
+    assert downloaded.length == pytest.approx(0.8)
+    server.stop()
+    assert main(["record", "list", str(folder)]) == 0
+    assert "episode 1, success: pour" in capsys.readouterr().out
+    assert main(["record", "episodes", "list", str(folder)]) == 0
+    assert "success     pour" in capsys.readouterr().out
+    assert main(["record", "episodes", "recover", str(folder)]) == 0
+    assert "No episode was interrupted" in capsys.readouterr().out
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_killed_recorder_keeps_the_running_episode_as_unfinished(
+    server: AppServer, folder: Path
+) -> None:
+    client = started(server, "first")
+    move(server, *POSTURES)
+    client.stop("success")
+    for kill in range(KILLS):
+        number = client.start("killed")
+        moved = move(server, *POSTURES)
+        time.sleep(0.2 * (kill % 5))
+        recorder = server.child(RECORDER)
+        os.kill(recorder, signal.SIGKILL)
+        waited_for(partial(_has, folder, number), "the interrupted episode")
+        found = EpisodeFolder(folder).find(number)
+        assert found.episode.outcome is EpisodeOutcome.UNFINISHED
+        assert moved - (found.episode.end or 0.0) <= MAX_LOSS
+        with RecordingFile.open(found.path) as file:
+            assert verify_recording(file, session_for(file).session).identical
+        waited_for(partial(_answers, client, number), "the next process")
+    kept = EpisodeFolder(folder).kept()
+    assert [each.episode.number for each in kept] == list(range(1, KILLS + 2))
+    assert kept[0].episode.outcome is EpisodeOutcome.SUCCESS
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_killed_server_leaves_an_episode_that_is_recovered(
+    command: tuple[str, ...], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with AppServer(command) as server:
+        started(server, "cut off")
+        move(server, *POSTURES)
+        time.sleep(1.5)
+        processes = [server.pid, server.child(RECORDER), server.arm, server.front]
+        for each in processes:
+            with suppress(ProcessLookupError):
+                os.kill(each, signal.SIGKILL)
+        with suppress(ServerError):
+            server.stop()
+    capsys.readouterr()
+    waited_for(partial(_recovered, folder), "the claim of the folder to end")
+    assert "Episode 1 was interrupted and is kept as unfinished" in capsys.readouterr().out
+    (kept,) = EpisodeFolder(folder).kept()
+    assert kept.episode.task == "cut off"
+    assert kept.episode.length > 1.0
+
+
+@pytest.mark.long
+def test_server_that_ends_finishes_its_episode(server: AppServer, folder: Path) -> None:
+    started(server, "last")
+    move(server, *POSTURES)
+    server.stop()
+    (kept,) = EpisodeFolder(folder).kept()
+    assert kept.episode.outcome is EpisodeOutcome.UNFINISHED
+    assert kept.episode.length > 1.0
+
+
+def _has(folder: Path, number: int) -> bool:
+    return EpisodeFolder(folder).path(number).exists()
+
+
+def _answers(client: EpisodeClient, number: int) -> bool:
+    with suppress(RefusedError):
+        return client.judge("failure", number) == number
+    return False
+
+
+def _recovered(folder: Path) -> bool:
+    return main(["record", "episodes", "recover", str(folder)]) == 0
