@@ -16,6 +16,7 @@ const key = (letter) => html("kbd", { "aria-hidden": true }, letter);
 export class Episodes {
   #state = null; // state of the server
   #may = false; // whether this person may record
+  #notice = null; // newest notice of the server
   #listed = -1; // revision of the list that is shown
   #open = new Set(); // numbers of the episodes whose fields are shown
   #task = html("input", { maxlength: 200, placeholder: "What is to be done", autocomplete: "off" });
@@ -54,18 +55,19 @@ export class Episodes {
 
   // Show the state in a status.
   draw({ episodes: state, role }) {
-    const [before, first] = [this.#state, !this.#state];
+    const before = this.#state;
+    if (!state && before?.running) this.toast("The recording is interrupted. It begins again in a few seconds.");
     this.#state = state;
     this.#may = role !== "viewer";
     button.hidden = !state;
     if (!state) return;
-    const { running, saving, last, undo, problem, notice, notices } = state;
+    const { running, saving, last, undo, problem } = state;
     button.classList.toggle("on", Boolean(running));
     const parts = running ? [`REC ${clock(running.seconds)}`, size(running.bytes)] : ["REC", ""];
     [...button.children].forEach((each, i) => write(each, parts[i]));
     set(button, "aria-label", running ? `Episodes: ${parts.join(", ")}` : "Episodes");
     for (const each of [this.#task.parentElement, this.#rec, this.#acts]) each.hidden = !this.#may;
-    if (document.activeElement !== this.#task && (first || before?.task !== state.task)) this.#task.value = state.task;
+    if (document.activeElement !== this.#task && before?.task !== state.task) this.#task.value = state.task;
     this.#rec.replaceChildren(saving ? "Saving…" : running ? `End episode ${running.number}, ${clock(running.seconds)}` : "Start an episode", key("T"));
     this.#rec.disabled = saving;
     this.#rec.classList.toggle("on", Boolean(running));
@@ -76,17 +78,20 @@ export class Episodes {
     const now = running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
     write(this.#says, problem || now);
     this.#says.classList.toggle("bad", Boolean(problem));
-    if (!first) this.#tell(before, notices !== before.notices && notice);
+    this.#tell(before);
     this.#fill();
   }
 
   // Say what has changed, also by other people.
-  #tell(before, notice) {
-    const { running, problem } = this.#state;
-    if (problem && problem !== before.problem) this.toast(problem);
-    else if (notice) this.toast(notice);
-    else if (running?.left != null && before.running?.left == null) this.toast(this.#says.textContent);
-    else if (running && running.number !== before.running?.number) this.toast(`Recording episode ${running.number}, by ${running.by}.`);
+  #tell(before) {
+    const { running, problem, notice } = this.#state;
+    const said = this.#notice;
+    this.#notice = notice;
+    if (problem && problem !== before?.problem) this.toast(problem);
+    // Not what happened before this page was loaded.
+    else if (said !== null && notice && notice !== said) this.toast(notice);
+    else if (running?.left != null && before?.running?.left == null) this.toast(this.#says.textContent);
+    else if (running && before && running.number !== before.running?.number) this.toast(`Recording episode ${running.number}, by ${running.by}.`);
   }
 
   // Return whether the key was handled.
@@ -146,7 +151,9 @@ export class Episodes {
     const answer = await fetch("api/v1/episodes");
     if (!answer.ok) return (this.#listed = -1);
     const { episodes, discarded, unreadable, folder } = await answer.json();
-    const kept = document.activeElement?.closest("#episodes ol [data-key]")?.dataset.key;
+    /** @type {HTMLElement | null} */
+    const focused = document.activeElement?.closest("#episodes ol [data-key]");
+    const kept = focused?.dataset.key;
     this.#list.replaceChildren(...episodes.reverse().map((each) => this.#row(each)), ...discarded.reverse().map((each) => this.#gone(each)));
     this.#list.querySelector(`[data-key="${kept}"]`)?.focus();
     const wrong = unreadable.length ? ` ${unreadable.join(" ")}` : "";

@@ -108,12 +108,12 @@ class EpisodeKeeper:
         self._retry_at = float("inf")
         self._saving = False
         self._undoable: UndoableJudgement | None = None
-        self._notices: list[str] = []
+        self._notice = ""
         self._problem = ""
         self._revision = 0
         self._task = ""
         for said in finish_interrupted(folder):
-            self._notices.append(said)
+            self._notice = said
         self._hold_interrupted()
 
     # The state for the pages
@@ -149,8 +149,7 @@ class EpisodeKeeper:
             if undo is None
             else {"number": undo.number, "discarded": undo.before is None},
             "problem": self._problem or (self._ring.problem if marker is not None else ""),
-            "notice": self._notices[-1] if self._notices else "",
-            "notices": len(self._notices),
+            "notice": self._notice,
         }
         if marker is not None and marker.episode.end is None:
             episode = marker.episode
@@ -185,7 +184,7 @@ class EpisodeKeeper:
         with self._changed:
             self._revision += 1
             if notice:
-                self._notices.append(notice)
+                self._notice = notice
             self._changed.notify_all()
 
     # Requests

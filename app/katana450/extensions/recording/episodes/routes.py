@@ -52,6 +52,7 @@ class EpisodeRoutes:
         self._folder, self._port = folder, port
         self._read = EpisodeFolder(folder)
         self._waiting = 0
+        self._listing = asyncio.Lock()
 
     def routes(self) -> list[BaseRoute]:
         """Return all routes."""
@@ -64,7 +65,8 @@ class EpisodeRoutes:
     async def _list(self, request: Request) -> Response:
         """Return all episodes, and the state of the one that runs."""
         self._context.identity(request)
-        return JSONResponse(await asyncio.to_thread(self._listed))
+        async with self._listing:
+            return JSONResponse(await asyncio.to_thread(self._listed))
 
     def _listed(self) -> dict[str, Any]:
         return {

@@ -6,7 +6,6 @@ take half a minute.
 
 from __future__ import annotations
 
-import shutil
 import struct
 import zlib
 from collections.abc import Iterable
@@ -57,47 +56,32 @@ def append_message(path: Path, message: Message) -> None:
             summary = reader.get_summary()
             if summary is None or summary.statistics is None:
                 raise InputError(f"{path} has no index, so it is no whole recording.")
-            data_bytes = _data_bytes(path, file)
-            write_files({path: lambda out: _write(file, data_bytes, summary, message, out)})
+            data = _data(path, file)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+    write_files({path: lambda out: _write(out, data, summary, message)})
 
 
-def _data_bytes(path: Path, file: BinaryIO) -> int:
-    """Return the length of the part before the summary, without the record that ends it."""
+def _data(path: Path, file: BinaryIO) -> bytes:
+    """Return the part of ``file`` before the summary, without the record that ends it."""
     file.seek(-(FOOTER.size + len(MAGIC)), 2)
     opcode, _, summary_start, _, _ = FOOTER.unpack(file.read(FOOTER.size))
     length = summary_start - DATA_END_BYTES
     file.seek(max(length, 0))
     if opcode != Opcode.FOOTER or file.read(1) != bytes([Opcode.DATA_END]):
         raise InputError(f"{path} is damaged: its data has no end.")
-    return int(length)
-
-
-def _write(
-    file: BinaryIO, data_bytes: int, summary: Summary, message: Message, out: BinaryIO
-) -> None:
-    """Write the data of ``file``, ``message`` and the index of both."""
     file.seek(0)
-    shutil.copyfileobj(_Part(file, data_bytes), out, 1 << 20)
+    return file.read(length)
+
+
+def _write(out: BinaryIO, data: bytes, summary: Summary, message: Message) -> None:
+    """Write ``data``, ``message`` and the index of both."""
+    out.write(data)
     channel = next(each.id for each in summary.channels.values() if each.topic == message.topic)
     _write_chunk(out, summary, channel, message)
     _add_to_statistics(summary, channel, message)
     _write_records(out, [DataEnd(0)])
     _write_summary(out, summary)
-
-
-class _Part:
-    """The next ``left`` bytes of a file."""
-
-    def __init__(self, file: BinaryIO, left: int) -> None:
-        self._file, self._left = file, left
-
-    def read(self, size: int = -1) -> bytes:
-        """Return the next bytes, up to ``size``."""
-        found = self._file.read(self._left if size < 0 else min(size, self._left))
-        self._left -= len(found)
-        return found
 
 
 def _write_chunk(out: BinaryIO, summary: Summary, channel: int, message: Message) -> None:
