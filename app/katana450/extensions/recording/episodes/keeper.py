@@ -131,7 +131,7 @@ class EpisodeKeeper:
 
     @property
     def active(self) -> bool:
-        """Whether the state changes by itself, because an episode runs or can be undone."""
+        """True if the state changes by itself, because an episode runs or can be undone."""
         return self._marker is not None or self._undo() is not None
 
     def status(self) -> dict[str, Any]:
