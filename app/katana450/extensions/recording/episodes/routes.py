@@ -6,6 +6,7 @@ import asyncio
 import json
 import threading
 import time
+import weakref
 from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
@@ -146,19 +147,26 @@ def described(kept: KeptEpisode) -> dict[str, Any]:
 
 def follow_episodes(hub: Hub, folder: Path, port: int) -> threading.Thread:
     """Show the state of the episodes to all pages of ``hub``, in a thread of its own."""
+    # The thread waits when this process ends, and must not keep the hub then.
+    shown = weakref.ref(hub)
+
+    def show(state: Any) -> None:
+        found = shown()
+        if found is not None:
+            found.shown = {**found.shown, ENTRY: state}
 
     def follow() -> None:
         while True:
             try:
                 connection = connect_to_episodes(folder, port)
             except InputError:
-                hub.shown = {**hub.shown, ENTRY: None}
+                show(None)
                 time.sleep(RECONNECT_SECONDS)
                 continue
             try:
                 connection.send_bytes(json.dumps({"watch": True}).encode())
                 while True:
-                    hub.shown = {**hub.shown, ENTRY: json.loads(connection.recv_bytes())}
+                    show(json.loads(connection.recv_bytes()))
             except (OSError, EOFError, ValueError):
                 connection.close()
 
