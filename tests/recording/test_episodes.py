@@ -233,6 +233,9 @@ def test_discarded_episodes_come_back_and_numbers_are_not_used_twice(bench: Benc
     again = bench.ask(do="rerecord")
     assert again["number"] == 4
     bench.move(40)
+    # The one before comes back, while its next attempt runs.
+    bench.ask(do="undo")
+    bench.ask(do="discard", number=3)
     bench.ask(do="stop", outcome="success")
     assert [each.episode.number for each in bench.folder.kept()] == [1, 4]
     assert [each.episode.number for each in bench.folder.discarded()] == [2, 3]

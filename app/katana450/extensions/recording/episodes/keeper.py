@@ -250,7 +250,7 @@ class EpisodeKeeper:
             self._folder.unmark(number)
             self._ring.held = None
             raise InputError(problem)
-        self._marker, self._task, self._undoable = marker, episode.task, None
+        self._marker, self._task = marker, episode.task
         return episode
 
     def _stop(self, outcome: EpisodeOutcome, t: float) -> Episode:

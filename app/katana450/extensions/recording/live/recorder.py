@@ -6,6 +6,7 @@ It imports little until the server has started, and the arm's process keeps the 
 from __future__ import annotations
 
 import logging
+import sys
 import time
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -28,6 +29,9 @@ START_DELAY = 3.0
 SYNC_INTERVAL = 1.0
 """[s] Maximum age of what a crash of the machine loses."""
 
+SWITCH_INTERVAL = 0.001
+"""[s] Time after which a busy thread lets another one run."""
+
 log = logging.getLogger(__name__)
 
 
@@ -49,6 +53,8 @@ class RecorderConfig:
 def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
     """Record in this process, from start to end. Raises KatanaError."""
     facts = config.facts
+    # So that ticks are received at once while another thread cuts out a long episode.
+    sys.setswitchinterval(SWITCH_INTERVAL)
     supervisor.report(READY)
     try:
         pipe = connected_to_ticks(facts.address, supervisor.ended)
