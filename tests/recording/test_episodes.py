@@ -34,6 +34,7 @@ from katana450.extensions.recording.episodes.episode_file import (
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episode_files
 from katana450.extensions.recording.episodes.episode_requests import episode_request
 from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
+from katana450.extensions.recording.episodes.undoable_judgement import UNDO_SECONDS
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.live import ring as ring_module
@@ -210,7 +211,7 @@ def test_episode_is_begun_judged_and_undone(bench: Bench) -> None:
     bench.ask(do="undo")
     assert bench.folder.find(1).episode.outcome is EpisodeOutcome.UNJUDGED
     bench.ask(do="judge", outcome="failure")
-    bench.t += keeper_module.UNDO_SECONDS
+    bench.t += UNDO_SECONDS
     assert bench.keeper.status()["undo"] is None
     with pytest.raises(InputError, match="nothing to undo"):
         bench.ask(do="undo")
@@ -289,6 +290,20 @@ def test_episode_longer_than_the_ring_is_whole(
     assert len(list(bench.ring_folder.glob("*.mcap"))) <= ring_module.MAX_FILES
 
 
+def test_episode_without_any_motion_is_not_kept(bench: Bench) -> None:
+    for request in ("judge", "discard", "rerecord"):
+        with pytest.raises(InputError, match="no episode yet"):
+            bench.ask(do=request, **({"outcome": "success"} if request == "judge" else {}))
+    bench.ask(do="start", task="pour")
+    with pytest.raises(InputError, match="has not moved"):
+        bench.ask(do="stop")
+    assert bench.folder.count() == 0
+    assert not bench.folder.markers()
+    bench.ask(do="start")
+    bench.move(40)
+    assert bench.ask(do="stop")["task"] == "pour"
+
+
 def test_episode_ends_by_itself_at_the_maximum(bench: Bench) -> None:
     bench.ask(do="start", task="long")
     bench.move(60)
@@ -310,8 +325,11 @@ def test_full_disk_is_reported_and_the_episode_saved_later(
     blocked = bench.folder.path(1)
     blocked.mkdir()
     with pytest.raises(InputError, match="not saved yet"):
-        bench.ask(do="stop", outcome="success")
+        bench.ask(do="judge", outcome="success")
     assert "not saved yet" in bench.keeper.status()["problem"]
+    # No other episode is meant.
+    with pytest.raises(InputError, match="not saved yet"):
+        bench.ask(do="judge", outcome="failure")
     assert bench.ring.held is not None
     blocked.rmdir()
     monkeypatch.setattr(keeper_module, "RETRY_SECONDS", 0.0)

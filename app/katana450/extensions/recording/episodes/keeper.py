@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,10 @@ from katana450.extensions.recording.episodes.interrupted import (
     cut_out,
     finish_interrupted,
 )
+from katana450.extensions.recording.episodes.undoable_judgement import (
+    UNDO_SECONDS,
+    UndoableJudgement,
+)
 from katana450.extensions.recording.live.ring import Ring
 
 MAX_SECONDS = 3600.0
@@ -47,9 +51,6 @@ MAX_SECONDS = 3600.0
 
 WARNING_SECONDS = 300.0
 """[s] Time before the maximum from which the page says how much is left."""
-
-UNDO_SECONDS = 10.0
-"""[s] Time in which the last judgement can be undone."""
 
 LATE_SECONDS = 0.3
 """[s] Time without a tick after which all ticks until the end of an episode have arrived."""
@@ -61,21 +62,6 @@ RETRY_SECONDS = 5.0
 """[s] Time after which an episode that could not be saved is saved again."""
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class UndoableJudgement:
-    """The last judgement, which can be undone until ``until`` [s]: the outcome before, or None.
-
-    Attributes:
-        number: the episode.
-        before: its outcome before; None if it was discarded.
-        until: time [s] from which it cannot be undone any more.
-    """
-
-    number: int
-    before: EpisodeOutcome | None
-    until: float
 
 
 class EpisodeKeeper:
@@ -310,28 +296,42 @@ class EpisodeKeeper:
         firsts = [each.first for each in self._folder.markers() if each.ring == self._ring_folder]
         self._ring.held = min(firsts, default=None)
 
-    def _last(self, number: int | None, t: float) -> Episode:
-        """Return the episode of ``number``; for None the one that runs, ended, or the last one."""
-        if number is None and self._marker is not None and self._marker.episode.end is None:
-            return self._stop(EpisodeOutcome.UNJUDGED, t)
-        if number is None:
-            kept = self._folder.last()
-            if kept is None:
-                raise InputError("There is no episode yet.")
-            return kept.episode
-        if self._marker is not None and self._marker.episode.number == number:
-            return self._stop(EpisodeOutcome.UNJUDGED, t)
-        return self._folder.find(number).episode
+    def _runs(self, number: int | None) -> bool:
+        """Return whether the episode of ``number``, or for None any one, runs.
+
+        Raises InputError for one that has ended and could not be saved yet.
+        """
+        marker = self._marker
+        if marker is None or number not in (None, marker.episode.number):
+            return False
+        if marker.episode.end is not None:
+            raise InputError(self._problem)
+        return True
+
+    def _last(self, number: int | None) -> Episode:
+        """Return the episode of ``number``; for None the last one."""
+        if number is not None:
+            return self._folder.find(number).episode
+        kept = self._folder.last()
+        if kept is None:
+            raise InputError("There is no episode yet.")
+        return kept.episode
 
     def _judge(self, number: int | None, outcome: EpisodeOutcome, t: float) -> Episode:
-        before = self._last(number, t)
-        episode = self._folder.change(before.number, "judged", outcome=outcome)
+        if self._runs(number):
+            # With its outcome, which is kept if it can only be saved later.
+            episode, before = self._stop(outcome, t), EpisodeOutcome.UNJUDGED
+        else:
+            found = self._last(number)
+            episode = self._folder.change(found.number, "judged", outcome=outcome)
+            before = found.outcome
         until = self._clock() + UNDO_SECONDS
-        self._undoable = UndoableJudgement(episode.number, before.outcome, until)
+        self._undoable = UndoableJudgement(episode.number, before, until)
         return episode
 
     def _discard(self, number: int | None, t: float) -> Episode:
-        episode = self._last(number, t)
+        runs = self._runs(number)
+        episode = self._stop(EpisodeOutcome.UNJUDGED, t) if runs else self._last(number)
         self._folder.discard(episode.number)
         until = self._clock() + UNDO_SECONDS
         self._undoable = UndoableJudgement(episode.number, None, until)
