@@ -57,7 +57,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--size",
-        type=_size,
+        type=picture_size,
         default=(1280, 720),
         metavar="WxH",
         help="pixels (default: 1280x720)",
@@ -75,7 +75,8 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _size(text: str) -> tuple[int, int]:
+def picture_size(text: str) -> tuple[int, int]:
+    """Return width and height [px] of ``WxH``. Raises ArgumentTypeError."""
     try:
         width, height = (int(part) for part in text.split("x"))
     except ValueError:

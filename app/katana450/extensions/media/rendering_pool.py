@@ -1,0 +1,136 @@
+"""Pictures of many states, rendered by all cores."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing.connection import wait
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.control.modes import IDLE
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import describe_robot
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.picture import MOVING, Picture, picture
+from katana450.extensions.media.stage import RenderStage
+from katana450.server.view.cameras import camera_pose
+from katana450.server.viser_bridge.presets import FOV, Preset
+from katana450.server.viser_bridge.themes import THEMES, Theme
+from katana450.settings import Settings
+
+Pixels = npt.NDArray[np.uint8]
+
+AHEAD = 4
+"""Number of states for each process that are rendered or wait, so that memory stays bounded."""
+
+
+class Shot(NamedTuple):
+    """The view and size of a picture."""
+
+    preset: Preset
+    size: tuple[int, int]
+    theme: str
+
+    def taken(self, stage: RenderStage, robot: Robot, state: State, rays: int) -> Picture:
+        """Return the picture of ``state`` with ``rays`` per pixel and kind of light."""
+        view = camera_pose(self.preset, robot.require_arm(), state)
+        camera = Camera(view.position, view.target, float(FOV), self.size)
+        theme: Theme = THEMES[self.theme]
+        return picture(stage.items(state), stage.water(state), camera, theme, rays)
+
+
+class RenderingPool:
+    """Processes that render pictures of states. A context: they end with it."""
+
+    def __init__(self, shots: Sequence[Shot], urdf: Path, bare: bool, count: int) -> None:
+        """Start when the first picture is taken.
+
+        Args:
+            shots: the pictures of each state.
+            urdf: file of the robot.
+            bare: whether it has no gripper.
+            count: number of states.
+        """
+        self._workers = max(min(os.cpu_count() or 1, count), 1)
+        # Pictures are independent, so each is rendered on one core.
+        self._pool = ProcessPoolExecutor(
+            self._workers,
+            multiprocessing.get_context("spawn"),
+            _begin,
+            (tuple(shots), urdf, bare),
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def pictures(self, states: Iterable[State]) -> Iterator[tuple[Pixels, ...]]:
+        """Yield the pictures of each of ``states``, in their order."""
+        waiting: deque[Future[tuple[Pixels, ...]]] = deque()
+        for state in states:
+            waiting.append(self._pool.submit(_take, _reduced(state)))
+            if len(waiting) >= AHEAD * self._workers:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+def _reduced(state: State) -> State:
+    """Return ``state`` without invisible parts, to transfer less to other processes."""
+    return replace(state, mode=IDLE, findings=())
+
+
+class _Studio(NamedTuple):
+    """The data of a process that renders pictures."""
+
+    shots: tuple[Shot, ...]
+    robot: Robot
+    stage: RenderStage
+
+
+_studios: list[_Studio] = []
+"""The only entry is set in processes that render pictures."""
+
+
+def _begin(shots: tuple[Shot, ...], urdf: Path, bare: bool) -> None:
+    # Ctrl-C is handled by the process that writes the file.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Processes of a pool would wait for ever for work of a parent that was killed.
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    session: Session
+    robot, session, _ = describe_robot(replace(Settings(), bare=bare), urdf, None)
+    _studios.append(_Studio(shots, robot, RenderStage(robot, session, load_props())))
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def _take(state: State) -> tuple[Pixels, ...]:
+    (studio,) = _studios
+    stage, robot = studio.stage, studio.robot
+    return tuple(shot.taken(stage, robot, state, MOVING).pixels for shot in studio.shots)
