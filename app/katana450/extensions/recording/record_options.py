@@ -6,9 +6,8 @@ import argparse
 import math
 from pathlib import Path
 
+from katana450.extensions.recording.datasets.export_options import add_export_options
 from katana450.extensions.recording.episodes.episode_options import add_episode_options
-
-FORMATS = ("csv", "mcap")
 
 
 def add_record_options(parser: argparse.ArgumentParser) -> None:
@@ -57,20 +56,15 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     verify.add_argument("--json", action="store_true", help="print the result as JSON")
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    export = acts.add_parser("export", help="write a recording for other programs")
-    export.add_argument("file", type=Path, metavar="FILE")
-    export.add_argument(
-        "--format",
-        choices=FORMATS,
-        default=FORMATS[0],
-        help="csv: t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it; "
-        "mcap: a recording (default: %(default)s)",
-    )
     add_episode_options(
         acts.add_parser("episodes", help="record, judge and list the episodes of a server")
     )
+    export = acts.add_parser("export", help="write recordings for other programs")
+    add_export_options(export)
     for each in (trim, export):
-        each.add_argument("--out", type=Path, required=True, metavar="FILE", help="new file")
+        each.add_argument(
+            "--out", type=Path, required=True, metavar="FILE", help="new file or folder"
+        )
         each.add_argument(
             "--from",
             dest="start",

@@ -13,6 +13,7 @@ import msgspec
 
 from katana450.assembly.log_lines import printable
 from katana450.errors import InputError, KatanaError
+from katana450.extensions.recording.datasets.export_command import check_options, export
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_command import episodes
 from katana450.extensions.recording.episodes.episode_file import episodes_in
@@ -20,7 +21,6 @@ from katana450.extensions.recording.files.fingerprint import differences
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
-from katana450.extensions.recording.files.table import write_csv
 from katana450.extensions.recording.files.trimming import Trimmed, trim
 from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.places import recordings_in
@@ -161,12 +161,10 @@ def _written(out: Path, found: Trimmed) -> int:
 
 
 def _export(options: Namespace) -> int:
+    check_options(options)
     if options.format == "mcap":
-        return _trim([options.file], options.out, options.start, options.end)
-    with RecordingFile.open(options.file) as file:
-        first = file.start
-        count = write_csv(file, options.out, first + options.start, first + options.end)
-    print(f"{options.out}: {count} rows.")
+        return _trim(options.files, options.out, options.start, options.end)
+    print(printable(f"{options.out}: {export(options)}."))
     return 0
 
 

@@ -73,27 +73,37 @@ def columns(
     return table
 
 
-def write_csv(
-    file: RecordingFile, out: Path, start: float = -math.inf, end: float = math.inf
-) -> int:
-    """Write the setpoints as a CSV file and return the number of its rows.
+def setpoint_table(
+    file: RecordingFile, start: float = -math.inf, end: float = math.inf
+) -> dict[str, FloatArray]:
+    """Return the setpoints as columns (N,) by their names.
 
-    The columns are ``t`` [s] from 0, ``theta1`` and so on [rad or m], and for an arm ``gripper``
-    [rad or m]. Their 17 digits are exact. Raises InputError.
+    These are ``t`` [s] from 0, which increases, ``theta1`` and so on [rad or m], and for an arm
+    ``gripper`` [rad or m]. Raises InputError.
     """
     table = columns(file, start, end)
     t, q = table["t"], table["setpoint"]
     # An extra tick for a STOP can have the time of the tick before.
     later = np.concatenate(([True], np.diff(t) > 0.0))
-    kept = [t[later] - t[0], *q[later].T]
-    names = ["t", *(f"theta{axis}" for axis in range(1, q.shape[1] + 1))]
+    found = {"t": t[later] - t[0]}
+    found.update({f"theta{axis}": row for axis, row in enumerate(q[later].T, start=1)})
     if "position" in table:
-        kept.append(table["gripper_setpoint"][later])
-        names.append("gripper")
+        found["gripper"] = table["gripper_setpoint"][later]
+    return found
+
+
+def write_csv(
+    file: RecordingFile, out: Path, start: float = -math.inf, end: float = math.inf
+) -> int:
+    """Write ``setpoint_table`` as a CSV file and return the number of its rows.
+
+    Its 17 digits are exact. Raises InputError.
+    """
+    table = setpoint_table(file, start, end)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    lines = np.stack(kept, axis=1)
+    writer.writerow(table)
+    lines = np.stack(list(table.values()), axis=1)
     writer.writerows([f"{value:.17g}" for value in line] for line in lines.tolist())
     write_files({out: writer_of(text.getvalue().encode())})
     return len(lines)

@@ -1,0 +1,158 @@
+"""Episodes of recordings: which part of which file is an episode of a dataset, and its label.
+
+Messages of episodes describe an episode completely; the last one of each number counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from katana450.errors import InputError
+from katana450.extensions.recording.files.checking import MissingMessage
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.topics import COMMANDS, EPISODES
+
+SUCCESS, FAILURE, UNJUDGED, UNFINISHED = "success", "failure", "unjudged", "unfinished"
+OUTCOMES = (SUCCESS, FAILURE, UNJUDGED, UNFINISHED)
+"""Outcomes of episodes that can be exported."""
+
+JUDGED = (SUCCESS, FAILURE)
+"""Outcomes that are exported unless others are asked for."""
+
+EPISODE_FILES = "episode-*.mcap"
+"""Pattern of the episodes in a folder. Those that were discarded are in a folder below it."""
+
+IDENTITY = ("robot", "urdf_sha256", "settings")
+"""Metadata that are the same in all recordings of one robot."""
+
+
+class EpisodeLabel(msgspec.Struct):
+    """Content of a message of the topic of episodes, as far as a dataset needs it."""
+
+    number: int
+    task: str
+    begin: float
+    end: float | None
+    outcome: str
+
+
+@dataclass(frozen=True)
+class EpisodeCut:
+    """A part of a recording that is an episode of a dataset.
+
+    Attributes:
+        path: the recording.
+        start, end: the part, on the clock of the recording [s].
+        task: what was to be done, in words.
+        success: whether it was done; None if nobody has judged that.
+    """
+
+    path: Path
+    start: float
+    end: float
+    task: str
+    success: bool | None
+
+    def __str__(self) -> str:
+        return f"{self.path} from {self.start:.3f} to {self.end:.3f} s"
+
+
+def files_of(paths: Sequence[Path]) -> list[Path]:
+    """Return the recordings that ``paths`` name: files, and folders of episodes by their numbers.
+
+    Raises InputError for a folder without episodes.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if not path.is_dir():
+            found.append(path)
+            continue
+        inside = sorted(path.glob(EPISODE_FILES), key=lambda each: (len(each.name), each.name))
+        if not inside:
+            raise InputError(f"{path} has no episodes: its files would be {EPISODE_FILES}.")
+        found += inside
+    return found
+
+
+def labels_of(file: RecordingFile) -> list[EpisodeLabel]:
+    """Return the episodes that ``file`` names, in their order. Raises InputError."""
+    labels: dict[int, EpisodeLabel] = {}
+    for message in file.messages(EPISODES):
+        try:
+            label = msgspec.json.decode(message.data, type=EpisodeLabel)
+        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            raise InputError(
+                f"{file.path} is damaged: the episode at t = {message.t:.3f} s is wrong ({error})."
+            ) from error
+        labels[label.number] = label
+    return [labels[number] for number in sorted(labels)]
+
+
+def episodes_in(
+    file: RecordingFile, task: str, outcomes: Collection[str], part: tuple[float, float]
+) -> Iterator[EpisodeCut]:
+    """Yield the episodes of ``file`` with one of ``outcomes``; without any, the ``part`` of it.
+
+    Args:
+        file: the recording.
+        task: task of an episode that has none.
+        outcomes: outcomes of the episodes to return; a recording without episodes has none.
+        part: begin and end of an episode that is the recording, in seconds after its begin.
+
+    Raises:
+        InputError: an episode has no task, or a part is asked for of a recording with episodes.
+    """
+    labels = labels_of(file)
+    if not labels:
+        start, end = (min(file.start + each, file.end) for each in part)
+        yield EpisodeCut(file.path, start, end, _task(task, file), None)
+        return
+    if part[0] > 0.0 or file.start + part[1] < file.end:
+        raise InputError(
+            f"{file.path} has {len(labels)} episodes. --from and --to cut recordings without "
+            "episodes only."
+        )
+    for label in labels:
+        if label.outcome in outcomes and label.end is not None:
+            success = label.outcome == SUCCESS if label.outcome in JUDGED else None
+            task_text = _task(label.task or task, file, label.number)
+            yield EpisodeCut(file.path, label.begin, label.end, task_text, success)
+
+
+def _task(task: str, file: RecordingFile, number: int | None = None) -> str:
+    text = " ".join(task.split())
+    if not text:
+        named = f"{file.path}" if number is None else f"Episode {number} of {file.path}"
+        raise InputError(f"{named} has no task, which a dataset needs. Name it by --task.")
+    return text
+
+
+def check_without_gaps(file: RecordingFile, cut: EpisodeCut) -> None:
+    """Raise InputError if the recording of ``cut`` lacks ticks."""
+    for message in file.messages(COMMANDS, start=cut.start, end=cut.end):
+        if b'"missing"' not in message.data:
+            continue
+        try:
+            found = msgspec.json.decode(message.data, type=MissingMessage)
+        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            raise InputError(f"{cut} is damaged: {error}.") from error
+        if found.missing is not None:
+            raise InputError(
+                f"{cut} has a gap: {found.ticks} ticks are missing until t = {message.t:.3f} s "
+                f"({found.missing}). Leave this file out, or cut out a part without gaps by "
+                "`katana450 record trim`."
+            )
+
+
+def check_same_robot(first: RecordingFile, other: RecordingFile) -> None:
+    """Raise InputError unless ``other`` is of the robot, tool and settings of ``first``."""
+    for name in IDENTITY:
+        if first.metadata.get(name) != other.metadata.get(name):
+            raise InputError(
+                f"{other.path} is not of the same robot, tool and settings as {first.path}: their "
+                f"{name} differs. A dataset has one robot; export them to several."
+            )

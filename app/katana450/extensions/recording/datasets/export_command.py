@@ -1,0 +1,142 @@
+"""``katana450 record export``: recordings as files for other programs."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.errors import InputError
+from katana450.extensions.recording.datasets.episode_cuts import JUDGED, files_of
+from katana450.extensions.recording.datasets.export_options import (
+    DEFAULT_FPS,
+    DEFAULT_SIZES,
+    OPTION_NAMES,
+    USED,
+)
+from katana450.extensions.recording.datasets.lerobot_export import (
+    Exported,
+    LerobotOptions,
+    export_lerobot,
+)
+from katana450.extensions.recording.datasets.parquet_table import write_parquet
+from katana450.extensions.recording.datasets.ros_bag import write_bag
+from katana450.extensions.recording.datasets.sampling import frame_times
+from katana450.extensions.recording.files.checking import session_for
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.table import write_csv
+from katana450.extensions.recording.files.trimming import trim
+
+
+def check_options(options: argparse.Namespace) -> None:
+    """Raise InputError for an option that the format does not have."""
+    for name, formats in USED.items():
+        if getattr(options, name) is not None and options.format not in formats:
+            option = OPTION_NAMES.get(name, f"--{name}")
+            raise InputError(
+                f"{options.format} has no {option}. Use it with {' or '.join(formats)}."
+            )
+
+
+def export(options: argparse.Namespace) -> object:
+    """Write the file or folder; return what it has, in words. Raises KatanaError."""
+    if options.format == "lerobot":
+        return _lerobot(options)
+    with _joined(options.files) as file:
+        start, end = file.start + options.start, min(file.start + options.end, file.end)
+        if start > end:
+            raise InputError(
+                f"There is nothing from {options.start:g} to {options.end:g} s; the recording has "
+                f"{file.end - file.start:.1f} s."
+            )
+        return _exported(options, file, start, end)
+
+
+def _exported(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
+    """Write the part of ``file`` from ``start`` to ``end`` [s]; return what was written."""
+    out: Path = options.out
+    match options.format:
+        case "csv":
+            return f"{write_csv(file, out, start, end)} rows"
+        case "parquet":
+            return f"{write_parquet(file, out, start, end)} rows"
+        case "rosbag2":
+            return f"{write_bag(file, out, start, end)} messages"
+        case "html":
+            return _page(options, file, start, end)
+    return _film(options, file, start, end)
+
+
+def _page(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
+    from katana450.extensions.export.page import FPS
+    from katana450.extensions.recording.datasets.player_files import write_page_of
+
+    times = frame_times(start, end, int(FPS))
+    count = write_page_of(file, options.out, times, _robot(file, options.urdf))
+    return f"{count} states"
+
+
+def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
+    from katana450.extensions.recording.datasets.player_files import (
+        PictureViews,
+        is_bare,
+        write_film_of,
+    )
+
+    views = options.views or ["free"]
+    if len(views) > 1:
+        raise InputError(f"A film has one view, not {len(views)}. Export one film for each.")
+    size = options.size or DEFAULT_SIZES["mp4"]
+    fps = DEFAULT_FPS["mp4"] if options.fps is None else options.fps
+    pictures = PictureViews(views, size, options.urdf, is_bare(file))
+    robot = _robot(file, options.urdf)
+    count = write_film_of(file, options.out, (start, end), fps, robot, pictures, size)
+    return f"{count} pictures"
+
+
+def _lerobot(options: argparse.Namespace) -> Exported:
+    views = tuple(dict.fromkeys(options.views or ()))
+    size = options.size or DEFAULT_SIZES["lerobot"]
+    asked = LerobotOptions(
+        fps=DEFAULT_FPS["lerobot"] if options.fps is None else options.fps,
+        task=options.task or "",
+        outcomes=options.outcomes or JUDGED,
+        part=(options.start, options.end),
+        views=views,
+        size=size,
+    )
+    if len(options.files) > 1 and asked.part != (0.0, math.inf):
+        raise InputError("--from and --to cut one recording; trim several one by one before.")
+    if not views:
+        return export_lerobot(options.files, options.out, asked)
+    from katana450.extensions.media.film import check_filmable
+    from katana450.extensions.recording.datasets.player_files import PictureViews, is_bare
+
+    check_filmable(size, asked.fps)
+    with RecordingFile.open(files_of(options.files)[0]) as first:
+        robot = _robot(first, options.urdf)
+        robot.robot.require_arm()
+        pictures = PictureViews(views, size, options.urdf, is_bare(first))
+    return export_lerobot(options.files, options.out, asked, robot.session, pictures.pictures)
+
+
+def _robot(file: RecordingFile, urdf: Path | None) -> DescribedRobot:
+    return session_for(file, urdf)
+
+
+@contextmanager
+def _joined(paths: Sequence[Path]) -> Iterator[RecordingFile]:
+    """Yield the recording of ``paths``; several of one run are joined."""
+    if len(paths) == 1:
+        with RecordingFile.open(paths[0]) as file:
+            yield file
+        return
+    with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
+        path = Path(folder) / paths[0].name
+        trim(paths, path, -math.inf, math.inf)
+        with RecordingFile.open(path) as file:
+            yield file

@@ -1,0 +1,125 @@
+"""Recordings as pages that play them, and as films."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.control.state import State
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.atomic import check_writable, write_files, writer_of
+from katana450.errors import InputError
+from katana450.extensions.export.page import FPS
+from katana450.extensions.export.recorded import recorded
+from katana450.extensions.media.film import check_filmable, write_film
+from katana450.extensions.media.rendering_pool import RenderingPool, Shot
+from katana450.extensions.media.tracer import check_traceable
+from katana450.extensions.progress import progress
+from katana450.extensions.recording.datasets.recorded_states import RecordedStates
+from katana450.extensions.recording.datasets.sampling import frame_times
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.resources import URDF_PATH
+from katana450.server.viser_bridge.presets import Preset
+
+THEME = "Light"
+"""Theme of pictures, as of the page."""
+
+PAGE_SUFFIXES = (".html", ".htm")
+FILM_SUFFIX = ".mp4"
+
+
+class PictureViews:
+    """Renders the pictures of views of one robot."""
+
+    def __init__(
+        self, views: Sequence[str], size: tuple[int, int], urdf: Path | None, bare: bool
+    ) -> None:
+        """Take pictures of ``size`` [px]. Raises ConfigurationError without the renderer.
+
+        Args:
+            views: names of the cameras.
+            size: width and height [px].
+            urdf: file of the robot; None for the one of this program.
+            bare: whether it has no gripper.
+        """
+        check_traceable()
+        self._shots = [Shot(Preset[view.upper()], size, THEME) for view in views]
+        self._urdf, self._bare = URDF_PATH if urdf is None else urdf, bare
+
+    @contextmanager
+    def pictures(
+        self, states: Iterator[State], count: int
+    ) -> Iterator[Iterator[tuple[npt.NDArray[np.uint8], ...]]]:
+        """Yield the pictures of all views for each of the ``count`` states."""
+        with RenderingPool(self._shots, self._urdf, self._bare, count) as pool:
+            yield pool.pictures(states)
+
+
+def is_bare(file: RecordingFile) -> bool:
+    """Return whether ``file`` is of an arm without gripper. Raises InputError."""
+    try:
+        return bool(json.loads(file.metadata.get("settings", ""))["bare"])
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError(f"{file.path} does not state the settings of its session.") from error
+
+
+def write_page_of(file: RecordingFile, out: Path, times: FloatArray, robot: DescribedRobot) -> int:
+    """Write a page that plays ``file`` at ``times`` (N,) [s]; return their number.
+
+    Raises InputError.
+    """
+    if out.suffix.lower() not in PAGE_SUFFIXES:
+        raise InputError(f"{out} must end in .html.")
+    check_writable(out)
+    robot.robot.require_arm()
+    reader = RecordedStates(file, robot.session)
+    states = progress(reader.at(times), len(times), out.name)
+    title = f"{robot.robot.name}: {file.path.stem}"
+    page = recorded(robot.robot, robot.session, states, 1.0 / FPS, title)
+    write_files({out: writer_of(page.encode())})
+    report_unknown(reader)
+    return len(times)
+
+
+def write_film_of(
+    file: RecordingFile,
+    out: Path,
+    part: tuple[float, float],
+    fps: int,
+    robot: DescribedRobot,
+    views: PictureViews,
+    size: tuple[int, int],
+) -> int:
+    """Write a film of the ``part`` [s] of ``file``; return the number of pictures.
+
+    Raises InputError.
+    """
+    if out.suffix.lower() != FILM_SUFFIX:
+        raise InputError(f"{out} must end in {FILM_SUFFIX}.")
+    check_writable(out)
+    check_filmable(size, fps)
+    robot.robot.require_arm()
+    times = frame_times(*part, fps)
+    reader = RecordedStates(file, robot.session)
+    with views.pictures(reader.at(times), len(times)) as taken:
+        pictures = (first for (first,) in taken)
+        count = write_film(out, progress(pictures, len(times), out.name), size, fps)
+    report_unknown(reader)
+    return count
+
+
+def report_unknown(reader: RecordedStates) -> None:
+    """Print how many ticks of ``reader`` could not be simulated, if any."""
+    if reader.unknown:
+        print(
+            f"katana450: {reader.unknown} ticks cannot be simulated. Joints are as recorded; "
+            "objects and water hold still there.",
+            file=sys.stderr,
+        )

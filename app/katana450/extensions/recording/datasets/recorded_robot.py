@@ -1,0 +1,43 @@
+"""The robot of a recording, from the URDF that is attached to it."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+from katana450.arm.robot.bare import bare
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
+from katana450.errors import InputError
+from katana450.extensions.recording.files.header import Attachment
+from katana450.extensions.recording.files.recording_file import RecordingFile
+
+
+def attached_urdf(file: RecordingFile) -> Attachment:
+    """Return the URDF of ``file``. Raises InputError without one."""
+    name = file.metadata.get("urdf")
+    for each in file.attachments():
+        if each.name == name:
+            return each
+    raise InputError(f"{file.path} has no URDF attached, so the names of its joints are unknown.")
+
+
+def recorded_robot(file: RecordingFile) -> Robot:
+    """Return the robot of ``file``: links and joints, without meshes.
+
+    Raises InputError or RobotDescriptionError if its description is missing or invalid.
+    """
+    urdf = attached_urdf(file)
+    try:
+        used = json.loads(file.metadata.get("settings", ""))
+        tool, without_gripper = used["tool"], bool(used["bare"])
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError(f"{file.path} does not state the settings of its session.") from error
+    # The name comes from the file, so it must not lead out of the folder.
+    name = PureWindowsPath(PurePosixPath(urdf.name).name).name or "robot.urdf"
+    with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
+        path = Path(folder) / name
+        path.write_bytes(urdf.data)
+        robot = load(path, None if tool is None else str(tool))
+        return bare(robot) if without_gripper else robot

@@ -1,0 +1,58 @@
+"""Resampling of recorded states onto the frames of a dataset."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray
+
+MIN_FPS, MAX_FPS = 1, 100
+"""[Hz] Range of frames per second: more than the recorded ticks would only repeat them."""
+
+TICK = 0.01
+"""[s] Time between two ticks of the control loop."""
+
+MAX_STEP = 2.5 * TICK
+"""[s] Maximum time between two states of a motion; within more the arm rests."""
+
+ROUNDING = 1e-6
+"""[1] Fraction of a frame by which an episode may be too short for its last frame."""
+
+
+def check_fps(fps: int) -> None:
+    """Raise InputError unless a dataset can have ``fps`` frames per second."""
+    if not MIN_FPS <= fps <= MAX_FPS:
+        raise InputError(
+            f"A dataset must have {MIN_FPS} to {MAX_FPS} frames per second, not {fps}; the arm is "
+            f"recorded {MAX_FPS} times a second."
+        )
+
+
+def frame_times(start: float, end: float, fps: int) -> FloatArray:
+    """Return the times (N,) [s] of the frames from ``start`` to ``end``, 1 / ``fps`` apart."""
+    count = max(math.floor((end - start) * fps + ROUNDING) + 1, 0)
+    return start + np.arange(count) / fps
+
+
+def sampled(t: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
+    """Return the values at ``times`` (N,) [s] of states at ``t`` (M,), which do not decrease.
+
+    Values between two ticks of a motion are interpolated. A state without a successor holds, as the
+    arm rests then, until a tick before the next one. Before the first state, that one is returned.
+
+    Args:
+        t: times of the states [s].
+        values: their values, (M,) or (M, n).
+        times: times to sample at [s].
+    """
+    at = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
+    after = np.minimum(at + 1, len(t) - 1)
+    begin, end = t[at], t[after]
+    begin = np.where(end - begin > MAX_STEP, end - TICK, begin)
+    length = end - begin
+    fraction = np.divide(times - begin, length, out=np.zeros(len(times)), where=length > 0.0)
+    fraction = np.clip(fraction, 0.0, 1.0).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values[at] + fraction * (values[after] - values[at]))
