@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LOADED_ON_USE = ("distributed", "imageio_ffmpeg", "matplotlib", "xacro")
-NOT_LOCKED = ("hypothesis", "mypy", "playwright", "pytest")
+NOT_LOCKED = ("hypothesis", "mypy", "playwright", "pyarrow", "pytest")
 MOTION = "t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n0.5,1,-1.19,1.48,0.14\n"
 MAP = ("--voxel", "150", "--pitches", "4", "--rolls", "4", "--samples", "30", "--seed", "2")
 

@@ -12,6 +12,9 @@ from katana450.extensions.recording.files.recording_file import Message, Recordi
 from katana450.extensions.recording.topics import COMMANDS, EPISODES
 from tests.recording.recorded import record
 
+BEGIN = 0.25
+"""[s] Begin of the episodes after that of their recordings."""
+
 BY = {"name": "Ada", "role": "operator", "key": "0a1b2c3d4e5f"}
 
 
@@ -69,7 +72,7 @@ def episode_folder(folder: Path, seeds: Mapping[str, int]) -> Path:
         name = f"episode-{number:04d}.mcap"
         with RecordingFile.open(run) as file:
             earlier = episode(file, number, "unjudged", "an older task")
-            last = episode(file, number, outcome, part=(0.25, 1.0 + 0.1 * number))
+            last = episode(file, number, outcome, part=(BEGIN, 1.0 + 0.1 * number))
             write_copy(run, folder / name, [earlier, last])
             if number == 1:
                 write_copy(run, folder / "discarded" / "episode-0099.mcap", [last])

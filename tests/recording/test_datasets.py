@@ -206,6 +206,9 @@ def test_odd_input_is_refused(
         short = write_copy(
             run, tmp_path / "short.mcap", [episode(file, 1, "success", part=(0.5, 0.51))]
         )
+        far = write_copy(
+            run, tmp_path / "far.mcap", [episode(file, 3, "success", part=(0.5, 1e300))]
+        )
         untold = write_copy(run, tmp_path / "untold.mcap", [episode(file, 1, "success", "")])
         judged = write_copy(run, tmp_path / "judged.mcap", [episode(file, 1, "unjudged")])
     out = tmp_path / "set"
@@ -220,6 +223,7 @@ def test_odd_input_is_refused(
         "the episode at t": (wrong, *lerobot),
         "fewer than 2 frames": (short, *lerobot),
         "Episode 1 of": (untold, *plain),
+        "Episode 3 of": (far, *lerobot),
         "1 to 100 frames per second, not 0": (run, *lerobot, "--fps", "0"),
         "1 to 100 frames per second, not 101": (run, *lerobot, "--fps", "101"),
         "--from and --to cut recordings": (untold, *lerobot, "--from", "1"),

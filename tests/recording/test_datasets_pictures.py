@@ -18,10 +18,12 @@ from imageio_ffmpeg import get_ffmpeg_exe
 
 from katana450.arm.robot.props import load_props
 from katana450.cli.main import main
+from katana450.extensions.media.extension import CAMERAS
 from katana450.extensions.media.picture import MOVING
 from katana450.extensions.media.rendering_pool import Shot
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
+from katana450.extensions.recording.datasets.export_options import VIEWS
 from katana450.extensions.recording.datasets.recorded_states import RecordedStates
 from katana450.extensions.recording.datasets.statistics import QUANTILES, PixelCounts
 from katana450.extensions.recording.files.recording_file import RecordingFile
@@ -67,6 +69,10 @@ def test_video_has_the_episodes_one_after_another(tmp_path: Path) -> None:
     assert shown.shape == (11, HEIGHT, WIDTH, 3)
     # Half of the resolution of colours is lost by the encoding, at the edges of the bar.
     assert np.abs(shown.astype(int) - np.array(pictures)).mean() < 3.0
+
+
+def test_views_are_those_of_pictures() -> None:
+    assert VIEWS == CAMERAS
 
 
 def test_statistics_of_pictures_are_those_of_all_pixels() -> None:

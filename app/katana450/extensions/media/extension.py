@@ -57,7 +57,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--size",
-        type=picture_size,
+        type=_size,
         default=(1280, 720),
         metavar="WxH",
         help="pixels (default: 1280x720)",
@@ -75,8 +75,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def picture_size(text: str) -> tuple[int, int]:
-    """Return width and height [px] of ``WxH``. Raises ArgumentTypeError."""
+def _size(text: str) -> tuple[int, int]:
     try:
         width, height = (int(part) for part in text.split("x"))
     except ValueError:

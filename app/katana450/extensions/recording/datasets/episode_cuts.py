@@ -26,6 +26,9 @@ JUDGED = (SUCCESS, FAILURE)
 EPISODE_FILES = "episode-*.mcap"
 """Pattern of the episodes in a folder. Those that were discarded are in a folder below it."""
 
+MAX_OUTSIDE = 60.0
+"""[s] Maximum time of an episode before and after its recording, in which the arm rests."""
+
 IDENTITY = ("robot", "urdf_sha256", "settings")
 """Metadata that are the same in all recordings of one robot."""
 
@@ -118,6 +121,12 @@ def episodes_in(
         )
     for label in labels:
         if label.outcome in outcomes and label.end is not None:
+            if not file.start - MAX_OUTSIDE <= label.begin < label.end <= file.end + MAX_OUTSIDE:
+                raise InputError(
+                    f"Episode {label.number} of {file.path} is from {label.begin:.3f} to "
+                    f"{label.end:.3f} s, but the recording is from {file.start:.3f} to "
+                    f"{file.end:.3f} s. The file was changed or is damaged."
+                )
             success = label.outcome == SUCCESS if label.outcome in JUDGED else None
             task_text = _task(label.task or task, file, label.number)
             yield EpisodeCut(file.path, label.begin, label.end, task_text, success)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from katana450.extensions.media.extension import CAMERAS, picture_size
-
 FORMATS = {
     "csv": "t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it",
     "mcap": "a recording",
@@ -20,6 +18,12 @@ FORMATS = {
 
 OUTCOMES = ("success", "failure", "unjudged", "unfinished")
 """Outcomes of episodes, of which a dataset takes the first two by default."""
+
+VIEWS = ("free", "front", "side", "top", "tool")
+"""Cameras, as `katana450 render` has them. Without that extension only pictures are missing."""
+
+MIN_SIDE, MAX_SIDE = 16, 4096
+"""[px] Range of width and height of pictures."""
 
 DEFAULT_SIZES = {"lerobot": (320, 240), "mp4": (1280, 720)}
 """Width and height of pictures [px] by format."""
@@ -71,13 +75,13 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         "--view",
         dest="views",
         action="append",
-        choices=CAMERAS,
+        choices=VIEWS,
         help="lerobot: camera whose pictures each frame has, several times for several "
         "(default: none); mp4: camera of the film (default: free)",
     )
     sizes = ", ".join(f"{w}x{h} for {name}" for name, (w, h) in DEFAULT_SIZES.items())
     parser.add_argument(
-        "--size", type=picture_size, metavar="WxH", help=f"pixels of pictures (default: {sizes})"
+        "--size", type=_size, metavar="WxH", help=f"pixels of pictures (default: {sizes})"
     )
     rates = ", ".join(f"{fps} for {name}" for name, fps in DEFAULT_FPS.items())
     parser.add_argument(
@@ -99,3 +103,15 @@ def _outcomes(text: str) -> tuple[str, ...]:
             f"expected some of {', '.join(OUTCOMES)}, separated by commas, not {text!r}"
         )
     return found
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.split("x"))
+    except ValueError:
+        width = height = 0
+    if not (MIN_SIDE <= width <= MAX_SIDE and MIN_SIDE <= height <= MAX_SIDE):
+        raise argparse.ArgumentTypeError(
+            f"expected two numbers from {MIN_SIDE} to {MAX_SIDE}, such as 320x240, not {text!r}"
+        )
+    return width, height
