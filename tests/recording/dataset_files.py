@@ -10,7 +10,7 @@ from typing import Any
 from katana450.extensions.recording.files.copying import RecordingCopy
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.topics import COMMANDS, EPISODES
-from tests.recording.recorded import record
+from tests.recording.recorded import Commands, random_commands, record
 
 BEGIN = 0.25
 """[s] Begin of the episodes after that of their recordings."""
@@ -62,13 +62,15 @@ def episode(
     return {"t": file.end, "kind": "judged", **about, "note": "", "by": BY}
 
 
-def episode_folder(folder: Path, seeds: Mapping[str, int]) -> Path:
+def episode_folder(
+    folder: Path, seeds: Mapping[str, int], commands: Commands = random_commands
+) -> Path:
     """Make a folder of episodes, one for each outcome of ``seeds``, and a discarded one."""
     folder.mkdir()
     (folder / "discarded").mkdir()
     for number, (outcome, seed) in enumerate(seeds.items(), start=1):
         run = folder / f"run-{number}"
-        record(run, 120 + 15 * number, seed)
+        record(run, 120 + 15 * number, seed, commands)
         name = f"episode-{number:04d}.mcap"
         with RecordingFile.open(run) as file:
             earlier = episode(file, number, "unjudged", "an older task")

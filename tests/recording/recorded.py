@@ -33,6 +33,9 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
+Commands = Callable[[np.random.Generator, State, DescribedRobot], Iterator[cmd.Command]]
+"""The commands of the next tick, by the state before it."""
+
 PERIOD = 0.01
 ADA = Actor(Person("session-of-ada/1", "Ada", Role.ADMIN, address="10.0.0.7"), CommandChannel.SCENE)
 FAILING_EVERY = 300
@@ -135,9 +138,7 @@ def run(
     ticks: int,
     seed: int,
     take: Callable[[TickRecord], None],
-    commands: Callable[
-        [np.random.Generator, State, DescribedRobot], Iterator[cmd.Command]
-    ] = random_commands,
+    commands: Commands = random_commands,
     *,
     odd: bool = True,
 ) -> ControlLoop:
@@ -173,8 +174,20 @@ def header(*attachments: Attachment) -> RecordingHeader:
     )
 
 
-def record(path: Path, ticks: int, seed: int = 1) -> list[TickRecord]:
-    """Write a random session to ``path`` and return its records."""
+def swinging(
+    _rng: np.random.Generator, state: State, session: DescribedRobot
+) -> Iterator[cmd.Command]:
+    """Yield a command at each rest, so that the arm swings to and fro."""
+    if state.motion.at_rest:
+        q = session.session.ready.copy()
+        q[0] = 0.8 if state.q[0] <= 0.0 else -0.8
+        yield cmd.SetJoints(q)
+
+
+def record(
+    path: Path, ticks: int, seed: int = 1, commands: Commands = random_commands
+) -> list[TickRecord]:
+    """Write a session, random unless there are other ``commands``, and return its records."""
     records: list[TickRecord] = []
     with path.open("wb") as file:
         writer = RecordingWriter(file, header(Attachment("scene.json", "application/json", b"{}")))
@@ -186,6 +199,6 @@ def record(path: Path, ticks: int, seed: int = 1) -> list[TickRecord]:
                 writer.event(tick.t, "note", {"number": len(records)})
                 writer.flush()
 
-        run(ticks, seed, take)
+        run(ticks, seed, take, commands)
         writer.close()
     return records
