@@ -38,7 +38,12 @@ steps:
 - arc: {centre: corner, axis: z, angle: 20, climb: 5}
 - circle: {centre: [320, 0, 150], normal: x, radius: 20, turns: 2, pitch: roomiest}
 - screw: {point: [300, 0, 150], axis: [0, 0, 1], angle: 10}
+- trajectory:
+    through:
+    - [0, 0, -68, 85, 8, 0]
+    - [0.5, 5, -68, 85, 8, 0]
 - gripper: open
+- gripper: {to: closed, holding: cup}
 - wait: 0.5
 - wait_for: {placed: {object: cup, at: corner}, timeout: 3}
 - tool: grasp
@@ -85,7 +90,9 @@ def everything() -> katana450.ScriptWriter:
         p.arc("corner", "z", 20, climb=5)
         p.circle((320, 0, 150), "x", 20, turns=2, pitch="roomiest")
         p.screw((300, 0, 150), (0, 0, 1), angle=10)
+        p.trajectory([0, 0.5], [[0, -68, 85, 8, 0], [5, -68, 85, 8, 0]])
         p.gripper("open")
+        p.gripper("closed", holding="cup")
         p.wait(np.float64(0.5))
         p.wait_for(placed={"object": "cup", "at": "corner"}, timeout=3)
         p.tool("grasp")

@@ -215,9 +215,17 @@ class ScriptWriter:
         """Move the tool as a rigid body about an axis [deg] and along it [mm]."""
         self._add("screw", {"point": point, "axis": axis, **given(angle=angle, climb=climb)})
 
-    def gripper(self, where: Number) -> None:
-        """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide."""
-        self._add("gripper", where)
+    def trajectory(self, times: Sequence[Number], postures: Sequence[Sequence[Number]]) -> None:
+        """Move through postures of five angles [deg] at times [s], slower where limits require."""
+        rows = zip(times, postures, strict=True)
+        self._add("trajectory", {"through": [[time, *angles] for time, angles in rows]})
+
+    def gripper(self, where: Number, *, holding: str | None = None) -> None:
+        """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide.
+
+        With ``holding`` they must hold this object then.
+        """
+        self._add("gripper", where if holding is None else {"to": where, "holding": holding})
 
     def wait(self, seconds: Number) -> None:
         """Wait [s]."""

@@ -33,6 +33,7 @@ from katana450.extensions.programs.schema_parts import (
 )
 from katana450.extensions.programs.script import MAX_NAME_LENGTH
 from katana450.extensions.programs.settings_steps import MAX_PAUSE
+from katana450.extensions.programs.trajectory import AXES, MAX_POSTURES, MAX_TIME
 from katana450.maths.water.liquid import LIQUIDS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -52,7 +53,16 @@ def _grasp(about: str) -> Schema:
     return any_of(about, OBJECT, fields)
 
 
+FINGERS = number_or_text(
+    -180.0, 180.0, "open, closed, or the angle of the fingers, deg; mm if they slide"
+)
+
 DEFINITIONS: dict[str, Schema] = {
+    "posture": list_of(
+        number_or_text(-MAX_TIME, MAX_TIME, "A time, s, then five joint angles, deg"),
+        1 + AXES,
+        1 + AXES,
+    ),
     "point": any_of(
         "A point, mm: {x, y, z}, [x, y, z], or the name of a pose",
         mapping("x, y, z", " ".join(XYZ), POINT_FIELDS),
@@ -152,8 +162,19 @@ STEP_VALUES: dict[str, Schema] = {
             "climb": {**LENGTH, "description": "Motion along the axis, mm"},
         },
     ),
-    "gripper": number_or_text(
-        -180.0, 180.0, "open, closed, or the angle of the fingers, deg; mm if they slide"
+    "gripper": any_of(
+        "open, closed, or the angle of the fingers, deg; mm if they slide",
+        FINGERS,
+        mapping(
+            "A position of the fingers, and what they must hold then",
+            "to",
+            {"to": FINGERS, "holding": OBJECT},
+        ),
+    ),
+    "trajectory": mapping(
+        "Move through postures at given times, on a smooth path, slower where limits require it",
+        "through",
+        {"through": list_of(reference("posture"), 2, MAX_POSTURES)},
     ),
     "wait": number_or_text(0.0, MAX_PAUSE, "Wait, s"),
     "tool": {**TEXT, "description": "Tool frame of all later points: tcp, grasp or flange"},

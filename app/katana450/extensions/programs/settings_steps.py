@@ -6,14 +6,21 @@ import math
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+
+from katana450 import tolerances
+from katana450.arm.control import commands as cmd
 from katana450.arm.control.commands import MIN_SPEED
+from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, SetSpeed, UseTool, Wait
+from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
+from katana450.maths.planning.plan import MARGIN
 
 MAX_PAUSE = 3600.0
 """[s] Maximum duration of a wait."""
@@ -21,30 +28,71 @@ MAX_PAUSE = 3600.0
 
 @dataclass(frozen=True)
 class Gripper:
-    """Open or close the fingers, or move them to a position [deg], or [mm] for sliding fingers."""
+    """Open or close the fingers, or move them to a position [deg], or [mm] for sliding fingers.
+
+    Attributes:
+        where: ``open``, ``closed`` or a position.
+        holding: name of the object that they must hold then; "" for any or none.
+    """
 
     where: float | str
+    holding: str = ""
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read ``open``, ``closed`` or a number. Raises ScriptError."""
-        if value.number is not None:
-            return cls(read.number(-180.0, 180.0, "deg or mm")(value))
-        return cls(read.choice("open", "closed")(value))
+        """Read ``open``, ``closed``, a number, or {to, holding}. Raises ScriptError."""
+        if value.kind != "mapping":
+            return cls(_finger_position(value))
+        fields = Fields(value, "a gripper step")
+        found = cls(fields.need("to", _finger_position, 0.0), fields.take("holding", read.text, ""))
+        fields.done()
+        return found
 
     def build(self, builder: PlanBuilder) -> None:
-        """Append the finger motion. Raises InputError outside the range of the fingers."""
+        """Append the finger motion.
+
+        Raises InputError outside the range of the fingers, and if they would not hold what they
+        must.
+        """
         fingers = builder.plan_context.arm.gripper
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
         ends = {"open": fingers.upper, "closed": fingers.lower}
         unit, scale = ("mm", 1e-3) if fingers.slides else ("deg", math.radians(1.0))
         angle = ends[self.where] if isinstance(self.where, str) else scale * self.where
-        if not fingers.lower <= angle <= fingers.upper:
+        if abs(fingers.clamp(angle) - angle) > tolerances.LIMIT_SLACK:
             low, high = fingers.lower / scale, fingers.upper / scale
             raise InputError(f"The range of the fingers is {low:.1f} to {high:.1f} {unit}.")
-        held = replace(builder.state, gripper=angle, gripper_setpoint=angle, gripper_goal=angle)
-        builder.note("gripper", MoveFingers(angle), held)
+        angle = fingers.clamp(angle)
+        held = _with_fingers(builder, angle)
+        if self.holding and (held.held is None or held.held.name != self.holding):
+            instead = "nothing" if held.held is None else held.held.name
+            raise InputError(
+                f"The fingers would hold {instead} instead of {self.holding}, which has to stand "
+                "where they close."
+            )
+        builder.note("gripper", MoveFingers(angle, self.holding), held)
+        if held.grip is None:
+            builder.taken = None
+
+
+def _finger_position(value: YamlValue) -> float | str:
+    """Read ``open``, ``closed`` or a number. Raises ScriptError."""
+    if value.number is not None:
+        return read.number(-180.0, 180.0, "deg or mm")(value)
+    return read.choice("open", "closed")(value)
+
+
+def _with_fingers(builder: PlanBuilder, angle: float) -> State:
+    """Return the state after the fingers were moved to ``angle`` [rad or m].
+
+    It is simulated where they may meet an object or let one go.
+    """
+    state, world = builder.state, builder.world
+    nearest = None if world is None else world.nearest(np.append(builder.q, angle))
+    if state.grip is not None or (nearest is not None and nearest.distance < MARGIN):
+        return builder.after(cmd.SetGripper(angle))
+    return replace(state, gripper=angle, gripper_setpoint=angle, gripper_goal=angle)
 
 
 @dataclass(frozen=True)

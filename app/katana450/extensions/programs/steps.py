@@ -15,6 +15,7 @@ from katana450.extensions.programs import (
     settings_steps,
     table,
     tool_moves,
+    trajectory,
     wait_for,
 )
 from katana450.extensions.programs.step import Step
@@ -29,5 +30,6 @@ STEPS: dict[str, type[Step]] = {
     **pick.STEPS,
     **place.STEPS,
     **wait_for.STEPS,
+    **trajectory.STEPS,
 }
 """The class of each step by its name in a script."""

@@ -20,6 +20,7 @@ from katana450.arm.control.appearance import (
 from katana450.arm.control.following import Following
 from katana450.arm.control.lease import Person, Role
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
+from katana450.extensions.programs.trajectory_path import TrajectoryPath
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import Fingerprint
 from katana450.maths.kinematics.branch import Branch
@@ -75,6 +76,7 @@ CLASSES: Final[tuple[type, ...]] = (
     *(pouring.MotionWithWater, Water, Slosh, Course),
     # Plans.
     *(Plan, Segment, Scaling, Nearest, Contact, Fingerprint, Chain, JointPath, ToolPath),
+    TrajectoryPath,
     *(ToolLine, ToolLines, ToolArc, ToolScrew, ToolTurn, Linear, Swing),
 )
 """Frozen dataclasses that a recording can hold."""
@@ -83,7 +85,7 @@ CURVES: Final[Any] = ToolLine | ToolLines | ToolArc | ToolScrew | ToolTurn
 PROFILES: Final[Any] = Linear | Swing
 
 MEMBERS: Final[Mapping[Any, Any]] = {
-    Path: JointPath | ToolPath,
+    Path: JointPath | ToolPath | TrajectoryPath,
     Curve: CURVES,
     Callable: PROFILES,
 }

@@ -79,9 +79,13 @@ class JointPath:
 
     def point(self, sigma: Jet) -> ThreeJets:
         """Return the tool point [m], in {C}."""
-        arm = arm_of(self.chain)
-        one, two, three, four, five = (
-            sign * q + shift
-            for q, sign, shift in zip(self.joints(sigma), arm.signs, arm.shifts, strict=True)
-        )
-        return tool_point(arm, (one, two, three, four, five))
+        return point_of(self.chain, self.joints(sigma))
+
+
+def point_of(chain: Chain, q: FiveJets) -> ThreeJets:
+    """Return the tool point [m], in {C}, at the joint angles `q` [rad]."""
+    arm = arm_of(chain)
+    one, two, three, four, five = (
+        sign * each + shift for each, sign, shift in zip(q, arm.signs, arm.shifts, strict=True)
+    )
+    return tool_point(arm, (one, two, three, four, five))

@@ -67,7 +67,7 @@ def fastest(path: Path, bounds: Bounds) -> Scaling:
     excess. a and j are sought on a pattern that narrows. Last, the waves that this leaves in the
     slowness are smoothed. The result is near the optimum; tests show how near.
     """
-    sampled = _Sampled.of(path, bounds)
+    sampled = SampledPath.of(path, bounds)
     joints = bounds.joints
     a = float((joints.acceleration / joints.speed).min())
     j = float((joints.jerk / joints.speed).min())
@@ -101,8 +101,8 @@ class _Fitted:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sampled:
-    """A path at many places.
+class SampledPath:
+    """A path at many places, for the search of its slowness.
 
     Attributes:
         pressing: first two derivatives (2, 5, N) of the joints by sigma, as fractions of the limits
@@ -130,8 +130,9 @@ class _Sampled:
     first: npt.NDArray[np.int64]
 
     @staticmethod
-    def of(path: Path, bounds: Bounds) -> _Sampled:
-        count = KNOTS + (KNOTS // 2) * len(path.joins)
+    def of(path: Path, bounds: Bounds, pieces: int | None = None) -> SampledPath:
+        """Return the samples of `path`, for a slowness of `pieces`; of KNOTS and more for None."""
+        count = KNOTS + (KNOTS // 2) * len(path.joins) if pieces is None else pieces
         even = np.linspace(0.0, 1.0, count * SAMPLES_PER_PIECE + 1)
         # Add places on either side of a join, where the third derivative leaps.
         joins = np.array(path.joins)
@@ -156,7 +157,7 @@ class _Sampled:
         pressing = np.ascontiguousarray(q[:2] / acceleration)
         jerking = np.ascontiguousarray(q / jerk)
         jerking[1] *= 3.0
-        return _Sampled(
+        return SampledPath(
             pressing,
             jerking,
             np.abs([pressing[0], jerking[0]]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -155,8 +155,9 @@ def plan(
     world: CollisionWorld | None = None,
     fingers: float = 0.0,
     margin: float = MARGIN,
+    timing: Callable[[Path, Bounds], Scaling] = fastest,
 ) -> Plan:
-    """Return the paths as a plan, each as fast as `bounds` allow, with rest between them.
+    """Return the paths as a plan with rest between them, each as fast as `bounds` allow.
 
     Args:
         paths: the paths, each of which begins where the one before ends.
@@ -164,6 +165,7 @@ def plan(
         world: the obstacles, with anything that the gripper holds; None skips all checks.
         fingers: angle of the finger joint meanwhile [rad].
         margin: distance to keep [m]; parts that are nearer at the start come no nearer.
+        timing: returns another scaling of a path, within the bounds.
 
     Raises:
         BlockedError: a path comes too near to something. The message names parts, distance and
@@ -184,7 +186,7 @@ def plan(
         key: None if world is None else _clearance(path, world, fingers, margin)
         for key, path in once.items()
     }
-    timed = {key: Segment(path, fastest(path, bounds)) for key, path in once.items()}
+    timed = {key: Segment(path, timing(path, bounds)) for key, path in once.items()}
     clearances = [checked[id(path)] for path in paths]
     segments = tuple(timed[id(path)] for path in paths)
     found = Plan(segments, None if world is None else world.fingerprint, fingers)

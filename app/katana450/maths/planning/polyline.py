@@ -32,8 +32,33 @@ its ends equal to that of the legs.
 """
 
 
+class PiecewisePolynomial:
+    """Coordinates as polynomials of fifth degree, each on a piece of sigma from 0 to 1."""
+
+    _starts: list[float]
+    _terms: FloatArray
+    _total: float
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places where pieces meet."""
+        return tuple(start / self._total for start in self._starts[1:])
+
+    def at(self, sigma: Jet) -> tuple[Jet, ...]:
+        """Return the n coordinates at `sigma`, one place or many (N,)."""
+        t = self._total * sigma
+        if isinstance(t.c0, float):
+            piece = max(bisect_right(self._starts, t.c0) - 1, 0)
+            local, terms = t - self._starts[piece], self._terms[piece].T.tolist()
+        else:
+            pieces = np.maximum(np.searchsorted(self._starts, t.c0, side="right") - 1, 0)
+            local = t - np.array(self._starts)[pieces]
+            terms = self._terms[pieces].transpose(2, 1, 0)
+        return tuple(_polynomial(row, local) for row in terms)
+
+
 @dataclass(frozen=True, eq=False)
-class Polyline:
+class Polyline(PiecewisePolynomial):
     """Straight legs from via to via, with a quintic round each corner.
 
     A corner is a Bezier curve of degree 5. Its control points lie on the two legs, three evenly
@@ -62,23 +87,6 @@ class Polyline:
             raise InputError(f"A blend must be above 0 and at most 1, not {blend.tolist()}.")
         object.__setattr__(self, "blend", frozen(blend))
         self._build()
-
-    @property
-    def joins(self) -> tuple[float, ...]:
-        """The places where legs and corners meet."""
-        return tuple(start / self._total for start in self._starts[1:])
-
-    def at(self, sigma: Jet) -> tuple[Jet, ...]:
-        """Return the n coordinates at `sigma`, one place or many (N,)."""
-        t = self._total * sigma
-        if isinstance(t.c0, float):
-            piece = max(bisect_right(self._starts, t.c0) - 1, 0)
-            local, terms = t - self._starts[piece], self._terms[piece].T.tolist()
-        else:
-            pieces = np.maximum(np.searchsorted(self._starts, t.c0, side="right") - 1, 0)
-            local = t - np.array(self._starts)[pieces]
-            terms = self._terms[pieces].transpose(2, 1, 0)
-        return tuple(_polynomial(row, local) for row in terms)
 
     def _build(self) -> None:
         """Build legs and corners as polynomials, each from 0 of its own part of sigma."""

@@ -1,0 +1,130 @@
+"""The step ``trajectory``: postures at given times, as a recording or another program has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from katana450.arm.control.session import TOOL_SPEED
+from katana450.errors import BlockedError
+from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.plan_builder import CARRY, PlanBuilder, UntimedPath
+from katana450.extensions.programs.recorded_pace import recorded_scaling
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.source import YamlValue
+from katana450.extensions.programs.step import Step
+from katana450.extensions.programs.trajectory_path import TrajectoryPath
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.planning.clearance import SweptClearance
+from katana450.maths.planning.plan import apart, plan
+from katana450.maths.planning.scaling import Bounds
+from katana450.maths.planning.sweep import Sweep
+
+CLEARANCE = STOP - 2e-4
+"""[m] Distance that a trajectory keeps. A moving arm keeps STOP by itself, and the spline through
+its recorded setpoints may pass a little nearer."""
+
+MAX_POSTURES = 1200
+"""Maximum number of postures of one step; the script's own size bounds their sum."""
+
+MAX_TIME = 24 * 3600.0
+"""[s] Maximum time of a posture."""
+
+AXES = 5
+
+TRAJECTORY = "trajectory"
+
+
+@dataclass(frozen=True, eq=False)
+class UntimedTrajectory(UntimedPath):
+    """A trajectory that is checked for contacts; it gets its own times, or slower ones."""
+
+    def timed(self) -> FollowPlan:
+        """Return the timed plan, with limited tool acceleration if an object is held."""
+        gentle = None if self.state.grip is None else CARRY
+        bounds = Bounds(self.arm.limits, TOOL_SPEED, gentle)
+        fingers = self.state.gripper_setpoint
+        return FollowPlan(
+            plan(self.paths, bounds, self.world, fingers, CLEARANCE, timing=recorded_scaling)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Move through postures at given times, on a smooth path.
+
+    The arm first moves to the first posture, on any path round obstacles. Where limits require it,
+    the motion is slower than given.
+
+    Attributes:
+        times: (m,) [s], from any zero.
+        postures: (m, 5) [rad].
+    """
+
+    times: FloatArray
+    postures: FloatArray
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {through: rows of a time [s] and five angles [deg]}. Raises ScriptError."""
+        fields = Fields(value, "a trajectory")
+        rows = fields.need("through", read.listed(_row, 2, MAX_POSTURES), ())
+        fields.done()
+        table = np.array(rows)
+        return cls(frozen(table[:, 0]), frozen(table[:, 1:]))
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the way to the start, and the trajectory.
+
+        Raises BlockedError with the time at which two parts would meet, and InputError for a
+        posture beyond the limits.
+        """
+        path = TrajectoryPath(builder.chain, self.times, self.postures)
+        builder.move_to(path.start, f"{TRAJECTORY}: approach")
+        _check_clear(builder, path)
+        arm, world = builder.plan_context.arm, builder.world
+        builder.note(
+            TRAJECTORY,
+            UntimedTrajectory(arm, world, builder.state, (path,)),
+            builder.standing(path.end),
+        )
+
+
+def _row(value: YamlValue) -> tuple[float, ...]:
+    """Read a time [s] and five angles [deg]; the angles are returned in rad."""
+    if value.kind != "list" or len(value.items) != 1 + AXES:
+        raise value.wrong(f"Expected a time and {AXES} angles, such as [0.5, 0, -65, 85, 8, 0].")
+    time, *angles = value.items
+    angle = read.degrees()
+    return read.number(0.0, MAX_TIME, "s")(time), *map(angle, angles)
+
+
+def _check_clear(builder: PlanBuilder, path: TrajectoryPath) -> None:
+    """Raise BlockedError, with the time, unless all of ``path`` keeps CLEARANCE from everything."""
+    world, fingers = builder.world, builder.state.gripper_setpoint
+    if world is None:
+        return
+    sweep = Sweep(path)
+    room = SweptClearance.about(world, CLEARANCE, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
+    met = sweep.blocked(room, fingers)
+    if met is None:
+        return
+    x = sweep.at(met.sigma, fingers)
+    worst = room.worst(x)
+    raise BlockedError(
+        f"At {path.time(met.sigma):.2f} s of the trajectory, with the tool at {{point}}, {{parts}} "
+        f"would {apart(worst.distance)}, and {1e3 * CLEARANCE:g} mm are required. Move the "
+        "obstacle, or leave this part out.",
+        forward(path.chain, x[:AXES])[:3, 3].tolist(),
+        parts=worst.parts,
+    )
+
+
+STEPS: dict[str, type[Step]] = {TRAJECTORY: Trajectory}
+"""Program steps of this module, by their names in a script."""

@@ -1,0 +1,152 @@
+"""A joint path through postures at given times: a natural cubic spline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.joint_path import VIA_TOLERANCE, point_of
+from katana450.maths.planning.polyline import PiecewisePolynomial
+from katana450.maths.planning.posture import FiveJets, ThreeJets
+
+MIN_INTERVAL = 1e-3
+"""[s] Minimum time from one posture to the next."""
+
+MAX_OVERSHOOT = 1e-3
+"""[rad] How far the spline may pass a joint limit between two postures; setpoints are clamped."""
+
+CHECKS_PER_PIECE = 8
+"""Number of places in each piece at which the limits are checked."""
+
+
+class CubicSpline(PiecewisePolynomial):
+    """The natural cubic spline through the rows of ``values`` (m, n) at ``times`` (m,) [s].
+
+    Value, rate and second derivative are continuous, and the second derivative is 0 at both ends
+    (de Boor, A Practical Guide to Splines, 1978, ch. IV).
+    """
+
+    def __init__(self, times: FloatArray, values: FloatArray) -> None:
+        """Fit the spline through at least two rows; ``times`` must rise."""
+        h = np.diff(times)[:, None]
+        slopes = np.diff(values, axis=0) / h
+        bends = _second_derivatives(h, slopes)
+        terms = np.zeros((len(h), 6, values.shape[1]))
+        terms[:, 0] = values[:-1]
+        terms[:, 1] = slopes - h * (2.0 * bends[:-1] + bends[1:]) / 6.0
+        terms[:, 2] = 0.5 * bends[:-1]
+        terms[:, 3] = (bends[1:] - bends[:-1]) / (6.0 * h)
+        self._starts: list[float] = (times[:-1] - times[0]).tolist()
+        self._terms = frozen(terms)
+        self._total = float(times[-1] - times[0])
+
+    def values_at(self, times: FloatArray) -> FloatArray:
+        """Return the values (N, n) at ``times`` (N,) [s] after the first one."""
+        found = self.at(Jet.variable(np.asarray(times) / self._total))
+        return np.stack([np.broadcast_to(each.c0, times.shape) for each in found], axis=1)
+
+
+def _second_derivatives(h: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Return the second derivatives (m, n) at the knots.
+
+    The tridiagonal system is eliminated row by row, so that every machine rounds in the same order.
+    """
+    bends = np.zeros((len(h) + 1, slopes.shape[1]))
+    diagonal = 2.0 * (h[:-1, 0] + h[1:, 0])
+    right = 6.0 * np.diff(slopes, axis=0)
+    for row in range(1, len(diagonal)):
+        factor = h[row, 0] / diagonal[row - 1]
+        diagonal[row] -= factor * h[row, 0]
+        right[row] -= factor * right[row - 1]
+    for row in range(len(diagonal) - 1, -1, -1):
+        bends[row + 1] = (right[row] - h[row + 1, 0] * bends[row + 2]) / diagonal[row]
+    return bends
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryPath:
+    """A joint path through postures at given times, as recorded.
+
+    Its sigma grows evenly with the time. Raises InputError for times that do not rise, and for a
+    posture beyond the joint limits.
+
+    Attributes:
+        chain: the arm with its tool.
+        times: (m,) [s], rising.
+        postures: (m, 5) joint angles at these times [rad].
+    """
+
+    chain: Chain
+    times: FloatArray
+    postures: FloatArray
+    _line: CubicSpline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        times = finite_array(self.times, (np.size(self.times),), "The times")
+        shape = (len(times), self.chain.n)
+        postures = finite_array(self.postures, shape, "The postures")
+        if len(times) < 2 or float(np.diff(times).min()) < MIN_INTERVAL:
+            raise InputError(
+                "A trajectory needs at least two postures, each at least "
+                f"{1e3 * MIN_INTERVAL:g} ms after the one before."
+            )
+        if float(np.ptp(postures, axis=0).max()) <= VIA_TOLERANCE:
+            raise InputError("This trajectory moves nothing. Remove it, or `wait` instead.")
+        line = CubicSpline(times, postures)
+        object.__setattr__(self, "times", frozen(times))
+        object.__setattr__(self, "_line", line)
+        self._check_limits()
+        # Angles with few decimals can be beyond a limit by their rounding.
+        inside = np.clip(postures, self.chain.lower, self.chain.upper)
+        object.__setattr__(self, "postures", frozen(inside))
+
+    def _check_limits(self) -> None:
+        inner = np.linspace(0.0, 1.0, CHECKS_PER_PIECE, endpoint=False)
+        passed = self.times - self.times[0]
+        t = np.append((passed[:-1, None] + np.diff(passed)[:, None] * inner).ravel(), passed[-1])
+        q = self._line.values_at(t)
+        beyond = np.maximum(self.chain.lower - q, q - self.chain.upper)
+        if float(beyond.max()) > MAX_OVERSHOOT:
+            place, axis = np.unravel_index(int(beyond.argmax()), beyond.shape)
+            raise InputError(
+                f"At {self.times[0] + t[place]:.2f} s axis {axis + 1} would be "
+                f"{np.degrees(beyond.max()):.2g} deg beyond its limit."
+            )
+
+    @property
+    def duration(self) -> float:
+        """The time from the first posture to the last [s]."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def start(self) -> FloatArray:
+        """The joint angles (5,) [rad] at the start."""
+        return frozen(self.postures[0])
+
+    @property
+    def end(self) -> FloatArray:
+        """The joint angles (5,) [rad] at the end."""
+        return frozen(self.postures[-1])
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places of the inner postures."""
+        return self._line.joins
+
+    def joints(self, sigma: Jet) -> FiveJets:
+        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
+        one, two, three, four, five = self._line.at(sigma)
+        return one, two, three, four, five
+
+    def point(self, sigma: Jet) -> ThreeJets:
+        """Return the tool point [m], in {C}."""
+        return point_of(self.chain, self.joints(sigma))
+
+    def time(self, sigma: float) -> float:
+        """Return the time [s] at the place ``sigma``, on the clock of ``times``."""
+        return float(self.times[0]) + sigma * self.duration
