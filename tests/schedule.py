@@ -35,6 +35,7 @@ KINDS = {
     "tests/library/test_run.py": BROWSER,
     "tests/recording/test_episodes_on_a_server.py": SERVERS[1],
     "tests/recording/test_recorder.py": SERVERS[0],
+    "tests/recording/test_run_again_on_a_server.py": SERVERS[0],
     "tests/robot/test_other_arms.py": BROWSER,
     # The most tests come first, so a file of many takes the single test of the types along.
     "tests/control/test_transitions.py": EARLY,

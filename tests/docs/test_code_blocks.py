@@ -23,7 +23,7 @@ from katana450.server.api import requests
 from katana450.server.api.requests import RequestDecoder
 from tests.browser.server import ROOT, AppServer
 from tests.docs.code_blocks import CodeBlock, code_block, code_blocks
-from tests.recording.recorded import record
+from tests.recording.sessions import drag, record_session
 
 PRINTED_URL = "http://127.0.0.1:8080"
 SECONDS = 120
@@ -89,8 +89,7 @@ def server(running: AppServer) -> AppServer:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
-    record(path, 20)
-    return path
+    return record_session(path, 220, drag(180))
 
 
 @pytest.fixture

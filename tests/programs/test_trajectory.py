@@ -173,6 +173,7 @@ def test_fingers_must_hold_what_is_named(stage: Stage) -> None:
         compiled(parse(text), stage.plan_context, stage.begin())
 
 
+@pytest.mark.long
 def test_fingers_that_close_on_an_object_hold_it_in_later_steps(stage: Stage) -> None:
     """The plan after it moves the object with the hand; opening lets it go."""
     grasp = compiled(parse("steps:\n  - pick: {object: cup}\n"), stage.plan_context, stage.begin())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import secrets
 import time
 from collections.abc import AsyncGenerator, AsyncIterator
@@ -253,6 +254,14 @@ class AsyncClient:
     def episodes(self) -> EpisodeClient:
         """Episodes of the server. Each call blocks, so use ``asyncio.to_thread``."""
         return EpisodeClient(self._site)
+
+    async def recording(self, last: float = math.inf) -> bytes:
+        """Return the recording of the last seconds as the contents of an MCAP file.
+
+        ``last``: time before the end of the recording [s]; at most ten minutes of motion are kept.
+        Raises RefusedError if the server records nothing, or has recorded nothing yet.
+        """
+        return await asyncio.to_thread(self._site.recording, last)
 
     async def people(self) -> tuple[answers.ConnectedPerson, ...]:
         """Return everybody who is connected, muted or kept out. For admins only."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 from collections.abc import AsyncGenerator, Coroutine, Iterator
 from contextlib import contextmanager
@@ -79,6 +80,10 @@ class Client:
     def episodes(self) -> EpisodeClient:
         """Episodes of the server: record, judge and list them."""
         return self._client.episodes
+
+    def recording(self, last: float = math.inf) -> bytes:
+        """See ``AsyncClient.recording``."""
+        return self._wait(self._client.recording(last))
 
     def people(self) -> tuple[answers.ConnectedPerson, ...]:
         """See ``AsyncClient.people``."""

@@ -61,6 +61,10 @@ class Site:
         name = self.name if self.name.isascii() else "Program"
         return self._ask(path, data, {"X-Name": name})
 
+    def recording(self, last: float) -> bytes:
+        """See ``AsyncClient.recording``."""
+        return self._ask(f"{ROOT}/recording?{urlencode({'last': last})}", None)
+
     def stop(self, press: str, port: int | None = None) -> str:
         """Send STOP over HTTP; return whether the arm has ``confirmed`` it, or ``requested``.
 

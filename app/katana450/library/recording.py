@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,8 +27,14 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.replay import Verification
+from katana450.extensions.recording.run_again.again_command import part_and_script
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, PLANS, SOLIDS
+from katana450.library.script_run import run_script
 from katana450.maths.geometry.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from katana450.client import Client
+    from katana450.server.api.answers import State
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +171,49 @@ class Recording:
             InputError: the file is damaged, or is of another robot.
         """
         return verified(self.path, None if urdf is None else Path(urdf))
+
+    def script(
+        self,
+        start: float = 0.0,
+        end: float = math.inf,
+        *,
+        urdf: str | os.PathLike[str] | None = None,
+    ) -> str:
+        """Return the script that runs this motion again, as ``katana450 record again`` does.
+
+        Args:
+            start: begin of the part [s] after that of the recording.
+            end: its end [s].
+            urdf: file of the recorded robot, if it is not the Katana450 of this package.
+
+        Raises:
+            InputError: the part has no motion or a gap, is too long for a script, or is of another
+                robot.
+        """
+        with RecordingFile.open(self.path) as file:
+            found = session_for(file, None if urdf is None else Path(urdf))
+            return part_and_script(file, found, start, end)[1]
+
+    def run_again(
+        self, client: Client, start: float = 0.0, end: float = math.inf, *, speed: float = 1.0
+    ) -> State:
+        """Drive the arm of a server along this motion; return its state at the end.
+
+        It is planned as a program in the present scene: on a clear path to the start, then as
+        recorded, slower where limits require it. STOP ends it.
+
+        Args:
+            client: a connection, from `katana450.connect`.
+            start: begin of the part [s] after that of the recording.
+            end: its end [s].
+            speed: fraction of the recorded speed, up to 1.
+
+        Raises:
+            InputError: as `script`.
+            RefusedError: the server refuses the motion, with the moment and the parts of a contact;
+                or it was stopped.
+        """
+        return run_script(client, self.script(start, end), speed)
 
     def to_dataframe(self) -> Any:
         """Return the states as a pandas DataFrame with the index ``t`` [s].

@@ -56,7 +56,7 @@ class UntimedTrajectory(UntimedPath):
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class FollowTrajectory:
     """Move through postures at given times, on a smooth path.
 
     The arm first moves to the first posture, on any path round obstacles. Where limits require it,
@@ -126,5 +126,5 @@ def _check_clear(builder: PlanBuilder, path: TrajectoryPath) -> None:
     )
 
 
-STEPS: dict[str, type[Step]] = {TRAJECTORY: Trajectory}
+STEPS: dict[str, type[Step]] = {TRAJECTORY: FollowTrajectory}
 """Program steps of this module, by their names in a script."""

@@ -98,6 +98,10 @@ def _tick_sender(options: Namespace) -> TickSender | None:
 
 
 def _record(options: Namespace) -> int:
+    if options.act == "again":
+        from katana450.extensions.recording.run_again.again_command import again
+
+        return again(options)
     from katana450.extensions.recording.files.record_command import record
 
     return record(options)

@@ -9,13 +9,19 @@ from pathlib import Path
 from katana450.extensions.recording.datasets.export_options import add_export_options
 from katana450.extensions.recording.episodes.episode_options import add_episode_options
 
+URL = "http://127.0.0.1:8080"
+"""Default address of the server."""
+
+MIN_SPEED = 0.01
+"""[1] Smallest fraction of its speed at which a program runs."""
+
 
 def add_record_options(parser: argparse.ArgumentParser) -> None:
     """Add the subcommands of ``katana450 record`` to ``parser``."""
     acts = parser.add_subparsers(
         dest="act",
         required=True,
-        metavar="keep | list | info | recover | verify | trim | export | episodes",
+        metavar="keep | list | info | recover | verify | again | trim | export | episodes",
     )
     keep = acts.add_parser(
         "keep", help="keep what a server has just recorded, whether it still runs or not"
@@ -54,6 +60,32 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         help="the recorded robot, if it is not the Katana450 of this program",
     )
     verify.add_argument("--json", action="store_true", help="print the result as JSON")
+    again = acts.add_parser("again", help="drive an arm along a recorded motion, or simulate it")
+    again.add_argument("file", type=Path, metavar="FILE")
+    again.add_argument(
+        "--headless", action="store_true", help="simulate it in the recorded scene, without server"
+    )
+    again.add_argument(
+        "--out", type=Path, metavar="FILE", help="write the script instead of running it"
+    )
+    again.add_argument(
+        "--speed", type=_speed, default=1.0, help="fraction of the recorded speed (default: 1)"
+    )
+    again.add_argument("--url", default=URL, help="address of the server (default: %(default)s)")
+    again.add_argument(
+        "--token", default="", help="token of an access link, if the server needs one"
+    )
+    again.add_argument(
+        "--unattended",
+        action="store_true",
+        help="let it run on when this command is ended or loses its connection",
+    )
+    again.add_argument(
+        "--urdf",
+        type=Path,
+        metavar="FILE",
+        help="the recorded robot, if it is not the Katana450 of this program",
+    )
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
     add_episode_options(
@@ -65,6 +97,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         each.add_argument(
             "--out", type=Path, required=True, metavar="FILE", help="new file or folder"
         )
+    for each in (again, trim, export):
         each.add_argument(
             "--from",
             dest="start",
@@ -81,6 +114,13 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
             metavar="S",
             help="end of the part (default: that of the recording)",
         )
+
+
+def _speed(text: str) -> float:
+    value = _seconds(text)
+    if not MIN_SPEED <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"a fraction from {MIN_SPEED:g} to 1, not {text!r}")
+    return value
 
 
 def _seconds(text: str) -> float:

@@ -1,0 +1,1 @@
+"""Scripts that run recorded motions again."""

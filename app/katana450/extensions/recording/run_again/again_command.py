@@ -1,0 +1,200 @@
+"""``katana450 record again``: drive an arm along a recorded motion, or simulate it."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.control.arm import ArmModel
+from katana450.assembly.log_lines import printable
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.atomic import write_files, writer_of
+from katana450.cli.main import main
+from katana450.client import Client, RefusedError, connect
+from katana450.client.files import LostError
+from katana450.errors import InputError
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.trajectory_path import TrajectoryPath
+from katana450.extensions.recording.files.checking import session_for
+from katana450.extensions.recording.files.recorded_states import at_rest, recorded_states
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.run_again.again_script import again_script
+from katana450.extensions.recording.run_again.path_difference import (
+    PathDifference,
+    path_difference,
+)
+from katana450.extensions.recording.run_again.recorded_part import RecordedPart, read_part
+from katana450.resources import URDF_PATH
+from katana450.server.api import answers
+
+SAME = 1e-9
+"""[rad or m] Largest difference of the numbers of one arm."""
+
+ON_DISK = 10.0
+"""[s] Timeout for the end of the run in the recording of the server."""
+
+POLL_PERIOD = 0.5
+"""[s] Time between two looks at it."""
+
+SAME_TICK = 1e-3
+"""[s] Largest difference of the times of one tick."""
+
+SLOWER = 1.02
+"""[1] Ratio of times from which a run counts as slower than recorded."""
+
+
+def again(options: Namespace) -> int:
+    """Run ``katana450 record again`` and return the exit status. Raises KatanaError."""
+    with RecordingFile.open(options.file) as file:
+        found = session_for(file, options.urdf)
+        part, text = part_and_script(file, found, options.start, options.end)
+        print(
+            f"{options.file}: {part.duration:.2f} s of motion from {part.t[0]:.2f} s to "
+            f"{part.t[-1]:.2f} s{_left_out(part)}."
+        )
+        if options.out is not None:
+            write_files({options.out: writer_of(text.encode())})
+            print(f"Script: {options.out}")
+        if options.headless:
+            return _simulate(options, file, found, part, text)
+    return 0 if options.out is not None else _drive(options, found, part, text)
+
+
+def part_and_script(
+    file: RecordingFile, found: DescribedRobot, start: float, end: float
+) -> tuple[RecordedPart, str]:
+    """Return the part of ``file`` from ``start`` to ``end`` [s] after its begin, and its script.
+
+    Raises InputError as ``read_part`` and ``again_script``.
+    """
+    part = read_part(file, start, end, name=file.path.name)
+    gripper = found.session.require_arm().gripper
+    bare = bool(json.loads(file.metadata["settings"])["bare"])
+    return part, again_script(part, gripper, bare=bare)
+
+
+def _left_out(part: RecordedPart) -> str:
+    return f", without {part.waited:.2f} s of pauses and stops" if part.waited else ""
+
+
+def _simulate(
+    options: Namespace, file: RecordingFile, found: DescribedRobot, part: RecordedPart, text: str
+) -> int:
+    """Simulate the script in the recorded scene, and print the result."""
+    states = recorded_states(file, found.session, file.start + part.t[0], file.end)
+    start = next(states, None)
+    if start is None:
+        raise InputError(f"{file.path} has no complete state in this part.")
+    plan = plan_script(
+        parse(text), options.urdf or URDF_PATH, speed=options.speed, begin=lambda _: at_rest(start)
+    )
+    planned, own = _times(plan.program)
+    if planned > SLOWER * own:
+        print(
+            f"Limits of the joints and the tool make it slower: {planned:.2f} s on its "
+            f"trajectories, recorded {own:.2f} s."
+        )
+    simulation = run_by_clock(plan)
+    trace = simulation.trace
+    _report(part, path_difference(part.setpoint, trace.t, trace.q))
+    return 0
+
+
+def _times(program: Program) -> tuple[float, float]:
+    """Return the planned and the recorded time of all trajectories [s]."""
+    planned = own = 0.0
+    for task in program.tasks:
+        if isinstance(task.action, FollowPlan):
+            for segment in task.action.plan.segments:
+                if isinstance(segment.path, TrajectoryPath):
+                    planned += segment.scaling.span
+                    own += segment.path.duration
+    return planned, own
+
+
+def _drive(options: Namespace, found: DescribedRobot, part: RecordedPart, text: str) -> int:
+    """Run the script on the server, and print how far its setpoints lie from the recorded ones."""
+    began: float | None = None
+    try:
+        with connect(options.url, "Look", options.token) as client:
+            _check_same_arm(client, found.session.require_arm(), options)
+            began = client.query(answers.State).sent
+    except LostError:
+        # `katana450 run` starts a server, or reports that there is none.
+        pass
+    with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
+        script = Path(folder) / "again.yaml"
+        script.write_text(text, encoding="utf-8")
+        command = ["run", str(script), "--url", options.url, "--speed", str(options.speed)]
+        command += ["--token", options.token] if options.token else []
+        command += ["--unattended"] if options.unattended else []
+        if status := main(command):
+            return status
+        if began is None:
+            return 0
+        try:
+            with connect(options.url, "Look", options.token) as client:
+                _report(part, driven_difference(client, part, began, Path(folder)))
+        except (LostError, RefusedError) as error:
+            print(f"The difference from the recorded setpoints is not known: {error}")
+    return 0
+
+
+def _check_same_arm(client: Client, arm: ArmModel, options: Namespace) -> None:
+    """Raise InputError if the arm of the server is not the recorded one."""
+    there = client.query(answers.Arm)
+    pairs = [(there.lower, arm.chain.lower), (there.upper, arm.chain.upper)]
+    for one, other in (
+        *((np.array(row), own) for row, own in pairs),
+        *((np.array(there.tools.get(name, [])), M) for name, M in arm.tools.items()),
+    ):
+        if one.shape != other.shape or not np.allclose(one, other, 0.0, SAME):
+            raise InputError(
+                f"{options.file} is not a recording of {there.name}, the arm of the server at "
+                f"{options.url}: its joint limits or tool frames differ."
+            )
+
+
+def driven_difference(
+    client: Client, part: RecordedPart, began: float, folder: Path
+) -> PathDifference:
+    """Return the difference of the run that has just ended on the server from ``part``.
+
+    Args:
+        client: a connection to the server.
+        part: the recorded motion.
+        began: time of the server's clock before the run [s].
+        folder: folder for a temporary file.
+
+    Raises:
+        RefusedError: the server records nothing.
+        LostError: the end of the run does not appear in its recording.
+    """
+    path, due = folder / "run.mcap", time.monotonic() + ON_DISK
+    ended = client.query(answers.State)
+    while time.monotonic() < due:
+        path.write_bytes(client.recording(ended.sent - began + ON_DISK))
+        with RecordingFile.open(path) as file:
+            # The server writes once a second.
+            if file.end >= ended.t - SAME_TICK:
+                run = read_part(file, max(began - file.start, 0.0))
+                return path_difference(part.setpoint, run.t, run.setpoint)
+        time.sleep(POLL_PERIOD)
+    raise LostError(f"the server has not written the end of the run within {ON_DISK:g} s.")
+
+
+def _report(part: RecordedPart, found: PathDifference) -> None:
+    print(
+        printable(
+            f"Largest difference of a joint from the recorded setpoints: {found.joints:.2g} rad. "
+            f"It took {found.duration:.2f} s, recorded {part.duration:.2f} s{_left_out(part)}."
+        )
+    )

@@ -1,0 +1,248 @@
+"""The script that runs a recorded part again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import yaml
+
+from katana450.arm.control.arm import GripperModel
+from katana450.errors import InputError
+from katana450.extensions.programs.script import MAX_NAME_LENGTH
+from katana450.extensions.programs.source import MAX_BYTES, MAX_VALUES
+from katana450.extensions.programs.trajectory import TRAJECTORY
+from katana450.extensions.programs.trajectory_path import CubicSpline
+from katana450.extensions.recording.run_again.recorded_part import RecordedPart
+from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+TOLERANCES = (1e-4, 3e-4, 1e-3)
+"""[rad] Largest distances of the trajectory from the recorded setpoints; a larger one if the script
+would be too long."""
+
+MIN_REST = 0.1
+"""[s] Shorter rests belong to the motion."""
+
+FINGER_REST = 0.3
+"""[s] Motions of the fingers with a shorter rest between are one."""
+
+FIRST_SPACING = 0.2
+"""[s] Time between postures before more are added."""
+
+TIME_DIGITS, ANGLE_DIGITS, EXACT_DIGITS = 5, 6, 8
+"""Decimals of times [s] and angles [deg] in a trajectory, and of single numbers."""
+
+EVENTS_OF_ROW = 8
+"""YAML events of a posture."""
+
+
+class Motion(NamedTuple):
+    """The arm moves from the state ``first`` to the state ``last``."""
+
+    first: int
+    last: int
+
+
+class FingerMotion(NamedTuple):
+    """The fingers move to ``angle`` [rad or m]; ``holding``: object that they hold then."""
+
+    angle: float
+    holding: str
+
+
+class Rest(NamedTuple):
+    """The arm rests for ``seconds`` [s]."""
+
+    seconds: float
+
+
+class ToolFrame(NamedTuple):
+    """The tool frame ``name`` is chosen."""
+
+    name: str
+
+
+Piece = Motion | FingerMotion | Rest | ToolFrame
+
+
+def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = False) -> str:
+    """Return the script that moves to the start of ``part`` and then as recorded.
+
+    Rests are kept, except those in which the arm was paused or stopped. Where the fingers moved
+    while the arm did, the arm rests meanwhile.
+
+    Args:
+        part: the recorded motion.
+        gripper: the finger joint of the arm.
+        bare: whether the gripper was taken off the arm.
+
+    Raises:
+        InputError: the part begins with an object in the hand, or is too long for a script.
+    """
+    if part.held[0]:
+        raise InputError(
+            f"The hand holds {part.held[0]} at the start of this part. Begin before it is grasped, "
+            "by --from."
+        )
+    pieces = tuple(pieces_of(part))
+    for tolerance in TOLERANCES:
+        steps = list(_steps(part, pieces, tolerance, gripper))
+        count = sum(len(each[TRAJECTORY]["through"]) for each in steps if TRAJECTORY in each)
+        text = _text(part, steps, bare=bare)
+        if len(text.encode()) <= MAX_BYTES and EVENTS_OF_ROW * (count + 20) <= MAX_VALUES:
+            return text
+    raise InputError(
+        f"This part has {part.duration:.0f} s of motion, which are too many for one script. Choose "
+        "a shorter part by --from and --to."
+    )
+
+
+def pieces_of(part: RecordedPart) -> Iterator[Piece]:
+    """Yield motions of the arm, motions of the fingers and rests, in their order."""
+    moves = np.abs(np.diff(part.setpoint, axis=0)).max(axis=1) > 0.0
+    for first, last in _runs(~moves):
+        if part.t[last] - part.t[first] < MIN_REST:
+            moves[first:last] = True
+    runs = _merged(part.t, list(_runs(np.diff(part.fingers) != 0.0)))
+    begins = dict(runs)
+    chosen = {
+        number + 1: tool
+        for number, (before, tool) in enumerate(pairwise(part.tools))
+        if tool != before
+    }
+    turns = (np.flatnonzero(np.diff(moves.astype(int))) + 1).tolist()
+    edges = sorted({0, len(part.t) - 1, *begins, *chosen, *turns})
+    busy = 0.0
+    for first, last in pairwise(edges):
+        if first in chosen:
+            yield ToolFrame(chosen[first])
+        if first in begins:
+            end = begins[first]
+            yield FingerMotion(float(part.fingers[end]), part.held[end])
+            busy = float(part.t[end])
+        if moves[first]:
+            yield Motion(first, last)
+        elif first > 0 and last < len(part.t) - 1:
+            # Rests before the first motion and after the last are left out.
+            seconds = _rest(part, first, last, busy)
+            if seconds > 0.0:
+                yield Rest(seconds)
+    if len(part.t) - 1 in begins:
+        yield FingerMotion(float(part.fingers[-1]), part.held[-1])
+
+
+def _rest(part: RecordedPart, first: int, last: int, busy: float) -> float:
+    """Return the time [s] of the rest from ``first`` to ``last`` that is kept.
+
+    ``busy``: time [s] until which the fingers moved, which takes its own time.
+    """
+    begin = np.maximum(part.t[first:last], busy)
+    lasted = np.maximum(part.t[first + 1 : last + 1] - begin, 0.0)
+    return float(lasted[~part.waiting[first:last]].sum())
+
+
+def _runs(flags: Any) -> Iterator[tuple[int, int]]:
+    """Yield first and end of each run of True in ``flags`` (N,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
+def _merged(t: FloatArray, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return ``runs`` with those joined that have less than FINGER_REST between them."""
+    found: list[tuple[int, int]] = []
+    for first, last in runs:
+        if found and t[first] - t[found[-1][1]] < FINGER_REST:
+            found[-1] = found[-1][0], last
+        else:
+            found.append((first, last))
+    return found
+
+
+def _steps(
+    part: RecordedPart, pieces: tuple[Piece, ...], tolerance: float, gripper: GripperModel
+) -> Iterator[dict[str, Any]]:
+    """Yield the steps of the script."""
+    scale = 1e3 if gripper.slides else math.degrees(1.0)
+    yield {"joints": _degrees(part.setpoint[0], EXACT_DIGITS)}
+    if gripper.moves:
+        yield {"gripper": round(scale * float(part.fingers[0]), EXACT_DIGITS)}
+    for piece in pieces:
+        match piece:
+            case ToolFrame(name=name):
+                yield {"tool": name}
+            case Rest(seconds=seconds):
+                yield {"wait": round(seconds, TIME_DIGITS)}
+            case FingerMotion(angle=angle, holding=holding) if holding:
+                yield {"gripper": {"to": "closed", "holding": holding}}
+            case FingerMotion(angle=angle):
+                yield {"gripper": round(scale * angle, EXACT_DIGITS)}
+            case Motion(first=first, last=last):
+                t, q = part.t[first : last + 1], part.setpoint[first : last + 1]
+                chosen = postures(t, q, tolerance)
+                rows = [
+                    [round(float(at), TIME_DIGITS), *_degrees(each, ANGLE_DIGITS)]
+                    for at, each in zip(t[chosen], q[chosen], strict=True)
+                ]
+                yield {TRAJECTORY: {"through": rows}}
+
+
+def postures(t: FloatArray, q: FloatArray, tolerance: float) -> IntArray:
+    """Return the indices of states whose natural cubic spline is near all states.
+
+    Args:
+        t: (N,) times [s], rising.
+        q: (N, 5) setpoints [rad].
+        tolerance: maximum difference of a joint [rad].
+    """
+    count = len(t)
+    wanted = np.linspace(t[0], t[-1], max(math.ceil((t[-1] - t[0]) / FIRST_SPACING), 1) + 1)
+    chosen = np.unique(np.append(np.minimum(np.searchsorted(t, wanted), count - 1), (0, count - 1)))
+    while len(chosen) < count:
+        found = CubicSpline(t[chosen], q[chosen]).values_at(t - t[0])
+        off = np.abs(found - q).max(axis=1)
+        added = [
+            first + 1 + int(np.argmax(off[first + 1 : last]))
+            for first, last in zip(chosen[:-1].tolist(), chosen[1:].tolist(), strict=True)
+            if last > first + 1 and float(off[first + 1 : last].max()) > tolerance
+        ]
+        if not added:
+            break
+        chosen = np.unique(np.append(chosen, added))
+    return chosen
+
+
+def _degrees(q: FloatArray, digits: int) -> list[float]:
+    return [round(each, digits) + 0.0 for each in np.degrees(q).tolist()]
+
+
+def _text(part: RecordedPart, steps: list[dict[str, Any]], *, bare: bool) -> str:
+    name = "".join(each for each in f"Again {part.name}" if each.isprintable())
+    about = (
+        f"{part.name}, {part.t[0]:.2f} to {part.t[-1]:.2f} s, run again. Times are those of the "
+        "recording."
+    )
+    head = {"name": name[:MAX_NAME_LENGTH], "about": about, "tool": part.tools[0]}
+    head |= {"gripper": "none"} if bare else {}
+    lines = [yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=100), "steps:\n"]
+    for step in steps:
+        ((kind, value),) = step.items()
+        if kind == TRAJECTORY:
+            lines.append(f"- {TRAJECTORY}:\n    through:\n")
+            lines += [f"    - {_flow(row)}\n" for row in value["through"]]
+        else:
+            lines.append(f"- {kind}: {_flow(value)}\n")
+    return "".join(lines)
+
+
+def _flow(value: Any) -> str:
+    """Return ``value`` on one line of YAML."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_flow, value))}]"
+    if isinstance(value, float):
+        # YAML takes 1e-06 for a text; such an angle is 0 within the digits.
+        return f"{value:.{EXACT_DIGITS}f}".rstrip("0").rstrip(".")
+    text: str = yaml.safe_dump(value, default_flow_style=True, width=10_000)
+    return text.removesuffix("...\n").strip()

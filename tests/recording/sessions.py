@@ -1,0 +1,78 @@
+"""Recordings of sessions with given commands: the real control loop on a test clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.extensions.programs import runner
+from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.script import parse
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from tests.recording.recorded import described, header, run
+
+Commands = Callable[[int, State], Iterator[cmd.Command]]
+"""Function from the number of a tick and the state before it to the commands of the tick."""
+
+STEP = 0.004
+"""[m] Motion of the target of a drag in a tick."""
+
+
+def record_session(path: Path, ticks: int, commands: Commands) -> Path:
+    """Write a session of ``ticks`` ticks with ``commands`` to ``path``, and return it."""
+    count = iter(range(ticks))
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header())
+        run(
+            ticks,
+            1,
+            writer.put,
+            lambda _rng, state, _found: commands(next(count), state),
+            odd=False,
+        )
+        writer.close()
+    return path
+
+
+def drag(ticks: int, at: Mapping[int, cmd.Command] | None = None, circles: float = 1.0) -> Commands:
+    """Return a drag of the tool on a flat spiral for ``ticks`` ticks; ``at``: other commands."""
+    others = dict(at or {})
+
+    def commands(tick: int, state: State) -> Iterator[cmd.Command]:
+        if tick in others:
+            yield others[tick]
+        elif tick < ticks and state.stopped is None and not state.paused:
+            angle = 2.0 * np.pi * circles * tick / ticks
+            radius = 0.06 * tick / ticks
+            yield cmd.MoveTool(
+                np.array((0.3 + radius * np.cos(angle), radius * np.sin(angle), 0.05))
+            )
+        elif tick == ticks:
+            yield cmd.EndDrag()
+
+    return commands
+
+
+def program(text: str) -> Commands:
+    """Return the commands of the script ``text``, planned for the first state."""
+    found = described()
+    context = PlanContext(found.session, found.robot.require_arm().T_base_shoulder)
+    progress: list[tuple[object, Run]] = []
+
+    def commands(_tick: int, state: State) -> Iterator[cmd.Command]:
+        if not progress:
+            progress.append((compiled(parse(text), context, state), Run(state.t)))
+        plan, before = progress[-1]
+        if before.phase is Phase.RUNNING:
+            after, given = runner.step(plan, before, state, state.t)  # type: ignore[arg-type]
+            progress[-1] = plan, after
+            assert after.phase in (Phase.RUNNING, Phase.DONE), after.why
+            yield from given
+
+    return commands

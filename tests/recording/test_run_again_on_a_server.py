@@ -1,0 +1,118 @@
+"""A real server records a motion and runs it again: the same setpoints, and STOP ends it."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.cli.main import main
+from katana450.client import Client, RefusedError
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import Shape
+from tests.browser.server import RECORDING_APP, AppServer
+from tests.recording.test_recorder import waited_for
+
+TARGETS = ((0.33, 0.05, 0.08), (0.28, -0.04, 0.03), (0.3, 0.0, 0.06))
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
+    folder = tmp_path_factory.mktemp("ring")
+    with AppServer((*RECORDING_APP, "--record", str(folder))) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def recorded(server: AppServer, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drag through TARGETS, as the server has recorded it."""
+    path = tmp_path_factory.mktemp("kept") / "drag.mcap"
+    with katana450.connect(server.url, "Ada") as client:
+        for target in TARGETS:
+            client.go(requests.Position(p=target))
+        end = client.query(answers.State).q
+
+        def kept() -> bool:
+            try:
+                path.write_bytes(client.recording())
+            except RefusedError:
+                return False
+            return bool(np.abs(katana450.open(path).setpoint[-1] - end).max() < 1e-9)
+
+        waited_for(kept, "the drag in the recording")
+    return path
+
+
+def test_recorded_drag_runs_again(
+    server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["record", "again", str(recorded), "--url", server.url]) == 0
+    printed = capsys.readouterr().out
+    assert "Again drag.mcap: " in printed
+    found = re.search(r"recorded setpoints: (\S+) rad. It took (\S+) s, recorded (\S+) s", printed)
+    assert found is not None, printed
+    assert 0.0 < float(found[1]) < 1e-3
+    assert float(found[3]) < float(found[2]) < 3.0 * float(found[3])
+    with katana450.connect(server.url, "Ada") as client:
+        end = client.query(answers.State).q
+    assert np.abs(katana450.open(recorded).setpoint[-1] - end).max() < 1e-6
+
+
+def test_stop_in_the_middle_ends_it_and_it_can_run_again(
+    server: AppServer, recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is a program for everything that controls programs."""
+    status: list[int] = []
+    command = ["record", "again", str(recorded), "--url", server.url]
+    thread = threading.Thread(target=lambda: status.append(main(command)))
+    with katana450.connect(server.url, "Ada") as client:
+        thread.start()
+        waited_for(lambda: _task(client) == "trajectory", "the trajectory")
+        time.sleep(0.5)
+        client.stop()
+        thread.join(20.0)
+        assert status == [1]
+        assert "Ada pressed STOP" in capsys.readouterr().err
+        client.clear_stop()
+        script = tmp_path / "again.yaml"
+        assert main([*command, "--out", str(script)]) == 0
+        found = katana450.open(recorded)
+        moved = np.flatnonzero(np.abs(found.setpoint - found.setpoint[0]).max(axis=1) > 1e-3)[0]
+        end = float(found.t[moved] - found.start) + 1.0
+        posture = found.run_again(client, end=end).q
+        number = int(np.searchsorted(found.t - found.start, end, side="right")) - 1
+        np.testing.assert_allclose(posture, found.setpoint[number], atol=1e-6)
+
+
+def _task(client: Client) -> str:
+    program = client.query(answers.State).program
+    return "" if program is None or program.status != "running" else program.task
+
+
+def test_present_obstacle_is_refused(
+    server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with katana450.connect(server.url, "Ada") as client:
+        passed = katana450.open(recorded).position
+        place = np.eye(4)
+        place[:3, 3] = passed[len(passed) // 3] - (0.0, 0.0, 0.03)
+        client.go(requests.Home())
+        client.ask(
+            requests.Place(
+                name="stone",
+                T=place.tolist(),  # type: ignore[arg-type]
+                shape=Shape.BOX,
+                size=[0.06, 0.06, 0.06],
+            )
+        )
+        assert main(["record", "again", str(recorded), "--url", server.url]) == 1
+        assert re.search(
+            r"At [\d.]+ s of the trajectory, with the tool at .* stone would",
+            capsys.readouterr().err,
+        )
