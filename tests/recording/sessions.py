@@ -15,7 +15,7 @@ from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from tests.recording.recorded import described, header, run
+from tests.recording.recorded import PERIOD, described, header, run
 
 Commands = Callable[[int, State], Iterator[cmd.Command]]
 """Function from the number of a tick and the state before it to the commands of the tick."""
@@ -65,12 +65,12 @@ def program(text: str) -> Commands:
     context = PlanContext(found.session, found.robot.require_arm().T_base_shoulder)
     progress: list[tuple[object, Run]] = []
 
-    def commands(_tick: int, state: State) -> Iterator[cmd.Command]:
+    def commands(tick: int, state: State) -> Iterator[cmd.Command]:
         if not progress:
-            progress.append((compiled(parse(text), context, state), Run(state.t)))
+            progress.append((compiled(parse(text), context, state), Run(0.0)))
         plan, before = progress[-1]
         if before.phase is Phase.RUNNING:
-            after, given = runner.step(plan, before, state, state.t)  # type: ignore[arg-type]
+            after, given = runner.step(plan, before, state, PERIOD * tick)  # type: ignore[arg-type]
             progress[-1] = plan, after
             assert after.phase in (Phase.RUNNING, Phase.DONE), after.why
             yield from given

@@ -121,6 +121,7 @@ def test_pause_or_stop_in_the_middle_is_left_out(tmp_path: Path, disturbance: st
     assert found.duration < 2.0 * part.duration
 
 
+@pytest.mark.long
 def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:
     steps = "  - grasp: cup\n  - line: {by: {z: 60}}\n  - nudge: {axis: 1, by: 10}\n"
     path = record_session(tmp_path / "grasp.mcap", 1500, program(f"frame: base\nsteps:\n{steps}"))
@@ -218,6 +219,7 @@ def test_parts_without_motion_are_refused(
         read_part(file, start, end)
 
 
+@pytest.mark.long
 def test_recording_of_a_run_is_verified_and_runs_again(dragged: Path, tmp_path: Path) -> None:
     """Trajectories are plans that recordings can hold."""
     _, text = read(dragged, 0.0, 1.5)

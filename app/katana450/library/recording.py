@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from katana450.arm.control.commands import Command
 from katana450.errors import ConfigurationError, InputError
@@ -21,6 +22,7 @@ from katana450.extensions.recording.episodes.episode_file import episodes_in
 from katana450.extensions.recording.files.checking import (
     MissingMessage,
     TickReader,
+    session_for,
     state_numbers,
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
@@ -28,12 +30,14 @@ from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.replay import Verification
 from katana450.extensions.recording.run_again.again_command import part_and_script
+from katana450.extensions.recording.scoring.score_command import score_file
+from katana450.extensions.recording.scoring.scored import Scored
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, PLANS, SOLIDS
-from katana450.library.script_run import run_script
 from katana450.maths.geometry.arrays import FloatArray
 
 if TYPE_CHECKING:
     from katana450.client import Client
+    from katana450.library.viewer import Viewer
     from katana450.server.api.answers import State
 
 
@@ -213,7 +217,74 @@ class Recording:
             RefusedError: the server refuses the motion, with the moment and the parts of a contact;
                 or it was stopped.
         """
+        from katana450.library.script_run import run_script
+
         return run_script(client, self.script(start, end), speed)
+
+    def score(
+        self,
+        start: float = 0.0,
+        end: float = math.inf,
+        *,
+        targets: Mapping[str, npt.ArrayLike] | None = None,
+        urdf: str | os.PathLike[str] | None = None,
+    ) -> Scored:
+        """Return the measures of this run, as ``katana450 score`` prints them.
+
+        The result has ``values`` by their names, which end with their units, the final ``places``
+        of objects, and the ``tool`` point and its ``speed`` at the times ``t``.
+
+        Args:
+            start: begin of the part [s] after that of the recording.
+            end: its end [s].
+            targets: places (3,) [m] in the base frame where objects should stand at the end, by
+                name, such as the ``places`` of another run; NaN for a number that is free.
+            urdf: file of the recorded robot, if it is not the Katana450 of this package.
+
+        Raises:
+            InputError: the part has no motion or a gap, or its simulation differs.
+        """
+        wanted = {name: np.asarray(place, dtype=float) for name, place in (targets or {}).items()}
+        path = None if urdf is None else Path(urdf)
+        return score_file(self.path, start, end, wanted, path)
+
+    def replay(
+        self,
+        speed: float = 1.0,
+        start: float = 0.0,
+        end: float = math.inf,
+        *,
+        port: int = 8090,
+        host: str = "127.0.0.1",
+        urdf: str | os.PathLike[str] | None = None,
+    ) -> Viewer:
+        """Show the recorded arm and objects in a 3D scene, repeatedly, as `Arm.show` shows a plan.
+
+        It is only a picture: no arm moves. ``run.replay(0.5).wait()`` keeps a script from ending.
+
+        Args:
+            speed: factor on the recorded time, above 0.
+            start: begin of the part [s] after that of the recording.
+            end: its end [s].
+            port: TCP port of the scene, or the next free one above it.
+            host: address to listen on, without a password.
+            urdf: file of the recorded robot, if it is not the Katana450 of this package.
+
+        Raises:
+            InputError: the speed is not above 0, or the part has no states.
+            ConfigurationError: no port could be opened.
+        """
+        from katana450.library.loading import load
+        from katana450.library.recorded_frames import RecordedFrames
+        from katana450.library.viewer import Viewer, check_speed
+
+        check_speed(speed)
+        with RecordingFile.open(self.path) as file:
+            robot = session_for(file, None if urdf is None else Path(urdf))
+        frames = RecordedFrames(self.path, robot, start, end)
+        viewer = Viewer(load(None if urdf is None else Path(urdf), frame="base"), port, host)
+        viewer.replay(frames, speed)
+        return viewer
 
     def to_dataframe(self) -> Any:
         """Return the states as a pandas DataFrame with the index ``t`` [s].

@@ -8,6 +8,7 @@ import html
 import io
 import threading
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -26,6 +27,7 @@ from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 if TYPE_CHECKING:
     from katana450.library.arm import Arm
+    from katana450.library.recorded_frames import RecordedFrames
 
 FRAME_TIME = 1.0 / 60.0
 """[s] Time from one frame to the next."""
@@ -90,19 +92,37 @@ class Viewer:
 
         ``speed``: factor on real time, above 0. Raises InputError for another ``speed``.
         """
-        if not (np.isfinite(speed) and speed > 0.0):
-            raise InputError(f"The speed is {speed!r}; give a number above 0.")
-        self.pause()
+        check_speed(speed)
         samples = plan.sample(max(FRAME_TIME * speed, plan.duration / 100_000))
         T_base_frame = self._arm.T_base_frame
         points = plan.sample(plan.duration / PATH_POINTS).points
         points = points @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
+        self._play(samples.t / speed, points, lambda number: self._show(samples.q[number]))
+
+    def replay(self, frames: RecordedFrames, speed: float = 1.0) -> None:
+        """Draw the tool's path and show a recording repeatedly, in a separate thread.
+
+        ``speed``: factor on real time, above 0. Raises InputError for another ``speed``.
+        """
+        check_speed(speed)
+
+        def show(number: int) -> None:
+            self._scenery.show(frames.state(number))
+
+        show(0)
+        step = max(len(frames.points) // PATH_POINTS, 1)
+        points = np.concatenate((frames.points[:-1:step], frames.points[-1:]))
+        self._play(frames.t / speed, points, show)
+
+    def _play(self, t: FloatArray, points: FloatArray, show: Callable[[int], None]) -> None:
+        """Draw a path through ``points`` (k, 3) [m] and ``show`` each frame at its time ``t``."""
+        self.pause()
         self._path.points = np.stack((points[:-1], points[1:]), axis=1).astype(np.float32)
         self._path.visible = True
         self._stopped = threading.Event()
         self._player = threading.Thread(
             target=self._run,
-            args=(samples.t / speed, samples.q, self._stopped),
+            args=(t, show, self._stopped),
             name="katana450 viewer",
             daemon=True,
         )
@@ -152,17 +172,23 @@ class Viewer:
         source = html.escape(self.url)
         return f'<iframe src="{source}" width="100%" height="480" frameborder="0"></iframe>'
 
-    def _run(self, t: FloatArray, q: FloatArray, stopped: threading.Event) -> None:
+    def _run(self, t: FloatArray, show: Callable[[int], None], stopped: threading.Event) -> None:
         while not stopped.is_set():
             started = time.monotonic()
             passed = 0.0
             while passed < t[-1] and not stopped.wait(FRAME_TIME):
                 passed = time.monotonic() - started
-                self._show(q[min(int(np.searchsorted(t, passed)), len(q) - 1)])
+                show(min(int(np.searchsorted(t, passed)), len(t) - 1))
             stopped.wait(PAUSE)
 
     def _show(self, q: FloatArray) -> None:
         self._scenery.show(self._arm.standing(q))
+
+
+def check_speed(speed: float) -> None:
+    """Raise InputError unless ``speed`` is a number above 0."""
+    if not (np.isfinite(speed) and speed > 0.0):
+        raise InputError(f"The speed is {speed!r}; give a number above 0.")
 
 
 def opened(arm: Arm, what: MotionPlan | npt.ArrayLike | None, port: int, host: str) -> Viewer:

@@ -15,16 +15,15 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.actions import FollowPlan, Task
+from katana450.extensions.programs.motion_measures import motion_measures, water_measures
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.score import score
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.simulation import Trace
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.velocity import singular_values, tool_speed
 from katana450.maths.planning.curve import ToolCoordinates
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
@@ -108,15 +107,7 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
     errors = np.concatenate([path.error for path in paths]) if paths else np.empty(0)
     turned = np.concatenate([path.turned for path in paths]) if paths else np.empty(0)
     at_ticks, between = executed(program, trace)
-    chains = [arm.chain_to(tool) for tool in trace.tools]
-    limits = arm.chain
-    room = np.minimum(trace.q - limits.lower, limits.upper - trace.q)
-    singular = [
-        float(singular_values(chain, q)[-1]) for chain, q in zip(chains, trace.q, strict=True)
-    ]
-    speeds = [
-        tool_speed(chain, q, qd) for chain, q, qd in zip(chains, trace.q, trace.qd, strict=True)
-    ]
+    moved = motion_measures(arm, trace.tools, trace.q, trace.qd)
     nearest = [
         task.action.plan.nearest.contact.distance
         for task in executed_tasks(program, trace)
@@ -132,13 +123,13 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
         "executed_position_error_mm": _maximum(1e3 * at_ticks),
         "between_ticks_error_mm": _maximum(1e3 * between),
         "path_length_mm": 1e3 * sum(_length(path.desired) for path in paths) if paths else None,
-        "smallest_singular_value": min(singular),
-        "margin_to_limits_deg": float(np.degrees(room.min())),
+        "smallest_singular_value": moved["smallest_singular_value"],
+        "margin_to_limits_deg": moved["margin_to_limits_deg"],
         "nearest_clearance_mm": 1e3 * min(nearest) if nearest else None,
-        "max_speed_fraction": float((np.abs(trace.qd) / limits.speed).max()),
+        "max_speed_fraction": moved["max_speed_fraction"],
         "max_acceleration_fraction": _fraction(trace, arm.limits.acceleration, 2),
         "max_jerk_fraction": _fraction(trace, arm.limits.jerk, 3),
-        "max_tool_speed_mm_s": 1e3 * max(speeds),
+        "max_tool_speed_mm_s": moved["max_tool_speed_mm_s"],
         "duration_s": float(trace.t[-1]),
         **_of_water(program, trace),
     }
@@ -231,15 +222,15 @@ def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
     end = trace.water[-1]
     if end is None:
         return {}
-    found = score(end.water, end.course)
+    found = water_measures(end)
     executed = sorted(set(trace.task.tolist()))
     pours = [number for number in executed if program.tasks[number].name == POURING]
     carried = trace.task < (pours[0] if pours else len(program.tasks))
     return {
-        "emptied_percent": found.emptied_percent,
-        "spilled_ml": found.spilled_ml,
+        "emptied_percent": found["emptied_percent"],
+        "spilled_ml": found["spilled_ml"],
         "carried_margin_to_rim_mm": 1e3 * float(trace.margin[carried].min()),
-        "cup_peak_jerk_m_s3": found.peak_jerk,
+        "cup_peak_jerk_m_s3": found["cup_peak_jerk_m_s3"],
     }
 
 

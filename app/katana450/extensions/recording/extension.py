@@ -16,6 +16,7 @@ from katana450.extension import (
     TickSender,
 )
 from katana450.extensions.recording.record_options import add_record_options
+from katana450.extensions.recording.scoring.score_options import add_score_options
 
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
@@ -107,9 +108,20 @@ def _record(options: Namespace) -> int:
     return record(options)
 
 
+def _score(options: Namespace) -> int:
+    from katana450.extensions.recording.scoring.score_command import score_files
+
+    return score_files(options)
+
+
 EXTENSION = Extension(
     "recording",
-    (CliCommand("record", "keep, verify, repair and cut recordings", add_record_options, _record),),
+    (
+        CliCommand(
+            "record", "keep, verify, repair and cut recordings", add_record_options, _record
+        ),
+        CliCommand("score", "measure and compare recordings", add_score_options, _score),
+    ),
     ServeExtension(
         add_serve_options,
         routes=_routes,

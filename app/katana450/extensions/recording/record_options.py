@@ -98,22 +98,27 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
             "--out", type=Path, required=True, metavar="FILE", help="new file or folder"
         )
     for each in (again, trim, export):
-        each.add_argument(
-            "--from",
-            dest="start",
-            type=_seconds,
-            default=0.0,
-            metavar="S",
-            help="begin of the part, in seconds after the begin of the recording",
-        )
-        each.add_argument(
-            "--to",
-            dest="end",
-            type=_seconds,
-            default=math.inf,
-            metavar="S",
-            help="end of the part (default: that of the recording)",
-        )
+        add_part_options(each)
+
+
+def add_part_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose a part of a recording to ``parser``."""
+    parser.add_argument(
+        "--from",
+        dest="start",
+        type=_seconds,
+        default=0.0,
+        metavar="S",
+        help="begin of the part, in seconds after the begin of the recording",
+    )
+    parser.add_argument(
+        "--to",
+        dest="end",
+        type=_seconds,
+        default=math.inf,
+        metavar="S",
+        help="end of the part (default: that of the recording)",
+    )
 
 
 def _speed(text: str) -> float:

@@ -89,7 +89,7 @@ def read_part(
             f"{file.path} is {file.end - file.start:.2f} s long; a part from {start:g} s to "
             f"{end:g} s has nothing of it."
         )
-    _check_whole(file, first, last)
+    check_whole(file, first, last)
     found = list(_states(file, first, last))
     if not found or "position" not in found[0]:
         raise InputError(f"{file.path} is not a recording of an arm with a tool.")
@@ -99,7 +99,7 @@ def read_part(
     return part
 
 
-def _check_whole(file: RecordingFile, first: float, last: float) -> None:
+def check_whole(file: RecordingFile, first: float, last: float) -> None:
     """Raise InputError with the time of the first gap from ``first`` to ``last`` [s]."""
     for message in file.messages(COMMANDS, start=first, end=last):
         if b'"missing"' not in message.data:

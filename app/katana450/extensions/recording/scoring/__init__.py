@@ -1,0 +1,1 @@
+"""Measures of recordings, and tables and pages that compare them."""

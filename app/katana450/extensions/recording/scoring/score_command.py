@@ -1,0 +1,67 @@
+"""``katana450 score``: measures of recordings, as a table, as JSON, and as a page."""
+
+from __future__ import annotations
+
+import json
+import math
+from argparse import Namespace
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from katana450.assembly.log_lines import printable
+from katana450.atomic import write_files, writer_of
+from katana450.errors import InputError
+from katana450.extensions.recording.files.checking import session_for
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.scoring.leaderboard import BEST, Leaderboard
+from katana450.extensions.recording.scoring.score_page import score_page
+from katana450.extensions.recording.scoring.scored import Places, Scored, scored
+
+
+def score_files(options: Namespace) -> int:
+    """Run ``katana450 score`` and return the exit status. Raises InputError."""
+    targets: dict[str, np.ndarray] = {}
+    if options.like is not None:
+        targets |= score_file(options.like, urdf=options.urdf).places
+    targets |= {name: np.array(place) for name, place in options.target}
+    found = [
+        score_file(path, options.start, options.end, targets, options.urdf)
+        for path in options.files
+    ]
+    missing = [name for name, _ in options.target if all(name not in s.places for s in found)]
+    if missing:
+        known = ", ".join(sorted({name for each in found for name in each.places})) or "none"
+        raise InputError(f"--target: there is no object {missing[0]!r}. Known objects: {known}.")
+    board = Leaderboard.of(found, options.sort)
+    if options.json:
+        print(json.dumps(board.json, indent=2))
+    else:
+        for line in board.lines:
+            print(printable(line))
+        if len(found) > 1:
+            print(f"Sorted by {options.sort}; {BEST} marks the best.")
+    if options.html is not None:
+        page = score_page(board, datetime.now().astimezone())
+        write_files({options.html: writer_of(page.encode())})
+        if not options.json:
+            print(f"Page: {options.html}")
+    return 0
+
+
+def score_file(
+    path: Path,
+    start: float = 0.0,
+    end: float = math.inf,
+    targets: Mapping[str, np.ndarray] | Places | None = None,
+    urdf: Path | None = None,
+) -> Scored:
+    """Return the score of the recording at ``path``; see ``scored``.
+
+    ``urdf``: file of the recorded robot, if it is not that of this program. Raises InputError.
+    """
+    with RecordingFile.open(path) as file:
+        robot = session_for(file, urdf)
+        return scored(file, robot, start, end, targets, name=path.name)

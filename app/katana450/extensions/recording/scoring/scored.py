@@ -1,0 +1,245 @@
+"""The score of a recording: the measures of a report, smoothness, and what happened."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, State
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.errors import InputError
+from katana450.extensions.programs.motion_measures import motion_measures, water_measures
+from katana450.extensions.programs.trajectory_path import CubicSpline
+from katana450.extensions.recording.files.recorded_states import recorded_states
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.table import columns
+from katana450.extensions.recording.run_again.recorded_part import check_whole
+from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.contact import Contact
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.batch import forward_batch
+
+MEASURES: Final = {
+    "duration_s": "from the first motion to the end of the last",
+    "tool_path_mm": "length of the path of the tool point",
+    "dimensionless_jerk": "mean squared jerk of the tool over time and length; at best 720",
+    "sparc": "spectral arc length of the tool's speed; the nearer to 0, the smoother",
+    "nearest_clearance_mm": "minimum of all pairs of parts, without objects that fingers touch",
+    "margin_to_limits_deg": "minimum of all joints",
+    "smallest_singular_value": "of the Jacobian, translations divided by the characteristic length",
+    "max_speed_fraction": "maximum of all joints, as a fraction of the limit",
+    "max_tool_speed_mm_s": "of the tool point",
+    "emptied_ml": "water in the basin at the end",
+    "emptied_percent": "fraction of the water that is in the basin at the end",
+    "spilled_ml": "water on table and floor at the end",
+    "cup_peak_jerk_m_s3": "maximum of the cup's middle, over one tick",
+    "placing_error_mm": "maximum distance of an object's final place from its target",
+    "stops": "number of times that the arm was stopped",
+    "contacts": "number of times that the arm waited before a contact",
+}
+"""Name of each measure, with its unit at the end, and its definition."""
+
+HIGHER_IS_BETTER: Final = frozenset(
+    (
+        "sparc", "nearest_clearance_mm", "margin_to_limits_deg", "smallest_singular_value",
+        "emptied_ml", "emptied_percent",
+    )
+)  # fmt: skip
+"""Measures of which the highest value is the best; of all others it is the lowest."""
+
+CLEARANCE_PERIOD = 0.05
+"""[s] Period of the clearance samples."""
+
+SAME_SETPOINT = 1e-6
+"""[rad] Largest difference of the simulation from the recorded setpoints."""
+
+Places = Mapping[str, FloatArray]
+"""Places (3,) [m] of objects in the base frame, by their names; NaN for a number that is free."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """The score of a part of a recording.
+
+    Attributes:
+        name: name of the recording.
+        values: each of MEASURES by its name; None if it does not apply.
+        places: final place (3,) of each object in the base frame [m].
+        t: (N,) times from the first motion [s], at equal steps.
+        tool: (N, 3) the tool point in the base frame [m].
+        speed: (N,) its speed [m/s].
+    """
+
+    name: str
+    values: Mapping[str, float | None]
+    places: Places
+    t: FloatArray
+    tool: FloatArray
+    speed: FloatArray
+
+    def __repr__(self) -> str:
+        known = {name: value for name, value in self.values.items() if value is not None}
+        shown = ", ".join(f"{name}={value:.4g}" for name, value in known.items())
+        return f"Scored({self.name!r}, {shown})"
+
+
+def scored(
+    file: RecordingFile,
+    robot: DescribedRobot,
+    start: float = 0.0,
+    end: float = math.inf,
+    targets: Places | None = None,
+    *,
+    name: str = "recording",
+) -> Scored:
+    """Return the score of ``file`` from ``start`` to ``end`` [s] after its begin.
+
+    The recorded commands are simulated again, so that every state is complete.
+
+    Args:
+        file: the recording.
+        robot: the recorded robot and its rules.
+        start: begin of the part [s].
+        end: end of the part [s].
+        targets: places at which objects should stand at the end; those that it does not have are
+            left out.
+        name: name of the recording.
+
+    Raises:
+        InputError: the part has no motion or a gap, or the simulation differs from the recording.
+    """
+    first, last = file.start + start, min(file.start + end, file.end)
+    check_whole(file, first, last)
+    session = robot.session
+    states = list(recorded_states(file, session, first, last))
+    _check_same(file, states, first, last)
+    moving = _moving(states)
+    if moving is None:
+        raise InputError(f"Nothing moves in this part of {file.path}.")
+    begin, stop = moving
+    run = states[begin : stop + 1]
+    t, tool = _tool_points(robot, run)
+    velocity = np.gradient(tool, 1.0 / RATE, axis=0)
+    speed = np.linalg.norm(velocity, axis=1)
+    places = _places(session, states[-1])
+    arm = session.require_arm()
+    joints = motion_measures(
+        arm,
+        [state.tool for state in run],
+        np.array([state.setpoint for state in run]),
+        np.array([state.motion.qd for state in run]),
+    )
+    moved = float(speed.max()) > 0.0
+    values: dict[str, float | None] = dict.fromkeys(MEASURES)
+    values |= {
+        "duration_s": run[-1].t - run[0].t,
+        "tool_path_mm": 1e3 * float(np.linalg.norm(np.diff(tool, axis=0), axis=1).sum()),
+        "dimensionless_jerk": dimensionless_jerk(velocity) if moved else None,
+        "sparc": sparc(speed) if moved else None,
+        "nearest_clearance_mm": _clearance(session, run),
+        **joints,
+        "placing_error_mm": _placing_error(places, targets or {}),
+        "stops": float(_begins([state.stopped is not None for state in states])),
+        "contacts": float(_begins([_waits_before_contact(state) for state in states])),
+    }
+    water = states[-1].poured
+    if water is not None and water.water.total:
+        values |= water_measures(water)
+    return Scored(name, values, places, frozen(t), frozen(tool), frozen(speed))
+
+
+def _check_same(file: RecordingFile, states: Sequence[State], first: float, last: float) -> None:
+    """Raise InputError unless the simulation has the recorded setpoints."""
+    if not states:
+        raise InputError(f"{file.path} has no complete state in this part.")
+    recorded = columns(file, first, last)
+    t = np.array([state.t for state in states])
+    number = np.clip(np.searchsorted(t, recorded["t"], side="right") - 1, 0, len(t) - 1)
+    # Of several states at one time the file may have any.
+    same = (t[number] == recorded["t"]) & (np.diff(recorded["t"], append=math.inf) > 0.0)
+    simulated = np.array([state.setpoint for state in states])[number[same]]
+    off = np.abs(simulated - recorded["setpoint"][same]).max(initial=0.0)
+    if not off <= SAME_SETPOINT:
+        raise InputError(
+            f"The simulation of {file.path} differs from the recording by {off:.2g} rad, so it "
+            "cannot be scored. `katana450 record verify` tells where it was made."
+        )
+
+
+def _moving(states: Sequence[State]) -> tuple[int, int] | None:
+    """Return the states before the first motion and after the last; None if nothing moves."""
+    q = np.array([(*state.setpoint, state.gripper_setpoint) for state in states])
+    moved = np.flatnonzero(np.abs(np.diff(q, axis=0)).max(axis=1) > 0.0)
+    return (int(moved[0]), int(moved[-1]) + 1) if len(moved) else None
+
+
+def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> tuple[FloatArray, FloatArray]:
+    """Return times (N,) from 0 [s] and the default tool's points (N, 3) in the base frame [m]."""
+    arm, T = robot.session.require_arm(), robot.robot.require_arm().T_base_shoulder
+    points = forward_batch(arm.chain, np.array([state.setpoint for state in states]))[:, :3, 3]
+    times = np.array([state.t for state in states])
+    later = np.concatenate(([True], np.diff(times) > 0.0))
+    times, points = times[later] - times[0], points[later]
+    # An arm at rest makes no ticks; without points in such a gap the spline would swing there.
+    gaps = np.flatnonzero(np.diff(times) > 2.5 / RATE)
+    step = 1.0 / RATE
+    rests = [np.arange(times[n] + step, times[n + 1] - 0.5 * step, step) for n in gaps]
+    held = np.concatenate([np.empty(0), *rests])
+    numbers = np.searchsorted(times, held, side="right") - 1
+    order = np.argsort(np.concatenate((times, held)), kind="stable")
+    times = np.concatenate((times, held))[order]
+    points = np.concatenate((points, points[numbers]))[order]
+    t = np.arange(0.0, times[-1] + 0.5 / RATE, 1.0 / RATE)
+    found = CubicSpline(times, points).values_at(np.minimum(t, times[-1]))
+    return t, found @ T[:3, :3].T + T[:3, 3]
+
+
+def _clearance(session: Session, states: Sequence[State]) -> float | None:
+    """Return the minimum clearance [mm]; None where nothing can meet."""
+    nearest: float | None = None
+    due = -math.inf
+    for state in states:
+        if state.t < due:
+            continue
+        due = state.t + CLEARANCE_PERIOD
+        world = session.world_at(state)
+        contact = None if world is None else world.nearest(state.x_setpoint)
+        if contact is None or (contact.distance < STOP and _of_held(state, contact)):
+            continue
+        nearest = contact.distance if nearest is None else min(nearest, contact.distance)
+    return None if nearest is None else 1e3 * nearest
+
+
+def _of_held(state: State, contact: Contact) -> bool:
+    """Return whether an object takes part that fingers may touch, as when it is grasped."""
+    return any(each.can_be_held and each.name in contact.parts for each in state.objects)
+
+
+def _places(session: Session, state: State) -> dict[str, FloatArray]:
+    pose = session.environment.pose
+    return {each.name: frozen(pose(each, state.x_setpoint)[:3, 3]) for each in state.objects}
+
+
+def _placing_error(places: Places, targets: Places) -> float | None:
+    """Return the maximum distance [mm] of an object from its target; None without a target."""
+    apart = [
+        float(np.linalg.norm(np.nan_to_num(places[name] - target)))
+        for name, target in targets.items()
+        if name in places
+    ]
+    return 1e3 * max(apart) if apart else None
+
+
+def _waits_before_contact(state: State) -> bool:
+    return state.blocked or any(each.reason is Reason.CONTACT for each in state.findings)
+
+
+def _begins(flags: Sequence[bool]) -> int:
+    """Return how often ``flags`` become true."""
+    return sum(now and not before for before, now in zip((False, *flags), flags, strict=False))

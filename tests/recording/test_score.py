@@ -1,0 +1,234 @@
+"""Measures of recordings are those of their motions, and the table and page compare them."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.stop_cause import pressed
+from katana450.cli.main import main
+from katana450.errors import InputError
+from katana450.extensions.media.measures import measurements
+from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
+from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.script import parse
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.scoring.leaderboard import Leaderboard, shown
+from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEASURES, Scored, scored
+from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.resources import URDF_PATH
+from tests.recording.recorded import described
+from tests.recording.sessions import drag, program, record_session
+
+LINE = "frame: base\ntool: tcp\nsteps:\n  - line: {by: {z: 60}}\n  - gripper: open\n"
+
+
+def bell(seconds: float) -> FloatArray:
+    """Return the velocity (N, 3) [m/s] of a motion of 1 m with minimum jerk."""
+    s = np.linspace(0.0, 1.0, round(seconds * RATE) + 1)
+    speed = 30.0 * s**2 * (1.0 - s) ** 2 / seconds
+    return np.stack((0.6 * speed, 0.0 * speed, 0.8 * speed), axis=1)
+
+
+def test_minimum_jerk_has_the_known_smoothness() -> None:
+    """720 by Hogan and Sternad (2009), -1.41 by Balasubramanian and others (2015)."""
+    for seconds in (2.0, 4.0):
+        velocity = bell(seconds)
+        assert dimensionless_jerk(velocity) == pytest.approx(720.0, rel=0.05)
+        assert sparc(np.linalg.norm(velocity, axis=1)) == pytest.approx(-1.41, abs=0.01)
+
+
+def test_smoothness_does_not_depend_on_size_and_falls_with_each_stop() -> None:
+    one = bell(2.0)
+    assert dimensionless_jerk(3.0 * one) == pytest.approx(dimensionless_jerk(one), rel=1e-9)
+    assert sparc(3.0 * one[:, 0]) == pytest.approx(sparc(one[:, 0]), rel=1e-9)
+    two, three = np.concatenate((one, one)), np.concatenate((one, one, one))
+    assert dimensionless_jerk(one) < dimensionless_jerk(two) < dimensionless_jerk(three)
+    assert sparc(one[:, 0]) > sparc(two[:, 0]) > sparc(three[:, 0])
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("score") / "line.mcap"
+    return record_session(path, 260, program(LINE))
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drag with a stop, during which nobody moves the arm for 1.5 s."""
+    at: dict[int, cmd.Command] = {
+        90: cmd.Stop(pressed("Ada", "key", "press", 1e9)),
+        250: cmd.ClearStop(),
+        260: cmd.MoveTool(np.array((0.33, 0.05, 0.08))),
+    }
+    path = tmp_path_factory.mktemp("score") / "stopped.mcap"
+    return record_session(path, 420, drag(90, at))
+
+
+def score(path: Path, **options: object) -> Scored:
+    with RecordingFile.open(path) as file:
+        return scored(file, described(), name=path.name, **options)  # type: ignore[arg-type]
+
+
+def test_line_has_its_length_and_the_measures_of_the_report(line: Path) -> None:
+    found = score(line)
+    assert found.values["tool_path_mm"] == pytest.approx(60.0, abs=0.05)
+    assert found.t[-1] == pytest.approx(found.values["duration_s"], abs=0.02)
+    assert float(found.speed.max()) == pytest.approx(
+        1e-3 * (found.values["max_tool_speed_mm_s"] or 0.0), rel=0.02
+    )
+    assert np.linalg.norm(found.tool[-1] - found.tool[0]) == pytest.approx(0.06, abs=1e-4)
+    plan = plan_script(parse(LINE), URDF_PATH)
+    report = measurements(plan.program, plan.session.require_arm(), run_by_clock(plan).trace)
+    for name in ("margin_to_limits_deg", "smallest_singular_value", "max_speed_fraction"):
+        assert found.values[name] == pytest.approx(report[name], rel=0.02), name
+    # Samples find a place that is a little farther away.
+    assert found.values["nearest_clearance_mm"] == pytest.approx(
+        report["nearest_clearance_mm"], rel=0.15
+    )
+    assert found.values["stops"] == found.values["contacts"] == 0.0
+    assert found.values["emptied_ml"] is None
+
+
+def test_stops_are_counted(stopped: Path) -> None:
+    found = score(stopped)
+    assert found.values["stops"] == 1.0
+    # From the first motion to the last, with the stop.
+    assert 3.0 < (found.values["duration_s"] or 0.0) < 8.0
+    part = score(stopped, start=0.0, end=0.8)
+    assert part.values["stops"] == 0.0
+    assert (part.values["sparc"] or 0.0) > (found.values["sparc"] or 0.0)
+
+
+@pytest.mark.long
+def test_contacts_are_counted(tmp_path: Path) -> None:
+    """The arm waits before the table, below the shoulder by 274.5 mm."""
+    at: dict[int, cmd.Command] = {1: cmd.MoveTool(np.array((0.3, 0.0, -0.4)))}
+    found = score(record_session(tmp_path / "table.mcap", 300, drag(0, at)))
+    assert found.values["contacts"] == 1.0
+    assert 0.0 < (found.values["nearest_clearance_mm"] or 0.0) < 8.0
+
+
+@pytest.mark.long
+def test_pour_has_the_measures_of_its_report(tmp_path: Path) -> None:
+    text = PourDemo().text
+    found = score(record_session(tmp_path / "pour.mcap", 3700, program(text)))
+    plan = plan_script(parse(text), URDF_PATH)
+    report = measurements(plan.program, plan.session.require_arm(), run_by_clock(plan).trace)
+    for name in ("emptied_percent", "spilled_ml", "margin_to_limits_deg"):
+        assert found.values[name] == pytest.approx(report[name], rel=0.02, abs=0.01), name
+    assert found.values["emptied_ml"] == pytest.approx(199.7, abs=0.3)
+    cup = described().session.begin(described().session.ready, 0.0, 0.0).objects[0].T[:3, 3]
+    np.testing.assert_allclose(found.places["cup"], cup, atol=6e-3)
+
+
+def test_placing_error_is_the_distance_from_the_target(line: Path) -> None:
+    x, y, z = score(line).places["cup"].tolist()
+    targets = {"cup": np.array((x + 0.003, y - 0.004, math.nan)), "basin": np.full(3, math.nan)}
+    assert score(line, targets=targets).values["placing_error_mm"] == pytest.approx(5.0)
+    assert score(line, targets={"cup": np.array((x, y, z + 0.01))}).values[
+        "placing_error_mm"
+    ] == pytest.approx(10.0)
+    assert score(line, targets={"stone": np.zeros(3)}).values["placing_error_mm"] is None
+
+
+def test_leaderboard_is_sorted_and_marks_the_best(line: Path, stopped: Path) -> None:
+    scores = (score(stopped), score(line))
+    board = Leaderboard.of(scores)
+    assert [each.name for each in board.rows] == ["line.mcap", "stopped.mcap"]
+    assert Leaderboard.of(scores, "tool_path_mm").rows[0].name == "line.mcap"
+    by_sparc = [each.values["sparc"] for each in Leaderboard.of(scores, "sparc").rows]
+    assert by_sparc == sorted(by_sparc, key=lambda value: -(value or 0.0))
+    assert board.is_best(board.rows[0], "stops")
+    assert not board.is_best(board.rows[1], "stops")
+    assert "emptied_ml" not in board.measures
+    alone = Leaderboard.of(scores[:1])
+    assert not any(alone.is_best(scores[0], name) for name in MEASURES)
+    same = replace(scores[0], values={**scores[0].values, "duration_s": 1e-9 + 1.0})
+    near = replace(scores[0], values={**scores[0].values, "duration_s": 1.0})
+    assert not Leaderboard.of((same, near)).is_best(near, "duration_s")
+    with pytest.raises(InputError, match="no measure 'speed'"):
+        Leaderboard.of(scores, "speed")
+    assert set(MEASURES) >= HIGHER_IS_BETTER
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "–"), (0.0, "0"), (12.3456, "12.35"), (1234.5, "1234"), (-1.4058, "-1.406")],
+)
+def test_values_have_four_digits(value: float | None, text: str) -> None:
+    assert shown(value) == text
+
+
+def test_command_prints_table_json_and_page(
+    line: Path, stopped: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "score.html"
+    hostile = tmp_path / "<b>&.mcap"
+    hostile.write_bytes(stopped.read_bytes())
+    files = [str(hostile), str(line)]
+    assert main(["score", *files, "--html", str(page), "--like", str(line)]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"1\. line\.mcap +2\. <b>&\.mcap", printed), printed
+    assert re.search(r"Stops +0 \* +1\n", printed), printed
+    assert re.search(r"Placing error mm +0 +0\n", printed), printed
+    text = page.read_text(encoding="utf-8")
+    assert "&lt;b&gt;&amp;.mcap" in text
+    assert "<b>&" not in text
+    assert "http" not in text
+    assert "prefers-color-scheme: dark" in text
+    figures = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
+    assert len(figures) == 3
+    for each in figures:
+        curves = ElementTree.fromstring(each).findall("polyline")
+        assert len(curves) == 2
+        numbers = np.array([p.split(",") for p in curves[0].attrib["points"].split()], dtype=float)
+        assert len(numbers) > 50
+        assert (numbers >= 0.0).all()
+    assert main(["score", str(line), "--json", "--target", "cup=340,-260"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)
+    assert found["name"] == "line.mcap"
+    assert set(MEASURES) <= set(found)
+    assert found["placing_error_mm"] == pytest.approx(0.0, abs=0.01)
+    assert found["places_mm"]["cup"] == pytest.approx([340.0, -260.0, 0.0], abs=0.01)
+
+
+def test_useless_input_is_refused(line: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["score", str(line), "--target", "stone=1,2"]) == 1
+    assert "no object 'stone'. Known objects: basin, cup" in capsys.readouterr().err
+    assert main(["score", str(line), "--from", "100"]) == 1
+    assert main(["score", str(line), "--sort", "beauty"]) == 1
+    assert "no measure 'beauty'" in capsys.readouterr().err
+    for target in ("cup", "cup=1", "cup=1,x", "=1,2"):
+        with pytest.raises(SystemExit):
+            main(["score", str(line), "--target", target])
+
+
+@pytest.mark.long
+def test_library_scores_and_replays(line: Path) -> None:
+    run = katana450.open(line)
+    found = run.score(targets={"cup": (0.34, -0.25, math.nan)})
+    assert found.values["placing_error_mm"] == pytest.approx(10.0, abs=0.01)
+    assert repr(found).startswith("Scored('line.mcap', duration_s=")
+    with pytest.raises(katana450.InputError, match="above 0"):
+        run.replay(0.0)
+    with run.replay(20.0) as viewer:
+        joints = viewer._scenery.arm._joints
+        shown_angles: set[float] = set()
+        for _ in range(400):
+            shown_angles.add(round(joints[1].angle, 4))
+            viewer._stopped.wait(0.01)
+        angles = run.q[:, 1]
+        assert len(shown_angles) >= 3
+        assert min(shown_angles) >= angles.min() - 1e-3
+        assert max(shown_angles) <= angles.max() + 1e-3
