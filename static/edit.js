@@ -48,7 +48,7 @@ const Edit = (() => {
     leaving = setTimeout(() => byId("stage").classList.remove("dropping"), 300);
     if (event.type !== "drop") return;
     const [file] = event.dataTransfer.files;
-    if (file) Objects.take(file);
+    if (file) (/\.mcap$/i.test(file.name) ? page.replay : Objects.take)(file);
   }
 
   function listen(target) {

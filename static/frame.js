@@ -117,12 +117,16 @@
       const view = Viser.viewOf(message);
       if (view) looks(view);
       const choice = Viser.choiceOf(message);
+      // What is seen may be the past: it cannot be dragged, and a control of the panel shows the present.
+      if (Viser.isVeiled() && Viser.handles(message)) return false;
+      if (Viser.isVeiled() && Viser.controls(message) && !/^(View|Theme)$/.test(choice?.label)) outer?.katana?.live();
       if (choice?.label === "View") Fit.choose(choice.value);
       if (choice?.label !== "Theme") return true;
       Theme.choose(choice.value);
       return false;
     },
     connected() {
+      outer?.katana?.live?.();
       document.documentElement.dataset.loading = "";
       loaded = false;
       seen = 0;

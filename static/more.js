@@ -82,7 +82,7 @@ const More = (() => {
     });
     byId("keep-recording").addEventListener("click", async () => {
       const { keep } = await import("./more/keep.js");
-      keep(toast, RECORDED);
+      keep(toast, { last: RECORDED });
     });
     byId("phone-button").addEventListener("click", async () => {
       const { toggle } = await import("./more/phone.js");

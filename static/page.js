@@ -10,6 +10,7 @@
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
   const WELCOMED = "katana450.welcome";
+  const PAST = "katana450.timeline.open";
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
@@ -21,7 +22,10 @@
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
   const page = name();
   const worker = new Worker("static/link.js");
-  const say = (message) => worker.postMessage({ say: message });
+  const say = (message) => {
+    timeline?.said(message);
+    worker.postMessage({ say: message });
+  };
   let status = null;
   let up = false;
   let since = performance.now(); // time of the last loss of the connection
@@ -32,6 +36,8 @@
   let stopPort = null; // port of STOP alone
   let proven = null; // cause of a stop confirmed on another path
   let people = null;
+  let timeline = null;
+  let past = null; // what to do with the timeline when the scene is drawn
 
   // A reloaded page keeps its name; a second tab gets another. A browser may refuse to store it.
   function name() {
@@ -59,6 +65,7 @@
   function stop() {
     press = randomName();
     say({ do: "stop", press, id: press });
+    timeline?.live();
     Jog.quiet();
     stopButton.classList.add("asked");
     insist();
@@ -147,6 +154,8 @@
     if (!canDraw) return;
     byId("poster").classList.add("done");
     takeHold();
+    if (past) showTimeline(true, past);
+    past = null;
   };
   if (!canDraw) {
     byId("poster").classList.add("failed");
@@ -155,7 +164,7 @@
   }
   const SHEETS = ["jog", "objects", "teach", "episodes"];
   const closeSheets = () => SHEETS.forEach((id) => byId(id)?.hidden === false && show(id, false));
-  window.katana = { key, blur, toast, drawn, closeSheets, view: null };
+  window.katana = { key, blur, toast, drawn, closeSheets, view: null, live: () => timeline?.live() };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
   window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page}`));
@@ -412,7 +421,7 @@
   More.begin({ say, toast, kept, view: () => window.katana.view });
   Jog.begin({ say, stop });
   Objects.begin({ say });
-  Edit.begin({ say, toast, connected: () => up, scene: () => stage });
+  Edit.begin({ say, toast, connected: () => up, scene: () => stage, replay: (file) => showTimeline(true, (there) => there.open(file)) });
   // What a pointer does in the scene; loaded when the scene is drawn.
   let stage = null;
   async function takeHold() {
@@ -426,6 +435,20 @@
     const { Episodes } = await import("./episodes/episodes.js");
     episodes ??= new Episodes(byId("stage"), { page, toast });
     episodes.draw(status);
+  });
+  // What was recorded, loaded on first use. `then` uses the timeline once it is shown.
+  async function showTimeline(shown, then) {
+    byId("timeline-button").setAttribute("aria-expanded", String(shown));
+    kept?.setItem(PAST, shown ? "yes" : "no");
+    const { Timeline } = await import("./timeline/timeline.js");
+    const fold = () => showTimeline(false);
+    timeline ??= new Timeline(byId("timeline"), { page, scene, stage: byId("stage"), toast, status: () => status, fold });
+    await timeline.show(shown);
+    then?.(timeline);
+  }
+  byId("timeline-button").addEventListener("click", () => {
+    byId("more").close();
+    showTimeline(byId("timeline").hidden);
   });
   // Who is connected, for admins; loaded on first use.
   byId("people-button").addEventListener("click", async () => {
@@ -497,6 +520,9 @@
     const { protocol, host } = location;
     worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });
     if (kept?.getItem(OPEN) === "yes") showInstruments(true);
+    // A link to a moment, or the timeline as it was; shown with the scene.
+    const moment = new URLSearchParams(location.search).get("moment");
+    if (moment || kept?.getItem(PAST) === "yes") past = (there) => moment && there.goTo(moment);
     window.addEventListener("status", ({ detail }) => {
       if (canDraw && detail.role !== "viewer" && !kept?.getItem(WELCOMED)) showWelcome();
     }, { once: true });

@@ -27,6 +27,7 @@ const Viser = (() => {
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const groups = new Map(); // labels of the rows of buttons, by id
   const shown = new Map(); // whether the server shows a node, by name
+  let veiled = null; // returns whether this page hides the node of a name
   let page = null; // the page's worker
   const viewer = () => window.__viserMutable;
 
@@ -70,9 +71,12 @@ const Viser = (() => {
             groups.clear();
             connected();
           } else if (data?.type === BATCH && !data.ours) {
-            for (const { type, uuid, props, name, visible } of data.messages) {
+            for (const message of data.messages) {
+              const { type, uuid, props, name, visible } = message;
               if (type === "GuiButtonGroupMessage") groups.set(uuid, props.label);
-              if (type === "SetSceneNodeVisibilityMessage") shown.set(name, visible);
+              if (type !== "SetSceneNodeVisibilityMessage") continue;
+              shown.set(name, visible);
+              if (veiled?.(name)) message.visible = false;
             }
             hears(data.messages, this.#line);
           }
@@ -105,6 +109,19 @@ const Viser = (() => {
     const messages = [{ type: "SetSceneNodeVisibilityMessage", name, visible }];
     page.dispatchEvent(new MessageEvent("message", { data: { type: BATCH, messages, ours: true } }));
   }
+
+  // Hide the nodes for whose names `hides` returns true in this page alone; null shows them as the server does.
+  function veil(hides) {
+    const found = hides ?? veiled;
+    veiled = hides;
+    for (const name of shown.keys()) if (found?.(name)) reveal(name, hides ? false : undefined);
+  }
+
+  // Whether `message` of the page uses a control of the panel.
+  const controls = ({ type }) => type === "GuiUpdateMessage";
+
+  // Whether `message` of the page drags or clicks something in the scene.
+  const handles = ({ type }) => /^(TransformControls|SceneNodeClick|SceneNodeDrag|ScenePointer)/.test(type);
 
   // Return the server's last messages that place and turn the camera; each may be missing.
   const viewsIn = (messages) =>
@@ -208,7 +225,9 @@ const Viser = (() => {
 
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
-    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail,
+    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
+    // Return whether nodes are hidden in this page alone.
+    isVeiled: () => veiled !== null,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,
     // Return the three.js object of a node; "" is viser's world.

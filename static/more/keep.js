@@ -1,13 +1,13 @@
-// Saves what the server has just recorded. Loaded on first use.
+// Saves what the server has recorded. Loaded on first use.
 let working = false;
 
-// `toast` shows a sentence to the person, `seconds` before now are saved.
-export async function keep(toast, seconds) {
+// `toast` shows a sentence to the person. `query` names the part: its last seconds, or begin and end.
+export async function keep(toast, query) {
   if (working) return;
   working = true;
   toast("The recording is being made.");
   try {
-    const answer = await fetch(`api/v1/recording?last=${seconds}`);
+    const answer = await fetch(`api/v1/recording?${new URLSearchParams(query)}`);
     if (!answer.ok) throw new Error(await answer.text());
     const link = document.createElement("a");
     link.href = URL.createObjectURL(await answer.blob());

@@ -222,6 +222,26 @@ def test_page_shows_a_hidden_node_by_itself(page: ViserPage) -> None:
             page.wait_until(lambda wanted=wanted: ask(page, seen) is wanted, f"{wanted}")  # type: ignore[misc]
 
 
+def test_page_hides_nodes_by_itself(page: ViserPage) -> None:
+    visible = """(() => {
+        const node = Viser.node("/box");
+        return Boolean(node?.visible);
+    })()"""
+    with part("veil"):
+        for hides, shown in (("(name) => name === '/box'", False), ("null", True)):
+            ask(page, f"Viser.veil({hides})")
+            page.wait_until(lambda wanted=shown: ask(page, visible) is wanted, "the node")  # type: ignore[misc]
+            with part("isVeiled"):
+                assert ask(page, "Viser.isVeiled()") is not shown
+    with part("handles"):
+        sent = {each["type"] for each in ask(page, "harness.sent")}
+        assert not any(ask(page, f"Viser.handles({{ type: '{each}' }})") for each in sent)
+        for each in ("TransformControlsUpdateMessage", "SceneNodeClickMessage"):
+            assert ask(page, f"Viser.handles({{ type: '{each}' }})")
+    with part("controls"):
+        assert ask(page, "Viser.controls({ type: 'GuiUpdateMessage' })")
+
+
 def test_page_is_painted_by_changed_messages(page: ViserPage) -> None:
     scheme = "document.documentElement.dataset.mantineColorScheme"
     with part("paint"):

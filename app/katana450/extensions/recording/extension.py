@@ -21,6 +21,7 @@ from katana450.extensions.recording.scoring.score_options import add_score_optio
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
+    from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
 
 
@@ -75,19 +76,27 @@ def _episodes_folder(options: Namespace, port: int) -> Path:
 def _routes(context: RouteContext) -> list[BaseRoute]:
     from katana450.extensions.recording.live.route import recording_route
     from katana450.extensions.recording.places import default_folder
+    from katana450.extensions.recording.playback.routes import PlaybackRoutes
+    from katana450.extensions.recording.playback.store import RecordingStore
 
     options = context.options
-    if options is None or options.no_record:
-        return [recording_route(context, None)]
-    from katana450.extensions.recording.episodes.routes import EpisodeRoutes, follow_episodes
-
+    records = options is not None and not options.no_record
     port = context.hub.stop_path.main_port
-    episodes = _episodes_folder(options, port)
-    follow_episodes(context.hub, episodes, port)
-    return [
-        recording_route(context, options.record or default_folder(port)),
-        *EpisodeRoutes(context, episodes, port).routes(),
-    ]
+    store = RecordingStore((options.record or default_folder(port)) if records else None)
+    routes = [recording_route(context, store), *PlaybackRoutes(context, store).routes()]
+    if records:
+        from katana450.extensions.recording.episodes.routes import EpisodeRoutes, follow_episodes
+
+        episodes = _episodes_folder(options, port)
+        follow_episodes(context.hub, episodes, port)
+        routes += EpisodeRoutes(context, episodes, port).routes()
+    return routes
+
+
+def _folder(context: FolderContext) -> PanelFolder:
+    from katana450.extensions.recording.playback.folder import PlaybackFolder
+
+    return PlaybackFolder(context)
 
 
 def _tick_sender(options: Namespace) -> TickSender | None:
@@ -125,6 +134,7 @@ EXTENSION = Extension(
     ServeExtension(
         add_serve_options,
         routes=_routes,
+        folder=_folder,
         process=_process,
         tick_sender=_tick_sender,
         needs=("programs",),

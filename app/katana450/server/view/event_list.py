@@ -1,4 +1,4 @@
-"""The event log in the panel: what limited the arm, when, by whose command, and what to do."""
+"""The event log in the panel of a mechanism: what limited it, when, and by whose command."""
 
 from __future__ import annotations
 
@@ -51,10 +51,12 @@ class EventList:
         return time.strftime("%H:%M:%S", time.localtime(self._epoch + entry.t))
 
 
+def problem_page(problem: str) -> str:
+    """Return the ``problem`` of the event log on disk as HTML; empty for none."""
+    return f"<div class='k450'><p class='status fault'>{escape(problem)}</p></div>" * bool(problem)
+
+
 def _page(rows: list[str], problem: str) -> str:
-    about = f"<p class='status fault'>{escape(problem)}</p>" if problem else ""
-    if not rows:
-        empty = "<p class='empty'>Nothing has limited the arm yet.</p>"
-        return f"<div class='k450'>{about}{empty}</div>"
-    table = f"<table class='event_log'><tbody>{''.join(rows)}</tbody></table>"
-    return f"<div class='k450'>{about}{table}</div>"
+    found = f"<table class='event_log'><tbody>{''.join(rows)}</tbody></table>"
+    shown = found if rows else "<p class='empty'>Nothing has limited the arm yet.</p>"
+    return f"{problem_page(problem)}<div class='k450'>{shown}</div>"

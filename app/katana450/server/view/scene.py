@@ -22,6 +22,9 @@ from katana450.server.viser_bridge.posing import Quaternion, place, turn
 Colour = tuple[int, int, int]
 """Red, green and blue, each from 0 to 255."""
 
+Window = viser.ViserServer | viser.ClientHandle
+"""The end of all windows, or of one window: the owner of a scene."""
+
 ANGLE_WORTH_SENDING = 1e-7
 """Smallest change of a joint [rad or m] that is sent: less than 0.1 um at a tool 0.6 m away."""
 
@@ -96,7 +99,7 @@ class _Sliding:
 class FrameTree:
     """One viser frame per link, nested as the links are. Subclasses add the shapes."""
 
-    def __init__(self, server: viser.ViserServer, root: str, robot: Robot) -> None:
+    def __init__(self, server: Window, root: str, robot: Robot) -> None:
         """Add the frames below the new node ``root``, for instance ``/arm``."""
         self._server = server
         self.root = server.scene.add_frame(root, show_axes=False)
@@ -180,7 +183,7 @@ class GhostNodes(FrameTree):
     """The translucent arm at the goal, or at a branch that can be chosen, in one colour."""
 
     def __init__(
-        self, server: viser.ViserServer, robot: Robot, root: str, colour: Colour, opacity: float
+        self, server: Window, robot: Robot, root: str, colour: Colour, opacity: float
     ) -> None:
         """Add the ghost below the new node ``root``, hidden."""
         super().__init__(server, root, robot)

@@ -23,7 +23,7 @@ from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.server.view.controls import GestureGate, refuse
-from katana450.server.view.scene import node_name
+from katana450.server.view.scene import Window, node_name
 from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place, turn
@@ -188,9 +188,7 @@ class SceneObjectNodes:
 class ObjectShape:
     """The drawn shape of an object: a file in its own colours, or a surface in one colour."""
 
-    def __init__(
-        self, server: viser.ViserServer, path: str, meshes: Meshes, prop: Any = None
-    ) -> None:
+    def __init__(self, server: Window, path: str, meshes: Meshes, prop: Any = None) -> None:
         """Prepare the shape below the node ``path``; ``prop``: GLB file of the cup or the basin."""
         self._scene = server.scene
         self._path = f"{path}/shape"

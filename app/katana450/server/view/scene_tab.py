@@ -1,4 +1,4 @@
-"""The tab "Scene" of the panel: objects, display options, and the event list."""
+"""The tab "Scene" of the panel: objects, display options, and a problem of the event log."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Callable
 
 import viser
 
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.state import State
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.display_options import DisplayOptions, add_shows, add_themes, add_views
-from katana450.server.view.event_list import EventList
+from katana450.server.view.event_list import problem_page
 from katana450.server.view.objects_panel import ObjectsPanel
 
 
@@ -42,10 +41,11 @@ class SceneTab:
             self._objects = ObjectsPanel(server, gestures, state, environment)
         with gui.add_folder("Show"):
             add_shows(gui, shows)
-        with gui.add_folder("Why", expand_by_default=False):
-            self._why = EventList(gui, gestures)
+        self._gestures, self._problem = gestures, gui.add_html("", visible=False)
 
-    def follow(self, state: State, event_log: tuple[LogEntry, ...], *, caught_up: bool) -> None:
-        """Show the objects of ``state``, and ``event_log``. ``caught_up``: see ``Panel.follow``."""
+    def follow(self, state: State, *, caught_up: bool) -> None:
+        """Show the objects of ``state``. ``caught_up``: see ``Panel.follow``."""
         self._objects.follow(state, caught_up=caught_up)
-        self._why.follow(event_log)
+        content = problem_page(self._gestures.log_problem)
+        if content != self._problem.content:
+            self._problem.content, self._problem.visible = content, bool(content)

@@ -157,8 +157,7 @@ class View(ViewUpdater):
             self._cameras.follow(state)
             caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(state, time.perf_counter(), caught_up=caught_up)
-            event_log = self._state_publisher.event_log
-            self._scene_tab.follow(state, event_log, caught_up=caught_up)
+            self._scene_tab.follow(state, caught_up=caught_up)
             for folder in self._folders:
                 folder.follow()
         self._server.flush()

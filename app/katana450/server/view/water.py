@@ -16,6 +16,7 @@ from katana450.maths.water.liquid import WATER, Liquid
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
+from katana450.server.view.scene import Window
 from katana450.srgb import to_light
 
 IN_VESSEL, IN_AIR, ON_TABLE = 0.58, 0.5, 0.3
@@ -47,7 +48,7 @@ class WaterNodes:
     """The nodes of the water. Only visible changes are sent, and nothing of water at rest."""
 
     def __init__(
-        self, server: viser.ViserServer, water_environment: WaterEnvironment, path: str = "/water"
+        self, server: Window, water_environment: WaterEnvironment, path: str = "/water"
     ) -> None:
         """Add the hidden nodes below the new node ``path``."""
         self._server, self._path = server, path

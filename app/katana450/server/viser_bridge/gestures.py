@@ -73,6 +73,11 @@ class Gestures:
             raise LeaseError("Open the start page to drive the arm.")
         return browser.actor
 
+    def client_of(self, key: str) -> int | None:
+        """Return viser's id of the browser that shows the window ``key``; None without one."""
+        # The newest connection of a window that has reconnected.
+        return max((n for n, b in [*self._browsers.items()] if b.slot.key == key), default=None)
+
     def submit(self, command: cmd.Command, actor: Actor) -> int:
         """See ``CommandGate.submit``."""
         return self._gate.submit(command, actor)

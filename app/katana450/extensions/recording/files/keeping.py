@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import tempfile
 from pathlib import Path
@@ -12,8 +13,12 @@ from katana450.extensions.recording.files.recovery import is_whole, recover
 from katana450.extensions.recording.files.trimming import Trimmed, trim
 from katana450.extensions.recording.places import recordings_in
 
+ALL = -math.inf, math.inf
 
-def keep(folder: Path, out: Path, last: float) -> Trimmed:
+
+def keep(
+    folder: Path, out: Path, last: float = math.inf, part: tuple[float, float] = ALL
+) -> Trimmed:
     """Write the last seconds of the ring in ``folder`` to ``out``; return what was written.
 
     The server may still write: of its present file, the part that is on the disk is taken. Only
@@ -23,6 +28,7 @@ def keep(folder: Path, out: Path, last: float) -> Trimmed:
         folder: folder of the ring.
         out: the new file.
         last: time before the end of the recording [s].
+        part: its first and last moment [s since the epoch].
 
     Raises:
         InputError: the folder has no recording, or ``out`` cannot be written.
@@ -47,8 +53,9 @@ def keep(folder: Path, out: Path, last: float) -> Trimmed:
                 "recorded while the arm rests."
             )
         with RecordingFile.open(copies[0]) as newest:
-            end = newest.end
-        return trim(copies, out, end - last, end)
+            end, offset = newest.end, newest.utc_offset
+        start, stop = (t - offset for t in part)
+        return trim(copies, out, max(end - last, start), min(end, stop))
 
 
 def whole_copy(path: Path, copy: Path) -> Path | None:

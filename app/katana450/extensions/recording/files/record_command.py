@@ -38,7 +38,7 @@ def record(options: Namespace) -> int:
     """
     match options.act:
         case "keep":
-            return _keep(options.folder, options.out, options.last)
+            return _keep(options)
         case "list":
             return _list(options.folder)
         case "info":
@@ -55,8 +55,9 @@ def record(options: Namespace) -> int:
             return _export(options)
 
 
-def _keep(folder: Path, out: Path, last: float) -> int:
-    return _written(out, keep(folder, out, last))
+def _keep(options: Namespace) -> int:
+    part = options.since or -math.inf, options.until or math.inf
+    return _written(options.out, keep(options.folder, options.out, options.last, part))
 
 
 def _list(folder: Path) -> int:

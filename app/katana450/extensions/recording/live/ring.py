@@ -18,6 +18,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.recovery import recover
+from katana450.extensions.recording.live.run_events import RunEvents
 from katana450.extensions.recording.places import SUFFIX, recordings_in
 from katana450.platform_support import claim_file, create_file
 
@@ -63,6 +64,7 @@ class Ring:
         self._retry_at = float("-inf")
         self._before: State | None = None
         self._newest = ""
+        self._run_events = RunEvents()
         self.unsynced = False
         """Whether ``sync`` has anything to bring to the disk."""
         self.lock = threading.RLock()
@@ -87,6 +89,8 @@ class Ring:
                 self._lost = 0
             self._writer.put(record)
             self._note_findings(record)
+            for kind, what in self._run_events.of(record):
+                self._writer.event(record.t, kind, what)
         except OSError as error:
             self._fail(error)
             self._lost += 1

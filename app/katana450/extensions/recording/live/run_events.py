@@ -1,0 +1,46 @@
+"""Events of a run that follow from its ticks: stops, who drives, and motions of programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.state import State
+from katana450.arm.runtime.tick import TickRecord
+
+STOP, CLEAR_STOP, DRIVER, STEP = "stop", "clear_stop", "driver", "step"
+"""Kinds of these events."""
+
+
+class RunEvents:
+    """Finds the events of one run, tick by tick."""
+
+    def __init__(self) -> None:
+        """Begin before the first tick."""
+        self._before: State | None = None
+        self._driver = ""
+
+    def of(self, record: TickRecord) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Yield kind and fields of each event of ``record``, the tick after the last one."""
+        for command, actor in record.submissions:
+            if actor is None or actor.channel is CommandChannel.SERVER or command.traits.safety:
+                continue
+            if actor.name != self._driver:
+                self._driver = actor.name
+                yield DRIVER, {"name": actor.name, "channel": actor.channel.value}
+        before, self._before = self._before, record.state
+        if before is None:
+            return
+        yield from _stops(before, record.state)
+        was, now = before.following, record.state.following
+        if now is not None and (was is None or was.plan is not now.plan):
+            yield STEP, {"seconds": now.plan.span}
+
+
+def _stops(before: State, after: State) -> Iterator[tuple[str, dict[str, Any]]]:
+    if after.stopped is not None and before.stopped is None:
+        cause = after.stopped.cause
+        yield STOP, {"why": cause.why, "by": cause.by}
+    elif after.stopped is None and before.stopped is not None:
+        yield CLEAR_STOP, {}

@@ -1,0 +1,155 @@
+"""Index of the chunks of a recording, also of one that a server is still writing.
+
+Only the heads of records are read, so that the end of a growing file is found in a millisecond.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from pathlib import Path
+from typing import BinaryIO, Final, NamedTuple
+
+from mcap.records import Channel, Chunk, Metadata
+from mcap.records import Message as McapMessage
+
+from katana450.errors import InputError
+from katana450.extensions.recording.files.header import METADATA
+from katana450.extensions.recording.files.recording_file import (
+    FAULTS,
+    PART_START,
+    BoundedStream,
+    Message,
+    records_at,
+    unpacked,
+)
+from katana450.extensions.recording.state_message import NANO
+
+MAX_UNPACKED = 16_000_000
+"""Maximum size of an unpacked chunk [bytes]; one holds a second of motion, half a megabyte."""
+
+MAGIC_BYTES: Final = 8
+HEAD: Final = struct.Struct("<BQ")
+"""Operation code and length of a record."""
+TIMES: Final = struct.Struct("<QQQ")
+"""Begin of a chunk: its first and last time [ns], and its unpacked size [bytes]."""
+CHANNEL: Final = struct.Struct("<H")
+
+METADATA_CODE, CHUNK_CODE, INDEX_CODE, END_CODE = 0x0C, 0x06, 0x07, 0x0F
+
+
+class ChunkSpan(NamedTuple):
+    """A chunk: its place in the file, its times [s], and the channels of its messages."""
+
+    offset: int
+    start: float
+    end: float
+    channels: frozenset[int]
+
+
+class ChunkIndex:
+    """The whole chunks of one file. For use by one thread at a time."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the index of the recording at ``path``. Raises InputError."""
+        self.path = path
+        self.metadata: dict[str, str] = {}
+        """Texts about the recording by their names."""
+        self.chunks: list[ChunkSpan] = []
+        """The chunks, in the order of the file."""
+        self._topics: dict[int, str] = {}
+        self._next = MAGIC_BYTES
+        self._ended = False
+        self.update()
+
+    @property
+    def utc_offset(self) -> float:
+        """Seconds to add to the times of the recording for seconds since the epoch."""
+        text = self.metadata.get("utc_offset_ns", "")
+        return int(text) / NANO if text.lstrip("-").isdigit() and len(text) < 20 else 0.0
+
+    @property
+    def part_start(self) -> float:
+        """Time at which a part begins that was cut out [s]; what is before serves simulation."""
+        try:
+            return float(self.metadata.get(PART_START, "-inf"))
+        except ValueError:
+            return -math.inf
+
+    def update(self) -> None:
+        """Find the chunks that were added since the last call. Raises InputError."""
+        if self._ended:
+            return
+        try:
+            with self.path.open("rb") as file:
+                self._scan(file)
+        except FAULTS as error:
+            why = str(error) or type(error).__name__
+            raise InputError(f"{self.path} is no recording, or is damaged: {why}.") from error
+        except OSError as error:
+            raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
+
+    def has(self, chunk: ChunkSpan, topic: str) -> bool:
+        """Return whether ``chunk`` has messages of ``topic``."""
+        return any(self._topics.get(each) == topic for each in chunk.channels)
+
+    def messages(self, chunk: ChunkSpan, *topics: str) -> list[Message]:
+        """Return the messages of ``topics`` in ``chunk``. Raises InputError."""
+        wanted = frozenset(topics)
+        try:
+            with self.path.open("rb") as file:
+                found = next(records_at(BoundedStream(file), chunk.offset))
+            if not isinstance(found, Chunk):
+                raise ValueError("its index is wrong")
+            return [
+                Message(topic, each.sequence, each.log_time, each.data)
+                for each in unpacked(found)
+                if isinstance(each, McapMessage)
+                and (topic := self._topics.get(each.channel_id, "")) in wanted
+            ]
+        except FAULTS as error:
+            why = str(error) or type(error).__name__
+            raise InputError(f"{self.path} is damaged: {why}.") from error
+        except OSError as error:
+            raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
+
+    def _scan(self, file: BinaryIO) -> None:
+        stream = BoundedStream(file)
+        if self._next == MAGIC_BYTES and stream.size >= MAGIC_BYTES:
+            # This checks the magic number too.
+            next(records_at(stream, 0), None)
+        while self._next + HEAD.size <= stream.size:
+            file.seek(self._next)
+            code, length = HEAD.unpack(file.read(HEAD.size))
+            if self._next + HEAD.size + length > stream.size:
+                # The rest is not written yet.
+                break
+            if code == CHUNK_CODE:
+                self._add_chunk(file, stream)
+            elif code == INDEX_CODE and self.chunks:
+                last = self.chunks[-1]
+                channels = last.channels | set(CHANNEL.unpack(file.read(CHANNEL.size)))
+                self.chunks[-1] = last._replace(channels=channels)
+            elif code == METADATA_CODE:
+                self._add_metadata(stream)
+            elif code == END_CODE:
+                self._ended = True
+                return
+            self._next += HEAD.size + length
+
+    def _add_chunk(self, file: BinaryIO, stream: BoundedStream) -> None:
+        first, last, size = TIMES.unpack(file.read(TIMES.size))
+        if size > MAX_UNPACKED:
+            raise ValueError(f"a chunk has {size} bytes, more than {MAX_UNPACKED}")
+        if not self.chunks:
+            # All channels are described in the first chunk.
+            chunk = next(records_at(stream, self._next))
+            if isinstance(chunk, Chunk):
+                found = (each for each in unpacked(chunk) if isinstance(each, Channel))
+                self._topics = {each.id: each.topic for each in found}
+        self.chunks.append(ChunkSpan(self._next, first / NANO, last / NANO, frozenset()))
+
+    def _add_metadata(self, stream: BoundedStream) -> None:
+        found = next(records_at(stream, self._next))
+        if isinstance(found, Metadata) and found.name == METADATA:
+            self.metadata = dict(found.metadata)

@@ -1,0 +1,56 @@
+"""Difference of two runs over one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.recording.playback.rows import StateRow
+
+MAX_POINTS = 200
+"""Number of points of a plot."""
+
+
+class RunDifference(NamedTuple):
+    """Differences at times ``t`` [s] since the begin of both runs.
+
+    Attributes:
+        t: the times [s].
+        joints: largest difference of a joint [deg].
+        tool: distance of the tool points [mm]; empty for robots without a tool.
+    """
+
+    t: list[float]
+    joints: list[float]
+    tool: list[float]
+
+
+def times_of(length: float) -> list[float]:
+    """Return the times of the points of a plot over ``length`` [s]."""
+    found: list[float] = np.linspace(0.0, max(length, 0.0), MAX_POINTS).tolist()
+    return found
+
+
+def difference(
+    times: Sequence[float], first: Sequence[StateRow | None], second: Sequence[StateRow | None]
+) -> RunDifference:
+    """Return the differences of the states of two runs at ``times`` [s].
+
+    Times at which one of them has no state are left out. Raises InputError for robots with
+    different joints.
+    """
+    found = RunDifference([], [], [])
+    for t, a, b in zip(times, first, second, strict=True):
+        if a is None or b is None:
+            continue
+        if len(a.q) != len(b.q):
+            raise InputError(f"The runs have {len(a.q)} and {len(b.q)} joints.")
+        turn = np.abs(np.subtract(a.q, b.q)).max(initial=0.0)
+        found.t.append(t)
+        found.joints.append(float(np.degrees(turn)))
+        if a.position is not None and b.position is not None:
+            found.tool.append(1e3 * float(np.linalg.norm(np.subtract(a.position, b.position))))
+    return found

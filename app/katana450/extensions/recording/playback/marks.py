@@ -1,0 +1,104 @@
+"""Marks of a timeline: what happened, from the events and episodes of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from katana450.arm.control.messages import finding_text
+from katana450.arm.control.state import Finding, Reason
+from katana450.extensions.recording.codec import json_form
+from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.live import run_events
+from katana450.extensions.recording.topics import EPISODES
+
+MAX_TEXT = 120
+"""Maximum number of letters of the text of a mark."""
+
+REPEATED = 1.0
+"""[s] Time in which a mark with the same text is left out."""
+
+WITHOUT_MARK = frozenset((Reason.STOPPED, Reason.PAUSED, Reason.WAITING))
+"""Reasons that another event reports, or that limit nothing."""
+
+
+class Mark(NamedTuple):
+    """A mark at ``t`` [s].
+
+    Its ``kind`` is stop, clear_stop, driver, step, contact, limit or episode.
+    """
+
+    t: float
+    kind: str
+    text: str
+
+
+def marks_of(messages: Iterable[Message]) -> list[Mark]:
+    """Return the marks of ``messages`` of events and episodes, without repetitions."""
+    found: list[Mark] = []
+    for mark in _all(messages):
+        again = (each for each in reversed(found) if mark.t - each.t < REPEATED)
+        if not any(each[1:] == mark[1:] for each in again):
+            found.append(mark)
+    return found
+
+
+def _all(messages: Iterable[Message]) -> Iterator[Mark]:
+    for message in messages:
+        try:
+            form = json_form(message.data)
+        except FormError:
+            continue
+        if not isinstance(form, dict):
+            continue
+        kind = form.get("kind")
+        found = (
+            ("episode", _episode(form)) if message.topic == EPISODES else _event(str(kind), form)
+        )
+        if found is not None:
+            yield Mark(message.t, found[0], found[1][:MAX_TEXT])
+
+
+def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
+    match kind:
+        case run_events.STOP:
+            return kind, str(form.get("why") or "Stopped")
+        case run_events.CLEAR_STOP:
+            return kind, "Stop cleared"
+        case run_events.DRIVER:
+            return kind, f"{form.get('name')} drives"
+        case run_events.STEP:
+            seconds = form.get("seconds")
+            length = f" of {seconds:.1f} s" if isinstance(seconds, int | float) else ""
+            return kind, f"Planned motion{length}"
+        case "finding" if form.get("began") is True:
+            return _finding(form)
+        case _:
+            return None
+
+
+def _finding(form: Mapping[str, Any]) -> tuple[str, str] | None:
+    try:
+        reason = Reason(form.get("reason"))
+    except ValueError:
+        return None
+    if reason in WITHOUT_MARK:
+        return None
+    kind = "contact" if reason is Reason.CONTACT else "limit"
+    axis, parts, amount = form.get("axis"), form.get("parts"), form.get("amount")
+    try:
+        finding = Finding(
+            reason,
+            float(amount or 0.0),
+            None if axis is None else int(axis) - 1,
+            None if parts is None else (str(parts[0]), str(parts[1])),
+        )
+        return kind, finding_text(finding)
+    except (TypeError, ValueError, LookupError):
+        return kind, reason.value
+
+
+def _episode(form: Mapping[str, Any]) -> str:
+    words = (form.get("kind"), form.get("task"), form.get("outcome"))
+    return "Episode: " + ", ".join(str(each) for each in words if each)

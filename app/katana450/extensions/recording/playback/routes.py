@@ -1,0 +1,247 @@
+"""Play back over HTTP, for the page: the timeline, a moment in one window, and opened files."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
+
+import msgspec
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from katana450.arm.control.actor import CommandChannel
+from katana450.errors import InputError
+from katana450.extensions.recording.playback.difference import difference, times_of
+from katana450.extensions.recording.playback.drawing import PlaybackWindows
+from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
+from katana450.extensions.recording.playback.run import PlaybackRun
+from katana450.extensions.recording.playback.spans import at_place, length_of, place_of
+from katana450.extensions.recording.playback.store import (
+    MAX_FILE_BYTES,
+    RING,
+    RecordingStore,
+    opened,
+)
+from katana450.server.api.fields import ROOT
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import PAGE
+from katana450.server.service.participants import actor_of, key_of
+from katana450.server.web.admission import client_of
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_LONG, TOO_MANY, TOO_SLOW
+from katana450.server.web.http_api import RouteContext
+
+AT_ONCE, WAITING = 2, 8
+"""Maximum number of requests that are worked on, and that wait, at the same time."""
+
+UPLOAD_TIMEOUT = 120.0
+"""[s] Timeout of receiving a file."""
+
+WRITTEN_BYTES = 1_000_000
+"""Bytes of a file that are received before they are written."""
+
+T = TypeVar("T")
+
+WINDOWS: WeakKeyDictionary[Hub, PlaybackWindows] = WeakKeyDictionary()
+"""The windows of each server, which has them once its scene is there."""
+
+
+class PlaybackRoutes:
+    """The HTTP routes of play back."""
+
+    def __init__(self, context: RouteContext, store: RecordingStore) -> None:
+        """Serve the recordings of ``store``."""
+        self._context, self._store = context, store
+        self._working = asyncio.Semaphore(AT_ONCE)
+        self._receiving = asyncio.Lock()
+        self._waiting = 0
+
+    def routes(self) -> list[BaseRoute]:
+        """Return all routes."""
+        path = f"{ROOT}/playback"
+        return [
+            Route(path, self._open, methods=["POST"]),
+            Route(f"{path}/show", self._show, methods=["POST"]),
+            Route(f"{path}/hide", self._hide, methods=["POST"]),
+            Route(f"{path}/difference", self._difference),
+            Route(f"{path}/{{name}}", self._timeline),
+        ]
+
+    async def _timeline(self, request: Request) -> Response:
+        """Return spans and marks of a recording."""
+        run = self._run(request, request.path_params["name"])
+
+        def read() -> Response:
+            run.update()
+            return _json({"spans": run.spans, "marks": run.marks()})
+
+        return await self._in_thread(read)
+
+    async def _show(self, request: Request) -> Response:
+        """Show a moment of one recording, or of two, in the window that asks."""
+        query = request.query_params
+        first = self._run(request, query.get("of", RING))
+        runs = [(first, _number(query.get("t")))]
+        if "second" in query:
+            runs.append((self._run(request, query["second"]), _number(query.get("t2"))))
+        windows, key = self._window(request)
+
+        def show() -> Response:
+            if any(not run.spans for run, _ in runs):
+                for run, _ in runs:
+                    run.update()
+            found = tuple(run.at(t) for run, t in runs)
+            if found[0] is None:
+                raise InputError("Nothing is recorded yet: the arm has not moved.")
+            windows.show(key, found)
+            moments = [_said(moment) for moment in found]
+            return _json({"moments": moments, "moving": windows.moving})
+
+        return await self._in_thread(show)
+
+    async def _hide(self, request: Request) -> Response:
+        self._context.identity(request)
+        windows, key = self._window(request)
+
+        def hide() -> Response:
+            windows.hide(key)
+            return Response(status_code=HTTPStatus.NO_CONTENT)
+
+        return await asyncio.to_thread(hide)
+
+    async def _difference(self, request: Request) -> Response:
+        """Return the difference of two recordings over one clock."""
+        query = request.query_params
+        first = self._run(request, query.get("of", RING))
+        second = self._run(request, query.get("second", RING))
+        begins = [_number(query.get(name)) for name in ("t", "t2")]
+
+        def compare() -> Response:
+            places = [
+                place_of(run.spans, t) for run, t in zip((first, second), begins, strict=True)
+            ]
+            left = [
+                length_of(run.spans) - place
+                for run, place in zip((first, second), places, strict=True)
+            ]
+            times = times_of(min(left))
+            rows = [
+                _rows(run, place, times) for run, place in zip((first, second), places, strict=True)
+            ]
+            return _json(difference(times, *rows)._asdict())
+
+        return await self._in_thread(compare)
+
+    async def _open(self, request: Request) -> Response:
+        """Receive a file, and return the name of its recording."""
+        sender = self._context.identity(request)
+        if not sender.role.may_drive:
+            raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not open files.")
+        if self._receiving.locked():
+            raise HTTPException(TOO_MANY, "Another file is being opened. Wait a moment.")
+        actor = actor_of(sender, CommandChannel.HTTP)
+        self._context.hub.recorder.note("upload", actor, {"path": request.url.path})
+        path = self._store.new_path()
+        async with self._receiving:
+            try:
+                async with asyncio.timeout(UPLOAD_TIMEOUT):
+                    await _received(request, path)
+                    run = await self._in_thread(lambda: opened(path))
+            except TimeoutError as error:
+                await asyncio.to_thread(path.unlink, missing_ok=True)
+                raise HTTPException(
+                    TOO_SLOW, f"The file took more than {UPLOAD_TIMEOUT:g} s."
+                ) from error
+            except BaseException:
+                path.unlink(missing_ok=True)
+                raise
+            return _json({"name": self._store.add(path, run)})
+
+    def _run(self, request: Request, name: str) -> PlaybackRun:
+        """Return the recording ``name`` for the sender of ``request``. Raises HTTPException."""
+        sender = self._context.identity(request)
+        if name != RING and not sender.role.may_drive:
+            raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not open files.")
+        try:
+            return self._store.run(name)
+        except InputError as error:
+            raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
+
+    def _window(self, request: Request) -> tuple[PlaybackWindows, str]:
+        """Return all windows, and the key of the one that asks. Raises HTTPException."""
+        windows, page = WINDOWS.get(self._context.hub), request.query_params.get("page", "")
+        client = client_of(self._context.authenticator, request)
+        if windows is None or client is None or not PAGE.fullmatch(page):
+            raise HTTPException(NOT_NOW, "The scene is not ready yet. Wait a moment.")
+        return windows, key_of(client, page)
+
+    async def _in_thread(self, act: Callable[[], T]) -> T:
+        """Return the result of ``act``, run in a thread. Raises HTTPException for its errors."""
+        if self._waiting >= WAITING:
+            raise HTTPException(TOO_MANY, "Too many people play back at once. Wait a moment.")
+        self._waiting += 1
+        try:
+            async with self._working:
+                return await asyncio.to_thread(act)
+        except InputError as error:
+            raise HTTPException(NOT_UNDERSTOOD, str(error)) from error
+        finally:
+            self._waiting -= 1
+
+
+async def _received(request: Request, path: Path) -> None:
+    """Write the body of ``request`` to ``path``. Raises HTTPException for a file too large."""
+    size, part = 0, bytearray()
+    file = await asyncio.to_thread(path.open, "wb")
+    try:
+        async for chunk in request.stream():
+            size += len(chunk)
+            if size > MAX_FILE_BYTES:
+                raise HTTPException(TOO_LONG, f"The file is larger than {MAX_FILE_BYTES} bytes.")
+            part += chunk
+            if len(part) >= WRITTEN_BYTES:
+                await asyncio.to_thread(file.write, bytes(part))
+                part.clear()
+        await asyncio.to_thread(file.write, bytes(part))
+    finally:
+        await asyncio.to_thread(file.close)
+
+
+def _rows(run: PlaybackRun, place: float, times: list[float]) -> list[StateRow | None]:
+    spans = run.spans
+    return [run.row_at(at_place(spans, place + t)) for t in times]
+
+
+def _said(moment: RecordedMoment | None) -> dict[str, Any] | None:
+    """Return what the page and programs read of a moment."""
+    if moment is None:
+        return None
+    row = moment.row
+    return {
+        "t": row.t,
+        "q": row.q,
+        "gripper": row.gripper,
+        "position": row.position,
+        "status": row.status,
+        "objects": {each.name: each.T[:3, 3].tolist() for each in moment.objects},
+    }
+
+
+def _number(text: str | None) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise HTTPException(HTTPStatus.BAD_REQUEST, "`t` and `t2` are seconds since the epoch.")
+    return value
+
+
+def _json(found: Any) -> Response:
+    return Response(msgspec.json.encode(found), media_type="application/json")

@@ -1,0 +1,192 @@
+"""The recorded states of a few seconds, decoded, and the moment at a time."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import msgspec
+import numpy as np
+
+from katana450.arm.control.pouring import CUP, MotionWithWater
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.recording.codec import Codec, json_form
+from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.topics import CHECKPOINTS, STATE
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.water.flow import Water
+from katana450.maths.water.puddle import Puddle
+from katana450.maths.water.slosh import Slosh
+from katana450.maths.water.units import MILLILITRE
+
+
+class ObjectRow(msgspec.Struct):
+    """Pose of an object: position [m] and quaternion x, y, z, w in the base frame."""
+
+    name: str
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
+    held: bool = False
+
+    @property
+    def T(self) -> FloatArray:
+        """The pose (4, 4) in the base frame."""
+        x, y, z, w = self.orientation
+        return se3.from_rotation_translation(so3.from_quaternion((w, x, y, z)), self.position)
+
+
+class WaterRow(msgspec.Struct):
+    """Volumes [ml]."""
+
+    cup: float
+    basin: float
+    air: float = 0.0
+    spilled: float = 0.0
+
+
+class StateRow(msgspec.Struct):
+    """The part of a recorded state that is played back; units as in docs/recording.md."""
+
+    t: float
+    q: list[float]
+    gripper: float = 0.0
+    status: str = ""
+    position: list[float] | None = None
+    objects: list[ObjectRow] = []
+    removed: list[str] = []
+    water: WaterRow | None = None
+
+
+@dataclass(frozen=True)
+class Description:
+    """The part of a complete state that other states refer to.
+
+    Attributes:
+        objects: the objects by name, with their shapes.
+        water: the water; None without a cup.
+    """
+
+    objects: Mapping[str, SceneObject] = field(default_factory=dict)
+    water: Water | None = None
+
+
+@dataclass(frozen=True)
+class RecordedMoment:
+    """A recorded state with all its objects.
+
+    Attributes:
+        row: the state.
+        objects: the objects that can be drawn, each in its pose then.
+        water: the water, with its surface at rest; None without a cup.
+    """
+
+    row: StateRow
+    objects: tuple[SceneObject, ...]
+    water: Water | None
+
+
+class Block:
+    """The states from one complete state to the next."""
+
+    def __init__(self, messages: Iterable[Message], descriptions: Iterable[Description]) -> None:
+        """Decode ``messages`` of the topic of states.
+
+        ``descriptions`` are those of the complete states before, in and after the block; a later
+        one adds objects that an earlier one has not. Raises InputError.
+        """
+        self._rows: list[StateRow] = []
+        self._poses: list[Mapping[str, ObjectRow]] = []
+        self._described: dict[str, SceneObject] = {}
+        self._water: Water | None = None
+        poses: dict[str, ObjectRow] = {}
+        for message in messages:
+            row = state_row(message)
+            if row.objects or row.removed:
+                poses = poses | {each.name: each for each in row.objects}
+                for name in row.removed:
+                    poses.pop(name, None)
+            self._rows.append(row)
+            self._poses.append(poses)
+        self._puddles: tuple[Puddle, ...] = ()
+        for each in descriptions:
+            self._described = {**each.objects, **self._described}
+            self._water = self._water or each.water
+            if each.water is not None:
+                self._puddles = self._puddles or each.water.puddles
+        self._times = [row.t for row in self._rows]
+
+    @property
+    def start(self) -> float:
+        """Time of the first state [s]; infinite without one."""
+        return self._times[0] if self._times else np.inf
+
+    def at(self, t: float) -> RecordedMoment | None:
+        """Return the last state at or before ``t`` [s]; None if there is none."""
+        number = bisect_right(self._times, t) - 1
+        if number < 0:
+            return None
+        row, poses = self._rows[number], self._poses[number]
+        objects = tuple(
+            # Drawn where it was, so the arm of today does not carry it.
+            replace(self._described[name], T=frozen(pose.T), held=False, fixed=False)
+            for name, pose in poses.items()
+            if name in self._described
+        )
+        return RecordedMoment(row, objects, self._water_of(row, poses))
+
+    def _water_of(self, row: StateRow, poses: Mapping[str, ObjectRow]) -> Water | None:
+        cup = poses.get(CUP)
+        if row.water is None or self._water is None or cup is None:
+            return None
+        return replace(
+            self._water,
+            cup=round(row.water.cup * MILLILITRE),
+            basin=round(row.water.basin * MILLILITRE),
+            film=0,
+            parcels=(),
+            puddles=self._puddles if row.water.spilled > 0.0 else (),
+            slosh=Slosh(),
+            T_base_cup=frozen(cup.T),
+        )
+
+
+def state_row(message: Message) -> StateRow:
+    """Return the state in ``message``. Raises InputError."""
+    try:
+        return msgspec.json.decode(message.data, type=StateRow)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise InputError(
+            f"The recording is damaged in the state at t = {message.t:.3f} s: {error}."
+        ) from error
+
+
+class Describer:
+    """Reads the objects and the water of complete states. For one file."""
+
+    def __init__(self) -> None:
+        self.codec = Codec()
+        self._fields = self.codec.fields(State)
+
+    def description(self, message: Message) -> Description:
+        """Return that of the complete state in ``message``. Raises InputError."""
+        try:
+            form = json_form(message.data)["state"]
+            objects: tuple[SceneObject, ...] = self._fields["objects"].decode(
+                form.get("objects", [])
+            )
+            poured: MotionWithWater | None = self._fields["poured"].decode(form.get("poured"))
+        except (FormError, TypeError, KeyError, AttributeError) as error:
+            raise InputError(
+                f"The recording is damaged in the state at t = {message.t:.3f} s: {error}."
+            ) from error
+        named = {each.name: each for each in objects}
+        return Description(named, None if poured is None else poured.water)
+
+
+TOPICS_OF_BLOCK = (STATE, CHECKPOINTS)
+"""Topics of which a block is made."""

@@ -1,0 +1,233 @@
+"""One run of a server as it was recorded, in one file or in the files of a ring."""
+
+from __future__ import annotations
+
+import threading
+from bisect import bisect_right
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from katana450.errors import InputError
+from katana450.extensions.recording.files.checking import KINDS, SharedMessage
+from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.playback.chunks import ChunkIndex, ChunkSpan
+from katana450.extensions.recording.playback.marks import Mark, marks_of
+from katana450.extensions.recording.playback.rows import (
+    Block,
+    Describer,
+    Description,
+    RecordedMoment,
+    StateRow,
+    state_row,
+)
+from katana450.extensions.recording.playback.spans import Span, spans_of
+from katana450.extensions.recording.shared_values import SharedText
+from katana450.extensions.recording.topics import (
+    CHECKPOINTS,
+    EPISODES,
+    EVENTS,
+    PLANS,
+    SOLIDS,
+    STATE,
+)
+
+MAX_BLOCKS = 24
+"""Number of decoded blocks that are kept, 4 min of motion; each has about 1 MB."""
+
+MAX_MARKS = 400
+"""Number of marks of a timeline; the newest are kept."""
+
+
+class _File:
+    """One file, and what was read of it."""
+
+    def __init__(self, path: Path) -> None:
+        self.index = ChunkIndex(path)
+        self.describer = Describer()
+        self.shared = 0
+        self.marked = 0
+        self.marks: list[Mark] = []
+        self._starts: list[int] = []
+        self._searched = 0
+
+    @property
+    def chunks(self) -> list[ChunkSpan]:
+        return self.index.chunks
+
+    @property
+    def starts(self) -> list[int]:
+        """The numbers of the chunks with a complete state."""
+        # The index of the newest chunk may still be missing.
+        while self._searched < len(self.chunks) and self.chunks[self._searched].channels:
+            if self.index.has(self.chunks[self._searched], CHECKPOINTS):
+                self._starts.append(self._searched)
+            self._searched += 1
+        return self._starts
+
+
+class _Place(NamedTuple):
+    """A block: its file, and the numbers of its first chunk and of the one after it."""
+
+    file: _File
+    first: int
+    last: int
+
+
+class PlaybackRun:
+    """The newest run in some files. For any thread; times are seconds since the epoch."""
+
+    def __init__(self, paths: Callable[[], Sequence[Path]]) -> None:
+        """Read files as they come. ``paths`` returns the files, the oldest first."""
+        self._paths = paths
+        self._files: list[_File] = []
+        self._blocks: OrderedDict[tuple[Path, int, int], Block] = OrderedDict()
+        self._lock = threading.Lock()
+        self._offset = 0.0
+        self.metadata: dict[str, str] = {}
+        """Texts about the newest file."""
+
+    def update(self) -> None:
+        """Read what was added. Raises InputError if there is nothing that can be read."""
+        with self._lock:
+            known = {each.index.path: each for each in self._files}
+            found: list[_File] = []
+            problem: InputError | None = None
+            for path in reversed(self._paths()):
+                try:
+                    file = known.get(path) or _File(path)
+                    file.index.update()
+                except InputError as error:
+                    problem = error
+                    continue
+                if not file.chunks or not file.index.metadata:
+                    continue
+                if found and file.index.utc_offset != found[0].index.utc_offset:
+                    break
+                found.append(file)
+            self._files = found[::-1]
+            if found:
+                self._offset, self.metadata = found[0].index.utc_offset, found[0].index.metadata
+            elif problem is not None:
+                raise problem
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """The times with records."""
+        shift = self._offset
+        return spans_of(
+            (max(each.start, file.index.part_start) + shift, each.end + shift)
+            for file in self._files
+            for each in file.chunks
+            if each.end >= file.index.part_start
+        )
+
+    def marks(self) -> list[Mark]:
+        """Return the newest marks in their order. Raises InputError for a damaged file."""
+        with self._lock:
+            found = [mark for file in self._files for mark in self._marks(file)]
+            return [each._replace(t=each.t + self._offset) for each in found[-MAX_MARKS:]]
+
+    def at(self, t: float) -> RecordedMoment | None:
+        """Return the state at ``t`` [s], or the first one after it; None without states.
+
+        Raises InputError for a damaged file.
+        """
+        with self._lock:
+            first: Block | None = None
+            for place in self._places(t - self._offset):
+                block = self._block(place)
+                moment = block.at(t - self._offset)
+                if moment is not None:
+                    return moment
+                first = block
+            return None if first is None else first.at(first.start)
+
+    def row_at(self, t: float) -> StateRow | None:
+        """Return the joints and the tool at ``t`` [s], without objects; None before the first.
+
+        This reads a second of the file at most, and keeps nothing.
+        """
+        with self._lock:
+            t -= self._offset
+            for file in reversed(self._files):
+                number = bisect_right(file.chunks, t, key=lambda each: each.start) - 1
+                for chunk in reversed(file.chunks[: number + 1]):
+                    if file.index.has(chunk, STATE):
+                        states = file.index.messages(chunk, STATE)
+                        before = [each for each in states if each.t <= t]
+                        if before:
+                            return state_row(before[-1])
+            return None
+
+    def _places(self, t: float) -> Iterator[_Place]:
+        """Yield the blocks in which the state at ``t`` [s] of the files' clock may be."""
+        for file in reversed(self._files):
+            starts = file.starts
+            after = bisect_right(starts, t, key=lambda number: file.chunks[number].start)
+            # The complete state of the last of these chunks may be after the time.
+            for number in range(after - 1, max(after - 3, -1), -1):
+                last = starts[number + 1] if number + 1 < len(starts) else len(file.chunks) - 1
+                yield _Place(file, starts[number], last)
+        oldest = self._files[0] if self._files else None
+        if oldest is not None and oldest.chunks:
+            yield _Place(oldest, 0, len(oldest.chunks[:2]) - 1)
+
+    def _block(self, place: _Place) -> Block:
+        index = place.file.index
+        key = (index.path, index.chunks[place.first].offset, index.chunks[place.last].offset)
+        known = self._blocks.get(key)
+        if known is None:
+            known = self._blocks[key] = self._read(place)
+            while len(self._blocks) > MAX_BLOCKS:
+                self._blocks.popitem(last=False)
+        self._blocks.move_to_end(key)
+        return known
+
+    def _read(self, place: _Place) -> Block:
+        """Decode a block: from the first complete state in its first chunk to that in its last."""
+        file, states = place.file, list[Message]()
+        self._share(file, place.last)
+        descriptions: list[Description] = []
+        for number in range(place.first, place.last + 1):
+            messages = file.index.messages(file.chunks[number], STATE, CHECKPOINTS)
+            complete = [each for each in messages if each.topic == CHECKPOINTS]
+            descriptions += map(file.describer.description, complete)
+            first = complete[0].number if complete else None
+            for each in messages:
+                if each.topic != STATE:
+                    continue
+                before = first is not None and each.number < first
+                if number == place.first and before:
+                    continue
+                if number > place.first and first is not None and not before:
+                    break
+                states.append(each)
+        return Block(states, descriptions)
+
+    def _share(self, file: _File, last: int) -> None:
+        """Read the plans and solids to which complete states up to a chunk refer."""
+        for number in range(file.shared, last + 1):
+            chunk = file.chunks[number]
+            if file.index.has(chunk, SOLIDS) or file.index.has(chunk, PLANS):
+                for each in file.index.messages(chunk, SOLIDS, PLANS):
+                    try:
+                        value = msgspec.json.decode(each.data, type=SharedMessage)
+                        text = SharedText(KINDS[each.topic], value.key, bytes(value.value))
+                        file.describer.codec.shared.add(text)
+                    except (FormError, msgspec.MsgspecError) as error:
+                        raise InputError(f"{file.index.path} is damaged: {error}.") from error
+        file.shared = max(file.shared, last + 1)
+
+    def _marks(self, file: _File) -> list[Mark]:
+        while file.marked < len(file.chunks) and file.chunks[file.marked].channels:
+            chunk = file.chunks[file.marked]
+            file.marked += 1
+            if file.index.has(chunk, EVENTS) or file.index.has(chunk, EPISODES):
+                file.marks += marks_of(file.index.messages(chunk, EVENTS, EPISODES))
+                del file.marks[:-MAX_MARKS]
+        return file.marks

@@ -1,0 +1,72 @@
+"""The recordings that a server plays back: its own last minutes, and files that people opened."""
+
+from __future__ import annotations
+
+import secrets
+import tempfile
+import weakref
+from collections import OrderedDict
+from pathlib import Path
+
+from katana450.errors import InputError
+from katana450.extensions.recording.places import SUFFIX, recordings_in
+from katana450.extensions.recording.playback.run import PlaybackRun
+
+RING = "ring"
+"""Name of the last minutes that the server has recorded itself."""
+
+MAX_FILE_BYTES = 200_000_000
+"""Maximum size of a file: three hours of motion without a pause."""
+
+MAX_FILES = 4
+"""Number of opened files that are kept; the one that was opened first is closed."""
+
+
+class RecordingStore:
+    """Runs by their names. For use in one thread, except for the runs themselves."""
+
+    def __init__(self, ring: Path | None) -> None:
+        """Offer the ring in the folder ``ring``, if there is one."""
+        self.ring = ring
+        self._temporary = tempfile.TemporaryDirectory(prefix="katana450-")
+        weakref.finalize(self, self._temporary.cleanup)
+        self._ring = None if ring is None else PlaybackRun(lambda: recordings_in(ring))
+        self._files: OrderedDict[str, tuple[Path, PlaybackRun]] = OrderedDict()
+
+    def run(self, name: str) -> PlaybackRun:
+        """Return the run ``name``. Raises InputError if there is none."""
+        if name == RING:
+            if self._ring is None:
+                raise InputError(
+                    "This server records nothing. Start it without --no-record to change that."
+                )
+            return self._ring
+        if name not in self._files:
+            raise InputError("The server no longer has that recording. Open its file again.")
+        return self._files[name][1]
+
+    def file(self, name: str) -> Path:
+        """Return the file of the opened recording ``name``. Raises InputError."""
+        self.run(name)
+        return self._files[name][0]
+
+    def new_path(self) -> Path:
+        """Return the path for a file that is being received."""
+        return Path(self._temporary.name) / f"{secrets.token_hex(8)}{SUFFIX}"
+
+    def add(self, path: Path, run: PlaybackRun) -> str:
+        """Keep ``run`` of the file ``path``, and return its name."""
+        self._files[path.stem] = path, run
+        while len(self._files) > MAX_FILES:
+            _, (old, _run) = self._files.popitem(last=False)
+            old.unlink(missing_ok=True)
+        return path.stem
+
+
+def opened(path: Path) -> PlaybackRun:
+    """Return the run in the file ``path``. Raises InputError if it is no recording."""
+    run = PlaybackRun(lambda: [path])
+    run.update()
+    if not run.spans:
+        raise InputError("The file is no recording of katana450, or it is empty.")
+    return run

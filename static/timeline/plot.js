@@ -1,0 +1,41 @@
+// The difference of two runs over one clock: the largest of a joint, and the distance of the tools.
+import { html, svg } from "../instruments/shape.js";
+
+const [WIDTH, HEIGHT] = [1000, 64];
+
+export class Plot {
+  #box;
+  #length = 0;
+  #cursor = svg("line", { y1: 0, y2: HEIGHT, class: "cursor" });
+
+  constructor(box) {
+    this.#box = box;
+  }
+
+  // Draw the difference, or nothing for null.
+  draw(found) {
+    this.#box.hidden = !found;
+    if (!found) return;
+    this.#length = found.t.at(-1) || 1;
+    const picture = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img" });
+    const words = [];
+    for (const [name, unit, label] of [["joints", "°", "largest joint difference"], ["tool", "mm", "tool distance"]]) {
+      const values = found[name];
+      if (!values.length) continue;
+      const high = Math.max(...values, 1e-3);
+      const points = values.map((each, i) => [(WIDTH * found.t[i]) / this.#length, HEIGHT - 3 - ((HEIGHT - 6) * each) / high]);
+      picture.append(svg("polyline", { points: points.map((each) => each.map((x) => x.toFixed(1)).join()).join(" "), class: name }));
+      words.push([name, `${label}, up to ${Math.max(...values).toFixed(1)} ${unit}`.replace(" °", "°")]);
+    }
+    picture.append(this.#cursor);
+    picture.setAttribute("aria-label", `Difference of the two runs: ${words.map(([, each]) => each).join("; ")}`);
+    const legend = words.map(([name, text]) => html("span", { class: name }, text));
+    this.#box.replaceChildren(html("p", {}, ...legend), picture);
+  }
+
+  // Mark the time [s] since the begin of both runs.
+  mark(t) {
+    const x = (WIDTH * Math.max(0, Math.min(t, this.#length))) / (this.#length || 1);
+    for (const end of ["x1", "x2"]) this.#cursor.setAttribute(end, x);
+  }
+}
