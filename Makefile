@@ -18,7 +18,7 @@ CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
         bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-lerobot bench-load bench-pictures bench-planning \
-        bench-recording bench-silence bench-start bench-stop bench-streams \
+        bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -107,6 +107,9 @@ bench-recording: $(dev_ok)    ## lateness of the control loop with and without r
 
 bench-stop: $(dev_ok)         ## time of STOP by both paths, alone and under attack
 	$(bin)/python -m benchmarks.stop $(ARGS)
+
+bench-scrub: $(dev_ok)        ## request to state, anywhere in a recording of an hour
+	$(bin)/python -m benchmarks.scrub $(ARGS)
 
 bench-busy: $(dev_ok)         ## pauses and stops of a simulated arm on a machine that others keep busy
 	$(bin)/python -m benchmarks.busy_machine $(ARGS)

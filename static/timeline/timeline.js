@@ -314,6 +314,7 @@ export class Timeline {
   }
 
   #words(t) {
+    /** @type {Intl.DateTimeFormatOptions} */
     const style = { hour: "2-digit", minute: "2-digit", second: "2-digit" };
     const at = new Date(1000 * t);
     const today = at.toDateString() === new Date().toDateString();

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import katana450
 from katana450.client import connect
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.run import PlaybackRun
@@ -18,7 +19,9 @@ from katana450.server.api import answers, requests
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import RECORDING_APP, AppServer
-from tests.browser.session import Truth
+from tests.browser.session import Truth, prepare
+from tests.browser.sight import overlap
+from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, in_sizes_and_schemes
 
 GHOST = "/playback/0/arm"
 LINK = "/arm/base_link/arm_base_link/pan_link"
@@ -26,6 +29,9 @@ TURNS = (0.5, -0.4)
 """[rad] Angles of axis 1 to which the arm turns, one after the other."""
 
 NOW = "Moment that is shown"
+
+EXEMPT = {("header", "phone"), ("header", "landscape"), ("nav", "landscape")}
+"""Parts that may overlap the timeline's box: the header's box includes the buttons of the page."""
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +102,7 @@ def place(page: ViserPage, value: float) -> None:
 def test_past_is_shown_in_one_window_until_stop(
     server: AppServer, folder: Path, open_page: OpenPage, artefacts: Path
 ) -> None:
-    page, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
+    page = open_page(server.url, nodes=("/arm",))
     truth = Truth(server)
     before = truth.status()["q"]
     opened(page)
@@ -133,10 +139,8 @@ def test_past_is_shown_in_one_window_until_stop(
     assert any("Ada pressed STOP" in each for each in titles), titles
     assert any("Ada drives" in each for each in titles), titles
 
-    # Nothing of this concerns the arm, or another window.
+    # Nothing of this concerns the arm.
     assert truth.status()["q"] == before
-    assert visible(other, LINK)
-    assert not other.frame.evaluate("() => Boolean(katanaScene.node('/playback/0/arm'))")
 
     # Esc stops the arm, and shows it.
     page.page.keyboard.press("Escape")
@@ -144,3 +148,131 @@ def test_past_is_shown_in_one_window_until_stop(
     assert truth.status()["stopped"] is not None
     assert slider.get_attribute("aria-valuetext") == "Live"
     assert page.errors == []
+
+
+@pytest.mark.long
+def test_other_windows_stay_live_and_acting_returns_to_live(
+    server: AppServer, open_page: OpenPage
+) -> None:
+    page, other = (open_page(server.url, nodes=("/arm", "/target/move")) for _ in range(2))
+    prepare(page, Truth(server))
+    opened(page)
+    since = time.time()
+    place(page, 1.0)
+    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
+    page.page.get_by_label("Play", exact=True).click()
+    page.wait_until(lambda: slider_place(page) > 2.0, "the run to continue")
+    page.page.get_by_label("Pause", exact=True).last.click()
+    stays = slider_place(page)
+    page.page.wait_for_timeout(300)
+    assert slider_place(page) == stays
+    assert visible(other, LINK)
+    assert not other.messages("FrameMessage", node=GHOST, since=since)
+    # A control of the panel moves the arm, so the window shows it.
+    page.type_number("1 base turn", 10.0)
+    page.wait_until(lambda: visible(page, LINK) and not visible(page, GHOST), "the present")
+    Truth(server).wait(moving=False)
+    assert Truth(server).status()["q"][0] == pytest.approx(np.radians(10.0), abs=1e-3)
+
+
+@pytest.mark.long
+def test_selection_is_saved_opened_and_compared(
+    server: AppServer, open_page: OpenPage, tmp_path: Path, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=WIDE)
+    opened(page)
+    # The last motion; the arm rests at first.
+    length = float(page.page.get_by_label(NOW).get_attribute("max") or 0.0)
+    ends = {"Begin of the selection": length - 1.9, "End of the selection": length - 0.4}
+    for name, value in ends.items():
+        page.page.get_by_label(name).evaluate(
+            "(each, value) => { each.value = value; each.dispatchEvent(new Event('input')); }",
+            value,
+        )
+    with page.page.expect_download() as downloading:
+        page.press_in_bar("Save selection")
+    path = tmp_path / "part.mcap"
+    downloading.value.save_as(path)
+    saved = katana450.open(path)
+    assert 0.5 < saved.t[-1] - saved.t[0] < 1.6
+    assert saved.verify().identical
+
+    # The file is opened, and its first state is shown.
+    page.page.locator("#timeline input[type=file]").set_input_files(path)
+    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
+    page.wait_until(lambda: abs(shown_turn(page) - saved.q[0][0]) < 1e-3, "its first posture")
+    lists = page.page.get_by_label("Recording", exact=True)
+    assert lists.locator("option:checked").inner_text() == "part.mcap"
+
+    # Beside the last minutes, on one clock.
+    lists.select_option("ring")
+    page.page.get_by_label("Second run").select_option(label="part.mcap")
+    page.page.locator("#timeline .plot polyline").first.wait_for()
+    page.wait_until(lambda: visible(page, "/playback/1/arm"), "the second arm")
+    place(page, 1.0)
+    run = PlaybackRun(lambda: [path])
+    run.update()
+    second = run.at(run.spans[0].start + 1.0)
+    assert second is not None
+    page.wait_until(
+        lambda: abs(shown_turn(page, "/playback/1/arm") - second.row.q[0]) < 1e-3,
+        "the second run at the same time",
+    )
+    page.keep(artefacts / "timeline-two-runs.png")
+
+    # What is no recording is refused with the reason.
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"nothing")
+    page.page.locator("#timeline input[type=file]").set_input_files(broken)
+    page.page.locator("#toast", has_text="no recording").wait_for()
+
+
+@pytest.mark.long
+def test_link_opens_the_page_at_its_moment(
+    server: AppServer, folder: Path, open_page: OpenPage
+) -> None:
+    run = PlaybackRun(lambda: recordings_in(folder))
+    run.update()
+    t = run.spans[0].start + 1.5
+    moment = run.at(t)
+    assert moment is not None
+    page = open_page(f"{server.url}/?moment=ring@{t:.3f}&x=", nodes=("/arm",))
+    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
+    page.wait_until(lambda: abs(shown_turn(page) - moment.row.q[0]) < 5e-3, "its posture")
+    page.page.get_by_role("button", name="Back to live").click()
+    page.wait_until(lambda: visible(page, LINK), "the present")
+
+
+@pytest.mark.long
+@in_sizes_and_schemes(("wide", "phone", "landscape"))
+def test_timeline_covers_nothing(
+    server: AppServer, open_page: OpenPage, artefacts: Path, size: str, scheme: str
+) -> None:
+    window = {"wide": WIDE, "phone": PORTRAIT, "landscape": LANDSCAPE}[size]
+    options = {} if size == "wide" else PHONE
+    page = open_page(server.url, nodes=("/arm",), window=window, color_scheme=scheme, **options)
+    opened(page)
+    scene = page.page.locator("#scene").bounding_box()
+    place(page, 1.0)
+    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
+    # The note about the past shifts nothing.
+    assert page.page.locator("#scene").bounding_box() == scene
+    page.keep(artefacts / f"timeline-{size}-{scheme}.png")
+    timeline = page.page.locator("#timeline").bounding_box()
+    assert timeline is not None
+    for name in ("#stop", "header", "#scene", "nav"):
+        # In landscape the buttons stand at the left, in the empty begin of the timeline.
+        box = page.page.locator(name).bounding_box()
+        assert box is not None
+        assert not overlap(timeline, **box) or (name, size) in EXEMPT, name
+    assert timeline["y"] + timeline["height"] <= window[1] + 0.5
+    small = page.page.locator("#timeline button, #timeline select").evaluate_all(
+        "(all) => all.map((each) => each.getBoundingClientRect().height)"
+    )
+    assert min(small) >= (32.0 if size == "wide" else 44.0) - 0.5
+    assert page.errors == []
+
+
+def slider_place(page: ViserPage) -> float:
+    """Return the place [s] of the moment that ``page`` shows."""
+    return float(page.page.get_by_label(NOW).input_value())

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 import struct
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
 
+import zstandard
 from mcap.records import Channel, Chunk, Metadata
-from mcap.records import Message as McapMessage
 
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import METADATA
@@ -34,8 +36,10 @@ HEAD: Final = struct.Struct("<BQ")
 TIMES: Final = struct.Struct("<QQQ")
 """Begin of a chunk: its first and last time [ns], and its unpacked size [bytes]."""
 CHANNEL: Final = struct.Struct("<H")
+MESSAGE: Final = struct.Struct("<HIQQ")
+"""Begin of a message: channel, number of the tick, log time and publish time [ns]."""
 
-METADATA_CODE, CHUNK_CODE, INDEX_CODE, END_CODE = 0x0C, 0x06, 0x07, 0x0F
+METADATA_CODE, MESSAGE_CODE, CHUNK_CODE, INDEX_CODE, END_CODE = 0x0C, 0x05, 0x06, 0x07, 0x0F
 
 
 class ChunkSpan(NamedTuple):
@@ -101,12 +105,8 @@ class ChunkIndex:
                 found = next(records_at(BoundedStream(file), chunk.offset))
             if not isinstance(found, Chunk):
                 raise ValueError("its index is wrong")
-            return [
-                Message(topic, each.sequence, each.log_time, each.data)
-                for each in unpacked(found)
-                if isinstance(each, McapMessage)
-                and (topic := self._topics.get(each.channel_id, "")) in wanted
-            ]
+            channels = {each: topic for each, topic in self._topics.items() if topic in wanted}
+            return list(_messages(_content(found), channels))
         except FAULTS as error:
             why = str(error) or type(error).__name__
             raise InputError(f"{self.path} is damaged: {why}.") from error
@@ -153,3 +153,41 @@ class ChunkIndex:
         found = next(records_at(stream, self._next))
         if isinstance(found, Metadata) and found.name == METADATA:
             self.metadata = dict(found.metadata)
+
+
+def _content(chunk: Chunk) -> bytes:
+    """Return the unpacked records of ``chunk``. Raises one of FAULTS."""
+    size = chunk.uncompressed_size
+    if size > MAX_UNPACKED:
+        raise ValueError(f"a chunk has {size} bytes, more than {MAX_UNPACKED}")
+    if chunk.compression not in ("", "zstd"):
+        raise ValueError(f"its chunks are compressed by {chunk.compression!r}, not by zstd")
+    content = chunk.data
+    if chunk.compression == "zstd":
+        # The unpacker uses as much memory as the frame says.
+        if zstandard.get_frame_parameters(chunk.data).content_size != size:
+            raise ValueError("the size of a chunk is wrong")
+        content = zstandard.ZstdDecompressor().decompress(chunk.data)
+    if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
+        raise ValueError("the checksum of a chunk is wrong")
+    return content
+
+
+def _messages(content: bytes, channels: Mapping[int, str]) -> Iterator[Message]:
+    """Yield the messages of ``channels`` in the records of a chunk.
+
+    Most messages of a chunk are of others. Skipping these here takes a tenth of the time that a
+    reader of whole records takes.
+    """
+    at, end = 0, len(content)
+    while at < end:
+        code, length = HEAD.unpack_from(content, at)
+        at += HEAD.size
+        if length > end - at:
+            raise EOFError("a record is longer than its chunk")
+        if code == MESSAGE_CODE:
+            channel, number, log_time, _ = MESSAGE.unpack_from(content, at)
+            topic = channels.get(channel)
+            if topic is not None:
+                yield Message(topic, number, log_time, content[at + MESSAGE.size : at + length])
+        at += length

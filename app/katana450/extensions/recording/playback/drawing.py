@@ -8,10 +8,11 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
+from katana450.arm.control.pouring import CUP
 from katana450.arm.control.session import Session
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.extensions.programs.server.ghost_scene import GhostScene
+from katana450.extensions.programs.server.ghost_scene import SAME_PLACE, GhostScene
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.server.view.scene import Colour, GhostNodes, node_name
 from katana450.server.viser_bridge.gestures import Gestures
@@ -36,12 +37,20 @@ class _RunDrawing:
         # Objects look as they did; those of a second run have its colour.
         self._scene = GhostScene(client, self._colour if number else None, opacity, root)
 
-    def show(self, moment: RecordedMoment, session: Session) -> None:
+    def show(self, moment: RecordedMoment, session: Session, other: RecordedMoment | None) -> None:
+        """Show ``moment``, without the objects that stand as in ``other``."""
         row = moment.row
         self._arm.move(self._robot.joint_values(np.array(row.q), row.gripper))
         self._arm.show(True, self._colour)
-        self._scene.place([(each, each.T) for each in moment.objects])
-        self._scene.pour(session, moment.objects, moment.water)
+        there = {} if other is None else {each.name: each.T for each in other.objects}
+        moved = [
+            each
+            for each in moment.objects
+            if each.name not in there or np.abs(each.T - there[each.name]).max() > SAME_PLACE
+        ]
+        self._scene.place([(each, each.T) for each in moved])
+        with_cup = any(each.name == CUP for each in moved)
+        self._scene.pour(session, moment.objects, moment.water if with_cup else None)
 
     def hide(self) -> None:
         self._arm.show(False, self._colour)
@@ -112,7 +121,7 @@ class PlaybackWindows:
                     if drawing is None:
                         drawing = _RunDrawing(window.client, self._robot, number)
                         window.runs[number] = drawing
-                    drawing.show(moment, session)
+                    drawing.show(moment, session, moments[0] if number else None)
                 elif drawing is not None:
                     drawing.hide()
         window.client.flush()

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import msgspec
-import numpy as np
 
 from katana450.arm.control.pouring import CUP, MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.codec import Codec, json_form
-from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.files.checking import KINDS, SharedMessage
+from katana450.extensions.recording.files.recording_file import Message, nanoseconds_of
 from katana450.extensions.recording.form_error import FormError
-from katana450.extensions.recording.topics import CHECKPOINTS, STATE
+from katana450.extensions.recording.shared_values import SharedText
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.flow import Water
@@ -99,18 +100,19 @@ class Block:
         ``descriptions`` are those of the complete states before, in and after the block; a later
         one adds objects that an earlier one has not. Raises InputError.
         """
-        self._rows: list[StateRow] = []
+        self._states = list(messages)
+        self._times = [each.log_time for each in self._states]
         self._poses: list[Mapping[str, ObjectRow]] = []
         self._described: dict[str, SceneObject] = {}
         self._water: Water | None = None
         poses: dict[str, ObjectRow] = {}
-        for message in messages:
-            row = state_row(message)
-            if row.objects or row.removed:
+        for message in self._states:
+            # Most states name no object, and are decoded when they are shown.
+            if any(each in message.data for each in CHANGES):
+                row = state_row(message)
                 poses = poses | {each.name: each for each in row.objects}
                 for name in row.removed:
                     poses.pop(name, None)
-            self._rows.append(row)
             self._poses.append(poses)
         self._puddles: tuple[Puddle, ...] = ()
         for each in descriptions:
@@ -118,19 +120,18 @@ class Block:
             self._water = self._water or each.water
             if each.water is not None:
                 self._puddles = self._puddles or each.water.puddles
-        self._times = [row.t for row in self._rows]
 
     @property
     def start(self) -> float:
         """Time of the first state [s]; infinite without one."""
-        return self._times[0] if self._times else np.inf
+        return self._states[0].t if self._states else math.inf
 
     def at(self, t: float) -> RecordedMoment | None:
         """Return the last state at or before ``t`` [s]; None if there is none."""
-        number = bisect_right(self._times, t) - 1
+        number = bisect_right(self._times, nanoseconds_of(t)) - 1
         if number < 0:
             return None
-        row, poses = self._rows[number], self._poses[number]
+        row, poses = state_row(self._states[number]), self._poses[number]
         objects = tuple(
             # Drawn where it was, so the arm of today does not carry it.
             replace(self._described[name], T=frozen(pose.T), held=False, fixed=False)
@@ -155,6 +156,10 @@ class Block:
         )
 
 
+CHANGES = (b'"objects":', b'"removed":')
+"""Parts of the messages of states in which objects have changed."""
+
+
 def state_row(message: Message) -> StateRow:
     """Return the state in ``message``. Raises InputError."""
     try:
@@ -169,8 +174,19 @@ class Describer:
     """Reads the objects and the water of complete states. For one file."""
 
     def __init__(self) -> None:
-        self.codec = Codec()
-        self._fields = self.codec.fields(State)
+        self._codec = Codec()
+        self._fields = self._codec.fields(State)
+
+    def add_solid(self, message: Message) -> None:
+        """Remember the solid in ``message``, to which objects refer. Raises InputError."""
+        try:
+            found = msgspec.json.decode(message.data, type=SharedMessage)
+            text = SharedText(KINDS[message.topic], found.key, bytes(found.value))
+            self._codec.shared.add(text)
+        except (FormError, msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            raise InputError(
+                f"The recording is damaged in the solid at t = {message.t:.3f} s: {error}."
+            ) from error
 
     def description(self, message: Message) -> Description:
         """Return that of the complete state in ``message``. Raises InputError."""
@@ -186,7 +202,3 @@ class Describer:
             ) from error
         named = {each.name: each for each in objects}
         return Description(named, None if poured is None else poured.water)
-
-
-TOPICS_OF_BLOCK = (STATE, CHECKPOINTS)
-"""Topics of which a block is made."""

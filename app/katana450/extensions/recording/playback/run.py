@@ -9,12 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
-
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import KINDS, SharedMessage
 from katana450.extensions.recording.files.recording_file import Message
-from katana450.extensions.recording.form_error import FormError
 from katana450.extensions.recording.playback.chunks import ChunkIndex, ChunkSpan
 from katana450.extensions.recording.playback.marks import Mark, marks_of
 from katana450.extensions.recording.playback.rows import (
@@ -26,12 +22,10 @@ from katana450.extensions.recording.playback.rows import (
     state_row,
 )
 from katana450.extensions.recording.playback.spans import Span, spans_of
-from katana450.extensions.recording.shared_values import SharedText
 from katana450.extensions.recording.topics import (
     CHECKPOINTS,
     EPISODES,
     EVENTS,
-    PLANS,
     SOLIDS,
     STATE,
 )
@@ -49,25 +43,28 @@ class _File:
     def __init__(self, path: Path) -> None:
         self.index = ChunkIndex(path)
         self.describer = Describer()
-        self.shared = 0
         self.marked = 0
         self.marks: list[Mark] = []
-        self._starts: list[int] = []
+        self.starts: list[int] = []
+        """The numbers of the chunks with a complete state."""
         self._searched = 0
 
     @property
     def chunks(self) -> list[ChunkSpan]:
         return self.index.chunks
 
-    @property
-    def starts(self) -> list[int]:
-        """The numbers of the chunks with a complete state."""
+    def update(self) -> None:
+        """Read what was added to the file. Raises InputError."""
+        self.index.update()
         # The index of the newest chunk may still be missing.
         while self._searched < len(self.chunks) and self.chunks[self._searched].channels:
-            if self.index.has(self.chunks[self._searched], CHECKPOINTS):
-                self._starts.append(self._searched)
+            chunk = self.chunks[self._searched]
+            if self.index.has(chunk, CHECKPOINTS):
+                self.starts.append(self._searched)
+            if self.index.has(chunk, SOLIDS):
+                for each in self.index.messages(chunk, SOLIDS):
+                    self.describer.add_solid(each)
             self._searched += 1
-        return self._starts
 
 
 class _Place(NamedTuple):
@@ -100,7 +97,7 @@ class PlaybackRun:
             for path in reversed(self._paths()):
                 try:
                     file = known.get(path) or _File(path)
-                    file.index.update()
+                    file.update()
                 except InputError as error:
                     problem = error
                     continue
@@ -191,7 +188,6 @@ class PlaybackRun:
     def _read(self, place: _Place) -> Block:
         """Decode a block: from the first complete state in its first chunk to that in its last."""
         file, states = place.file, list[Message]()
-        self._share(file, place.last)
         descriptions: list[Description] = []
         for number in range(place.first, place.last + 1):
             messages = file.index.messages(file.chunks[number], STATE, CHECKPOINTS)
@@ -208,20 +204,6 @@ class PlaybackRun:
                     break
                 states.append(each)
         return Block(states, descriptions)
-
-    def _share(self, file: _File, last: int) -> None:
-        """Read the plans and solids to which complete states up to a chunk refer."""
-        for number in range(file.shared, last + 1):
-            chunk = file.chunks[number]
-            if file.index.has(chunk, SOLIDS) or file.index.has(chunk, PLANS):
-                for each in file.index.messages(chunk, SOLIDS, PLANS):
-                    try:
-                        value = msgspec.json.decode(each.data, type=SharedMessage)
-                        text = SharedText(KINDS[each.topic], value.key, bytes(value.value))
-                        file.describer.codec.shared.add(text)
-                    except (FormError, msgspec.MsgspecError) as error:
-                        raise InputError(f"{file.index.path} is damaged: {error}.") from error
-        file.shared = max(file.shared, last + 1)
 
     def _marks(self, file: _File) -> list[Mark]:
         while file.marked < len(file.chunks) and file.chunks[file.marked].channels:

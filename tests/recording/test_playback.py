@@ -1,0 +1,213 @@
+"""Play back: the recorded states at any moment, marks, spans, and the difference of two runs."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+
+from benchmarks.scrub import write_run
+from katana450.arm.control.commands import ClearStop, Command, Follow, SetJoints, Stop
+from katana450.arm.control.lease import Role
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.state import State
+from katana450.arm.control.stop_cause import pressed
+from katana450.arm.runtime.tick import TickRecord
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.errors import InputError
+from katana450.extensions.recording.live.ring import Ring
+from katana450.extensions.recording.places import recordings_in
+from katana450.extensions.recording.playback.chunks import ChunkIndex
+from katana450.extensions.recording.playback.difference import difference
+from katana450.extensions.recording.playback.routes import PlaybackRoutes
+from katana450.extensions.recording.playback.rows import StateRow
+from katana450.extensions.recording.playback.run import PlaybackRun
+from katana450.extensions.recording.playback.spans import (
+    Span,
+    at_place,
+    length_of,
+    place_of,
+    spans_of,
+)
+from katana450.extensions.recording.playback.store import RecordingStore, opened
+from katana450.server.service.identity import Identity
+from katana450.server.web.http_api import RouteContext
+from tests.recording.recorded import ADA, header, record, run
+
+MAX_SCRUB = 0.15
+"""[s] Maximum time from a request to the state, anywhere in a recording of an hour."""
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[TickRecord]]:
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    return path, record(path, 350)
+
+
+def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]) -> None:
+    path, records = recorded
+    run = opened(path)
+    shift = run.spans[0].start - records[0].t
+    assert run.spans[-1].end == pytest.approx(records[-1].t + shift, abs=1e-6)
+    for each in random.Random(1).sample(records, 40):
+        moment = run.at(each.t + shift + 1e-6)
+        assert moment is not None
+        assert moment.row.q == each.state.q.tolist()
+        assert moment.row.gripper == each.state.gripper
+        poses = {found.name: found.T for found in moment.objects}
+        for wanted in each.state.objects:
+            if not wanted.carried and wanted.name in poses:
+                np.testing.assert_allclose(poses[wanted.name], wanted.T, atol=2e-6)
+        assert {"cup", "basin"} <= poses.keys()
+        row = run.row_at(each.t + shift + 1e-6)
+        assert row is not None
+        assert row.q == moment.row.q
+        if each.state.poured is not None and moment.water is not None:
+            kept = each.state.poured.water.kept
+            assert moment.water.cup == pytest.approx(kept, abs=1e3)
+    # Before the begin, the first state is shown.
+    first = run.at(0.0)
+    assert first is not None
+    assert first.row.q == records[0].state.q.tolist()
+
+
+def test_file_that_grows_is_read_as_far_as_it_is_written(
+    recorded: tuple[Path, list[TickRecord]], tmp_path: Path
+) -> None:
+    content = recorded[0].read_bytes()
+    path = tmp_path / "growing.mcap"
+    ends = []
+    run = PlaybackRun(lambda: [path])
+    begins = [each.offset for each in ChunkIndex(recorded[0]).chunks]
+    for size in (begins[1], begins[1] + 9, begins[-1] - 1, len(content)):
+        path.write_bytes(content[:size])
+        run.update()
+        ends.append(run.spans[-1].end)
+        assert run.at(ends[-1]) is not None
+    assert ends == sorted(ends)
+    assert ends[-1] > ends[0]
+
+
+def test_broken_files_are_refused(recorded: tuple[Path, list[TickRecord]], tmp_path: Path) -> None:
+    content = bytearray(recorded[0].read_bytes())
+    path = tmp_path / "broken.mcap"
+    for broken in (b"", b"no recording at all", bytes(content[:40])):
+        path.write_bytes(broken)
+        with pytest.raises(InputError):
+            opened(path)
+    rng = random.Random(2)
+    for _ in range(20):
+        damaged = bytearray(content)
+        for _ in range(20):
+            damaged[rng.randrange(len(damaged))] = rng.randrange(256)
+        path.write_bytes(damaged)
+        try:
+            run = opened(path)
+            for t in (run.spans[0].start, run.spans[-1].end):
+                run.at(t)
+            run.marks()
+        except InputError:
+            continue
+
+
+class StopAndPlan:
+    """The commands of a motion, a stop of Ada, and a plan."""
+
+    def __init__(self) -> None:
+        self._tick = 0
+
+    def __call__(
+        self, _rng: np.random.Generator, state: State, session: DescribedRobot
+    ) -> Iterator[Command]:
+        self._tick += 1
+        if self._tick == 5:
+            yield SetJoints(session.session.ready + 0.1)
+        elif self._tick == 30:
+            yield Stop(pressed("Ada", ADA.key, "press", 1e9))
+        elif self._tick > 150 and state.stopped is not None:
+            yield ClearStop()
+        elif self._tick > 170 and state.following is None and state.motion.at_rest:
+            world = session.session.world_at(state)
+            goal = session.session.ready - 0.05
+            yield Follow(plan_to(session.session.require_arm(), world, state, goal))
+
+
+def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
+    ring = Ring(tmp_path / "ring", header())
+    run(260, 1, ring.put, StopAndPlan(), odd=False)
+    ring.close()
+    played = PlaybackRun(lambda: recordings_in(tmp_path / "ring"))
+    played.update()
+    found = played.marks()
+    kinds = [each.kind for each in found]
+    assert kinds.count("stop") == 1
+    assert kinds.index("driver") < kinds.index("stop") < kinds.index("clear_stop")
+    assert kinds.index("clear_stop") < kinds.index("step")
+    words = {each.kind: each.text for each in found}
+    assert words["stop"] == "Ada pressed STOP."
+    assert words["driver"] in ("Ada drives", "the server drives")
+    (stop,) = (each for each in found if each.kind == "stop")
+    moment = played.at(stop.t + 1e-6)
+    assert moment is not None
+    assert moment.row.status == "stopped"
+
+
+def test_axis_leaves_out_the_rests() -> None:
+    spans = spans_of([(10.0, 11.0), (11.5, 13.0), (100.0, 104.0)])
+    assert spans == (Span(10.0, 13.0), Span(100.0, 104.0))
+    assert length_of(spans) == 7.0
+    for place, t in ((0.0, 10.0), (2.5, 12.5), (3.5, 100.5), (7.0, 104.0)):
+        assert at_place(spans, place) == t
+        assert place_of(spans, t) == place
+    assert place_of(spans, 50.0) == 3.0
+    assert (at_place(spans, -1.0), at_place(spans, 99.0)) == (10.0, 104.0)
+    assert at_place((), 1.0) == 0.0
+
+
+def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
+    first = StateRow(0.0, [0.0, 0.1], position=[0.3, 0.0, 0.1])
+    second = replace_row(first, q=[np.radians(3.0), 0.1], position=[0.3, 0.004, 0.103])
+    found = difference([0.0, 1.0, 2.0], [first, first, None], [first, second, second])
+    assert found.t == [0.0, 1.0]
+    assert found.joints == pytest.approx([0.0, 3.0])
+    assert found.tool == pytest.approx([0.0, 5.0])
+    with pytest.raises(InputError, match="2 and 1 joints"):
+        difference([0.0], [first], [replace_row(first, q=[0.0])])
+
+
+def replace_row(row: StateRow, **changes: object) -> StateRow:
+    return StateRow(**{name: getattr(row, name) for name in row.__struct_fields__} | changes)
+
+
+@pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])
+def test_viewers_open_no_files(tmp_path: Path, role: Role) -> None:
+    who = Identity("session", "Vera", role)
+    context = RouteContext(None, None, lambda _: who)  # type: ignore[arg-type]
+    (_, *_, timeline) = PlaybackRoutes(context, RecordingStore(tmp_path)).routes()
+    request = Request({"type": "http", "path_params": {"name": "0" * 16}, "headers": []})
+    with pytest.raises(HTTPException) as caught:
+        asyncio.run(timeline.endpoint(request))  # type: ignore[attr-defined]
+    assert caught.value.status_code == (403 if role is Role.VIEWER else 404)
+
+
+@pytest.mark.long
+def test_scrubbing_an_hour_takes_at_most_150_ms(tmp_path: Path) -> None:
+    path = tmp_path / "hour.mcap"
+    write_run(path, 3600.0)
+    run = opened(path)
+    start, end = run.spans[0].start, run.spans[-1].end
+    assert end - start > 3500.0
+    rng, taken = random.Random(3), []
+    for _ in range(100):
+        began = time.perf_counter()
+        assert run.at(rng.uniform(start, end)) is not None
+        taken.append(time.perf_counter() - began)
+    # One of a hundred may be delayed by what else the machine does.
+    assert sorted(taken)[-2] < MAX_SCRUB
