@@ -6,6 +6,7 @@ import asyncio
 import random
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +23,13 @@ from katana450.arm.control.stop_cause import pressed
 from katana450.arm.runtime.tick import TickRecord
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.chunks import ChunkIndex
 from katana450.extensions.recording.playback.difference import difference
 from katana450.extensions.recording.playback.routes import PlaybackRoutes
-from katana450.extensions.recording.playback.rows import StateRow
+from katana450.extensions.recording.playback.rows import StateRow, still_flying
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.spans import (
     Span,
@@ -37,9 +39,11 @@ from katana450.extensions.recording.playback.spans import (
     spans_of,
 )
 from katana450.extensions.recording.playback.store import RecordingStore, opened
+from katana450.maths.geometry import se3, so3
+from katana450.maths.water.flow import WaterFlow
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
-from tests.recording.recorded import ADA, header, record, run
+from tests.recording.recorded import ADA, described, header, record, run
 
 MAX_SCRUB = 0.15
 """[s] Maximum time from a request to the state, anywhere in a recording of an hour."""
@@ -157,6 +161,50 @@ def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
     moment = played.at(stop.t + 1e-6)
     assert moment is not None
     assert moment.row.status == "stopped"
+
+
+def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
+    """The cup is tilted by 1.6 rad in 1.2 s, over the basin and beyond."""
+    session = described().session
+    pouring = session.pouring
+    assert pouring is not None
+    state = session.begin(session.ready, 0.0, 1000.0)
+    cup = next(each for each in state.objects if each.name == "cup")
+    filled = pouring.fill(1.2e-4, state.objects, state.x)
+    assert filled is not None
+    flow, water, states = WaterFlow(pouring.water_environment(state.objects)), filled.water, []
+    path = tmp_path / "pour.mcap"
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header())
+        for number in range(150):
+            t = 1000.0 + 0.01 * number
+            R = so3.exp((0.0, min(1.6, 0.0133 * number), 0.0))
+            T = se3.from_rotation_translation(R, cup.T[:3, 3] + (0.0, 0.0, 0.2))
+            water = flow.step(water, T, (0.0, 0.0, 0.0), 0.01)
+            objects = tuple(
+                replace(each, T=T) if each.name == "cup" else each for each in state.objects
+            )
+            poured = replace(filled, water=water)
+            states.append(replace(state, t=t, objects=objects, poured=poured))
+            writer.put(TickRecord(t - 0.01, t, (), False, states[-1]))
+            if number % 20 == 19:
+                writer.flush()
+        writer.close()
+    run = opened(path)
+    shift = run.spans[0].start - 1000.0
+    assert max(len(each.poured.water.parcels) for each in states if each.poured) > 10
+    for wanted in states[::7]:
+        moment = run.at(wanted.t + shift + 1e-6)
+        assert moment is not None
+        assert moment.water is not None
+        assert wanted.poured is not None
+        found, true = still_flying(moment.water, flow.water_environment), wanted.poured.water
+        assert found.cup == pytest.approx(true.kept, abs=1e4)
+        assert found.basin == pytest.approx(true.basin, abs=1e4)
+        np.testing.assert_allclose(found.T_base_cup, true.T_base_cup, atol=2e-6)
+        assert len(found.parcels) == pytest.approx(len(true.parcels), abs=1)
+        for a, b in zip(found.parcels[::-1], true.parcels[::-1], strict=False):
+            np.testing.assert_allclose(a.at(a.age), b.at(b.age), atol=1e-4)
 
 
 def test_axis_leaves_out_the_rests() -> None:

@@ -19,6 +19,8 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.water.flow import Water
+from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import MILLILITRE
 
 DIGITS, SHOWN_DIGITS = 6, 5
@@ -89,6 +91,7 @@ class StateMessages:
                 "spilled": water.spilled,
             }
             message["water"] = {name: each / MILLILITRE for name, each in volumes.items()}
+            message["water"].update(_motion_of(water))
         return message
 
     def tool_pose(self, state: State) -> FloatArray | None:
@@ -154,6 +157,21 @@ class StateMessages:
             "translation": dict(zip("xyz", position, strict=True)),
             "rotation": dict(zip("xyzw", orientation, strict=True)),
         }
+
+
+def _motion_of(water: Water) -> dict[str, Any]:
+    """Return the lean of the surface in the cup, and the water that left it in this tick, if any.
+
+    Parcels fly freely, so each is described once.
+    """
+    found: dict[str, Any] = {}
+    if water.slosh != Slosh():
+        found["lean"] = [round(each, SHOWN_DIGITS) + 0.0 for each in water.slosh.up]
+    if water.parcels and water.parcels[-1].age == 0.0:
+        new = water.parcels[-1]
+        places = [[round(x, DIGITS) + 0.0 for x in each] for each in (new.start, new.velocity)]
+        found["left"] = [new.volume / MILLILITRE, *places, round(new.span, DIGITS)]
+    return found
 
 
 def _target(state: State) -> dict[str, Any]:

@@ -135,6 +135,8 @@ TOPICS: Final = (
             water=_object(
                 "volumes [ml]",
                 **{name: _number(name) for name in ("cup", "basin", "air", "spilled")},
+                lean=_numbers("(3,) normal of the surface in the cup, unless it is upright"),
+                left=_array({}, "what left the cup in this tick: ml, place, velocity, time [s]"),
             ),
         ),
     ),

@@ -13,7 +13,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.programs.server.ghost_scene import SAME_PLACE, GhostScene
-from katana450.extensions.recording.playback.rows import RecordedMoment
+from katana450.extensions.recording.playback.rows import RecordedMoment, still_flying
 from katana450.server.view.scene import Colour, GhostNodes, node_name
 from katana450.server.viser_bridge.gestures import Gestures
 
@@ -50,7 +50,10 @@ class _RunDrawing:
         ]
         self._scene.place([(each, each.T) for each in moved])
         with_cup = any(each.name == CUP for each in moved)
-        self._scene.pour(session, moment.objects, moment.water if with_cup else None)
+        water = moment.water if with_cup else None
+        if water is not None and session.pouring is not None:
+            water = still_flying(water, session.pouring.water_environment(moment.objects))
+        self._scene.pour(session, moment.objects, water)
 
     def hide(self) -> None:
         self._arm.show(False, self._colour)

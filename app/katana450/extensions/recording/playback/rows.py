@@ -20,10 +20,13 @@ from katana450.extensions.recording.form_error import FormError
 from katana450.extensions.recording.shared_values import SharedText
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.vectors import Vector
+from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water
+from katana450.maths.water.parcel import Parcel, landing
 from katana450.maths.water.puddle import Puddle
 from katana450.maths.water.slosh import Slosh
-from katana450.maths.water.units import MILLILITRE
+from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
 
 
 class ObjectRow(msgspec.Struct):
@@ -48,6 +51,8 @@ class WaterRow(msgspec.Struct):
     basin: float
     air: float = 0.0
     spilled: float = 0.0
+    lean: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    left: tuple[float, Vector, Vector, float] | None = None
 
 
 class StateRow(msgspec.Struct):
@@ -68,10 +73,12 @@ class Description:
     """The part of a complete state that other states refer to.
 
     Attributes:
+        t: its time [s].
         objects: the objects by name, with their shapes.
         water: the water; None without a cup.
     """
 
+    t: float
     objects: Mapping[str, SceneObject] = field(default_factory=dict)
     water: Water | None = None
 
@@ -83,7 +90,7 @@ class RecordedMoment:
     Attributes:
         row: the state.
         objects: the objects that can be drawn, each in its pose then.
-        water: the water, with its surface at rest; None without a cup.
+        water: the water, in which parcels that have landed may still fly; None without a cup.
     """
 
     row: StateRow
@@ -106,7 +113,14 @@ class Block:
         self._described: dict[str, SceneObject] = {}
         self._water: Water | None = None
         poses: dict[str, ObjectRow] = {}
+        self._parcels: list[tuple[float, Parcel]] = []
         for message in self._states:
+            if LEFT in message.data:
+                row = state_row(message)
+                if row.water is not None and row.water.left is not None:
+                    ml, start, velocity, span = row.water.left
+                    new = Parcel(round(ml * MILLILITRE), start, velocity, 0.0, span)
+                    self._parcels.append((row.t, new))
             # Most states name no object, and are decoded when they are shown.
             if any(each in message.data for each in CHANGES):
                 row = state_row(message)
@@ -116,6 +130,11 @@ class Block:
             self._poses.append(poses)
         self._puddles: tuple[Puddle, ...] = ()
         for each in descriptions:
+            if each.water is not None:
+                # One that has just left is in the state of the same tick too.
+                flying = [old for old in each.water.parcels if old.age > 0.0]
+                if each.t <= self.start:
+                    self._parcels += ((each.t - old.age, old) for old in flying)
             self._described = {**each.objects, **self._described}
             self._water = self._water or each.water
             if each.water is not None:
@@ -149,15 +168,32 @@ class Block:
             cup=round(row.water.cup * MILLILITRE),
             basin=round(row.water.basin * MILLILITRE),
             film=0,
-            parcels=(),
+            parcels=tuple(
+                each._replace(age=row.t - t)
+                for t, each in sorted(self._parcels)
+                if 0.0 <= row.t - t < MAX_FLIGHT
+            ),
             puddles=self._puddles if row.water.spilled > 0.0 else (),
-            slosh=Slosh(),
+            slosh=Slosh(row.water.lean[:2], weight=row.water.lean[2]),
             T_base_cup=frozen(cup.T),
         )
 
 
+LEFT = b'"left":'
+"""Part of the messages of states in which water has left the cup."""
+
+MAX_FLIGHT = 1.0
+"""[s] Time after which water has landed that fell 5 m."""
+
 CHANGES = (b'"objects":', b'"removed":')
 """Parts of the messages of states in which objects have changed."""
+
+
+def still_flying(water: Water, environment: WaterEnvironment) -> Water:
+    """Return ``water`` without the parcels that have landed."""
+    level = environment.basin.level(water.basin * FEMTOLITRE)
+    flying = (each for each in water.parcels if landing(each, environment, level).age > each.age)
+    return replace(water, parcels=tuple(flying))
 
 
 def state_row(message: Message) -> StateRow:
@@ -201,4 +237,4 @@ class Describer:
                 f"The recording is damaged in the state at t = {message.t:.3f} s: {error}."
             ) from error
         named = {each.name: each for each in objects}
-        return Description(named, None if poured is None else poured.water)
+        return Description(message.t, named, None if poured is None else poured.water)
