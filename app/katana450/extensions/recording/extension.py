@@ -80,11 +80,13 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
     from katana450.extensions.recording.playback.store import RecordingStore
 
     options = context.options
-    records = options is not None and not options.no_record
     port = context.hub.stop_path.main_port
-    store = RecordingStore((options.record or default_folder(port)) if records else None)
+    folder: Path | None = None
+    if options is not None and not options.no_record:
+        folder = options.record or default_folder(port)
+    store = RecordingStore(folder)
     routes = [recording_route(context, store), *PlaybackRoutes(context, store).routes()]
-    if records:
+    if options is not None and folder is not None:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes, follow_episodes
 
         episodes = _episodes_folder(options, port)
