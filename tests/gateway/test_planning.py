@@ -305,3 +305,19 @@ def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> No
     assert speeds == [1.0, 0.3]
     assert table.status == "done"
     assert table.arm.fraction == 0.3
+
+
+@pytest.mark.parametrize("ends", ["done", "stopped"])
+def test_tool_frame_is_restored_at_the_end_of_a_program(table: Staged, ends: str) -> None:
+    participant, before = table.join(PAGES[0]), table.arm.state.tool
+    table.plan(participant, "steps:\n  - tool: flange\n  - wait: 1\n")
+    table.programs.steer(participant, ProgramOrder.RUN)
+    table.wait(0.5, participant)
+    table.arm.rest = replace(table.arm.rest, tool="flange")
+    if ends == "stopped":
+        table.programs.steer(participant, ProgramOrder.END)
+    table.wait(3.0, participant)
+    assert table.status == ends
+    chosen = [each.name for each in table.arm.commands if isinstance(each, cmd.SetTool)]
+    # A program that was ended early can continue, with its own tool frame.
+    assert chosen == (["flange", before] if ends == "done" else ["flange"])

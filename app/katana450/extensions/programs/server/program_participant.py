@@ -46,6 +46,7 @@ class ProgramParticipant:
         hub.gate.program = RunningProgram(joined.person, owner.person.key)
         # The speed to restore at the end, and the last one that was commanded.
         self._speed = self._commanded = hub.present().state.speed
+        self._tool = hub.present().state.tool
         self.allowed = 1.0
 
     @property
@@ -69,9 +70,16 @@ class ProgramParticipant:
             ticket = self._hub.move(self.joined, sent)
         return ticket
 
-    def leave(self) -> None:
-        """Restore the speed, release the lease and leave the hub."""
+    def leave(self, *, done: bool) -> None:
+        """Restore the speed, release the lease and leave the hub.
+
+        ``done``: whether the program has reached its end. Then the tool frame is restored too; one
+        that was interrupted continues with its own.
+        """
         hub = self._hub
+        if done and self.drives and hub.present().state.tool != self._tool:
+            with suppress(InputError, LeaseError):
+                self.send(cmd.SetTool(self._tool))
         hub.gate.program = None
         with suppress(InputError):
             hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)

@@ -394,7 +394,7 @@ class ProgramRunner(Runner):
             self._interruption = Interruption.of(self.program, run, self.hub.present().state)
         left, self._runs_as = self._runs_as, None
         self._run = run
-        left.leave()
+        left.leave(done=run.phase is Phase.DONE)
         joined = left.joined
         log.info("The program %s: %s", joined.person.name, run.why or f"{run.phase.value}.")
         self.hub.recorder.note("program", joined.actor, {"ended": run.phase.value}, why=run.why)
