@@ -11,7 +11,7 @@ async function answered(url, options) {
 const post = (url, body = null) => answered(url, { method: "POST", body });
 
 // Return {spans, marks} of a recording.
-export const timeline = (of) => answered(`${API}/${of}`);
+export const timeline = (of) => answered(`${API}/${encodeURIComponent(of)}`);
 
 // Show a moment in the window `page`, and one of a second recording if there is one.
 export const show = (query) => post(`${API}/show?${new URLSearchParams(query)}`);

@@ -13,7 +13,7 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4];
 // Nodes of the present that are hidden while the past is shown, beside the links that move.
 const PRESENT = /^\/(ghost|cup|basin|water|velocity|(target|handles|objects|path|branch)\/[^/]+)$/;
 // Requests that do not concern what is seen.
-const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|watch|people|heartbeat)$/;
+const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|list_people|kick|mute|unmute|breakpoints|speed)$/;
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
 
 const icon = (d) => svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d }));
@@ -34,6 +34,7 @@ export class Timeline {
   #second = null; // {of, begin, mine}: second run, its begin, and that of the first one
   #busy = false; // whether a moment is requested
   #timer = 0;
+  #failed = false; // whether the last look at the recording failed
   #use; // what a chosen file is opened for
   #veiled = false; // whether the present is hidden
 
@@ -183,9 +184,11 @@ export class Timeline {
     try {
       const { spans, marks } = await api.timeline(this.#of);
       [this.#spans, this.#marks] = [spans, marks];
+      this.#failed = false;
     } catch (error) {
-      clearInterval(this.#timer);
-      this.#page.toast(error.message);
+      // Once, not each time.
+      if (!this.#failed) this.#page.toast(error.message);
+      this.#failed = true;
     }
     this.#drawMarks();
     this.#draw();

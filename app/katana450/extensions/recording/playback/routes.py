@@ -178,7 +178,9 @@ class PlaybackRoutes:
         windows, page = WINDOWS.get(self._context.hub), request.query_params.get("page", "")
         client = client_of(self._context.authenticator, request)
         if windows is None or client is None or not PAGE.fullmatch(page):
-            raise HTTPException(NOT_NOW, "The scene is not ready yet. Wait a moment.")
+            raise HTTPException(
+                NOT_NOW, "The scene is not ready yet, or shows no arm. Wait a moment."
+            )
         return windows, key_of(client, page)
 
     async def _in_thread(self, act: Callable[[], T]) -> T:
