@@ -31,6 +31,13 @@ TURNS = (0.5, -0.4)
 
 NOW = "Moment that is shown"
 
+DROP = """([name, bytes]) => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([new Uint8Array(bytes)], name));
+    window.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
+}"""
+"""Script that drops a file on the page."""
+
 EXEMPT = {("header", "phone"), ("header", "landscape"), ("nav", "landscape")}
 """Parts that may overlap the timeline's box: the header's box includes the buttons of the page."""
 
@@ -210,6 +217,18 @@ def test_selection_is_saved_opened_and_compared(
     lists = page.page.get_by_label("Recording", exact=True)
     assert lists.locator("option:checked").inner_text() == "part.mcap"
 
+    # A part of the file is saved too.
+    page.page.get_by_label("End of the selection").evaluate(
+        "(each) => { each.value = 0.5 * each.max; each.dispatchEvent(new Event('input')); }"
+    )
+    with page.page.expect_download() as downloading:
+        page.press_in_bar("Save selection")
+    downloading.value.save_as(tmp_path / "half.mcap")
+    half = katana450.open(tmp_path / "half.mcap")
+    assert half.verify().identical
+    assert (half.q[0] == saved.q[0]).all()
+    assert 0 < len(half.t) < len(saved.t)
+
     # Beside the last minutes, on one clock.
     lists.select_option("ring")
     page.page.get_by_label("Second run").select_option(label="part.mcap")
@@ -223,6 +242,12 @@ def test_selection_is_saved_opened_and_compared(
         "the second run at the same time",
     )
     page.keep(artefacts / "timeline-two-runs.png")
+
+    # A file that is dropped on the page is opened.
+    page.page.get_by_role("button", name="Back to live").click()
+    page.page.evaluate(DROP, [path.name, list(path.read_bytes())])
+    page.page.locator("#toast", has_text="part.mcap is open").wait_for()
+    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
 
     # What is no recording is refused with the reason.
     broken = tmp_path / "broken.mcap"
