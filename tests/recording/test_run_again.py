@@ -21,13 +21,16 @@ from katana450.errors import InputError
 from katana450.extensions.programs.clocked_run import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.run_again.again_command import part_and_script
+from katana450.extensions.recording.run_again.again_script import again_script
 from katana450.extensions.recording.run_again.path_difference import path_difference
 from katana450.extensions.recording.run_again.recorded_part import RecordedPart, read_part
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from tests.recording.recorded import described, header, run
@@ -231,6 +234,44 @@ def test_recording_of_a_run_is_verified_and_runs_again(dragged: Path, tmp_path: 
     part, again = read(path)
     trace = run_by_clock(planned(again)).trace
     assert path_difference(part.setpoint, trace.t, trace.q).joints < TOLERANCE
+
+
+def moved(*pieces: FloatArray) -> RecordedPart:
+    """Return a part whose axis 1 has the values of ``pieces`` [rad], 100 a second."""
+    angle = np.concatenate(pieces)
+    setpoint = np.tile(described().session.ready, (len(angle), 1))
+    setpoint[:, 0] = angle
+    count = len(angle)
+    still = np.zeros(count, dtype=bool)
+    t = 0.01 * np.arange(float(count))
+    return RecordedPart(t, setpoint, np.zeros(count), still, ("",) * count, ("tcp",) * count, "x")
+
+
+def test_motions_below_the_rounding_are_left_out() -> None:
+    up, rest = np.linspace(0.0, 0.1, 50), np.full(30, 0.1)
+    tiny = 0.1 + np.linspace(1e-9, 4e-6, 20)
+    part = moved(up, rest, tiny, np.full(30, tiny[-1]), tiny[-1] - up)
+    text = again_script(part, described().session.require_arm().gripper)
+    assert text.count("trajectory:") == 2
+    assert [step for step in re.findall(r"- (\w+):", text) if step != "trajectory"] == [
+        "joints", "gripper", "wait", "wait",
+    ]  # fmt: skip
+    program_ = planned(text).program
+    assert not any("approach" in task.name for task in program_.tasks)
+
+
+def test_part_with_too_much_motion_is_refused_and_a_long_one_is_coarser() -> None:
+    t = np.arange(0.0, 60.0, 0.01)
+    gripper = described().session.require_arm().gripper
+    slow = 0.05 * np.sin(4.4 * t)
+    with pytest.raises(InputError, match="60 s with too much motion for one script"):
+        again_script(moved(slow + 0.02 * np.sin(31.0 * t)), gripper)
+    part = moved(slow + 0.02 * np.sin(18.0 * t))
+    text = again_script(part, gripper).split("through:")[1]
+    rows = np.array(re.findall(r"\[([\d.]+), (\S+),", text), dtype=float)
+    spline = CubicSpline(rows[:, 0], np.radians(rows[:, 1:]))
+    off = np.abs(spline.values_at(part.t)[:, 0] - part.setpoint[:, 0]).max()
+    assert 1e-4 < off < 3.1e-4
 
 
 def test_difference_is_that_of_the_paths() -> None:

@@ -12,9 +12,10 @@ import yaml
 
 from katana450.arm.control.arm import GripperModel
 from katana450.errors import InputError
+from katana450.extensions.programs.blocks import MAX_STEPS
 from katana450.extensions.programs.script import MAX_NAME_LENGTH
 from katana450.extensions.programs.source import MAX_BYTES, MAX_VALUES
-from katana450.extensions.programs.trajectory import TRAJECTORY
+from katana450.extensions.programs.trajectory import MAX_POSTURES, TRAJECTORY
 from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.run_again.recorded_part import RecordedPart
 from katana450.maths.geometry.arrays import FloatArray, IntArray
@@ -25,6 +26,9 @@ would be too long."""
 
 MIN_REST = 0.1
 """[s] Shorter rests belong to the motion."""
+
+MIN_MOTION = 1e-5
+"""[rad] Smaller motions are left out; the next one then begins where the last one ended."""
 
 FINGER_REST = 0.3
 """[s] Motions of the fingers with a shorter rest between are one."""
@@ -90,13 +94,19 @@ def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = Fals
     pieces = tuple(pieces_of(part))
     for tolerance in TOLERANCES:
         steps = list(_steps(part, pieces, tolerance, gripper))
-        count = sum(len(each[TRAJECTORY]["through"]) for each in steps if TRAJECTORY in each)
+        counts = [len(each[TRAJECTORY]["through"]) for each in steps if TRAJECTORY in each]
+        events = EVENTS_OF_ROW * (sum(counts) + len(steps) + 5)
         text = _text(part, steps, bare=bare)
-        if len(text.encode()) <= MAX_BYTES and EVENTS_OF_ROW * (count + 20) <= MAX_VALUES:
+        if (
+            len(text.encode()) <= MAX_BYTES
+            and events <= MAX_VALUES
+            and max(counts, default=0) <= MAX_POSTURES
+            and len(steps) <= MAX_STEPS
+        ):
             return text
     raise InputError(
-        f"This part has {part.duration:.0f} s of motion, which are too many for one script. Choose "
-        "a shorter part by --from and --to."
+        f"This part has {part.duration:.0f} s with too much motion for one script. Choose a "
+        "shorter part by --from and --to."
     )
 
 
@@ -124,7 +134,8 @@ def pieces_of(part: RecordedPart) -> Iterator[Piece]:
             yield FingerMotion(float(part.fingers[end]), part.held[end])
             busy = float(part.t[end])
         if moves[first]:
-            yield Motion(first, last)
+            if float(np.ptp(part.setpoint[first : last + 1], axis=0).max()) > MIN_MOTION:
+                yield Motion(first, last)
         elif first > 0 and last < len(part.t) - 1:
             # Rests before the first motion and after the last are left out.
             seconds = _rest(part, first, last, busy)
@@ -165,6 +176,7 @@ def _steps(
     part: RecordedPart, pieces: tuple[Piece, ...], tolerance: float, gripper: GripperModel
 ) -> Iterator[dict[str, Any]]:
     """Yield the steps of the script."""
+    end: list[float] = []
     scale = 1e3 if gripper.slides else math.degrees(1.0)
     yield {"joints": _degrees(part.setpoint[0], EXACT_DIGITS)}
     if gripper.moves:
@@ -186,6 +198,9 @@ def _steps(
                     [round(float(at), TIME_DIGITS), *_degrees(each, ANGLE_DIGITS)]
                     for at, each in zip(t[chosen], q[chosen], strict=True)
                 ]
+                # After motions that were left out, the difference is far below the tolerance.
+                rows[0][1:] = end or rows[0][1:]
+                end = rows[-1][1:]
                 yield {TRAJECTORY: {"through": rows}}
 
 
