@@ -16,6 +16,7 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.continuation import continued
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import parse
@@ -26,6 +27,13 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from tests.programs.conftest import TICK, Stage
+from tests.programs.test_continuation import (
+    after_return,
+    interruption_of,
+    off_path,
+    played,
+    stopped_after,
+)
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "programs" / "wave.yaml"
 READY = (0.0, -68.0, 85.0, 8.0, 0.0)
@@ -124,6 +132,17 @@ def with_box(stage: Stage, q: FloatArray) -> State:
     place[:3, 3] = T[:3, 3] - (0.0, 0.0, 0.02)
     box = SceneObject("box", Shape.BOX, (0.04, 0.04, 0.04), place)
     return stage.session.step(state, (PlaceObject(box),), TICK)
+
+
+def test_stopped_trajectory_continues_on_its_path(stage: Stage) -> None:
+    program = compiled(parse(script(swing(4.0, 30.0))), stage.plan_context, stage.begin())
+    path, _ = plan_of(program)
+    run, state = stopped_after(stage, program, 150)
+    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    states = played(stage, rest, state)
+    np.testing.assert_allclose(states[-1].setpoint, path.end, atol=1e-9)
+    assert np.degrees(max(each.setpoint[0] for each in states)) == pytest.approx(30.0, abs=0.05)
+    assert off_path(rest, after_return(rest, states)) < 5e-3
 
 
 def test_contact_is_refused_with_its_time_and_the_parts(stage: Stage) -> None:

@@ -28,7 +28,7 @@ from katana450.extensions.recording.live import record_end, ring
 from katana450.extensions.recording.live.record_end import RecordEnd, lost_records
 from katana450.extensions.recording.live.record_wire import RecordDeserializer
 from katana450.extensions.recording.live.ring import Ring
-from katana450.extensions.recording.live.route import recording_route
+from katana450.extensions.recording.live.route import recording_routes
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, STATE
@@ -119,7 +119,7 @@ def test_viewers_get_no_recording(folder: Path, role: Role) -> None:
     context = RouteContext(None, None, lambda _: who)  # type: ignore[arg-type]
     request = Request({"type": "http", "query_string": b"", "headers": []})
     with pytest.raises(HTTPException) as caught:
-        asyncio.run(recording_route(context, RecordingStore(folder)).endpoint(request))
+        asyncio.run(recording_routes(context, RecordingStore(folder))[0].endpoint(request))
     # An operator passes the check of the role, and learns that the folder is still empty.
     assert caught.value.status_code == (403 if role is Role.VIEWER else 409)
     assert ("may watch" if role is Role.VIEWER else "has no recording") in caught.value.detail

@@ -14,9 +14,11 @@ import pytest
 import katana450
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
+from katana450.extensions.programs.script import parse
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Shape
 from tests.browser.server import RECORDING_APP, AppServer
+from tests.gateway.client import ask, enter
 from tests.recording.test_recorder import waited_for
 
 TARGETS = ((0.33, 0.05, 0.08), (0.28, -0.04, 0.03), (0.3, 0.0, 0.06))
@@ -62,6 +64,16 @@ def test_recorded_drag_runs_again(
     with katana450.connect(server.url, "Ada") as client:
         end = client.query(answers.State).q
     assert np.abs(katana450.open(recorded).setpoint[-1] - end).max() < 1e-6
+
+
+def test_script_of_the_last_seconds_is_served(server: AppServer, recorded: Path) -> None:
+    address, cookie = f"{server.url}/api/v1/recording/script", enter(server.url)
+    for query, status in (("?from=-1", 400), ("?to=x", 400), ("?from=9e9", 409), ("", 200)):
+        answer = ask(address + query, Cookie=cookie)
+        assert answer[0] == status, answer[2]
+    script = parse(answer[2].decode())
+    assert [located.step.__class__.__name__ for located in script.steps][-1] == "FollowTrajectory"
+    assert len(katana450.open(recorded).t) > 100
 
 
 def test_stop_in_the_middle_ends_it_and_it_can_run_again(

@@ -125,10 +125,22 @@ def _nearest(plan: Plan, tau: float, q: FloatArray) -> float:
     for _ in range(REFINEMENTS):
         places = np.linspace(low, high, SAMPLES)
         apart = [float(np.abs(plan.q(each) - q).max()) for each in places.tolist()]
-        number = int(np.argmin(apart))
+        number = _first_nearest(np.array(apart))
         best = float(places[number])
         low, high = float(places[max(number - 1, 0)]), float(places[min(number + 1, SAMPLES - 1)])
     return best
+
+
+def _first_nearest(apart: FloatArray) -> int:
+    """Return the index of the first minimum of ``apart`` (N,) that is as low as the lowest.
+
+    Minima count as equal within the largest change from one sample to the next, because a path that
+    leads back the same way passes a place twice.
+    """
+    padded = np.pad(apart, 1, constant_values=math.inf)
+    minima = np.flatnonzero((apart <= padded[:-2]) & (apart <= padded[2:]))
+    allowed = float(apart.min()) + float(np.abs(np.diff(apart)).max(initial=0.0))
+    return int(minima[apart[minima] <= allowed][0])
 
 
 def _way(plan_context: PlanContext, state: State, q: FloatArray) -> FollowPlan:

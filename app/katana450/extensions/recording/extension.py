@@ -74,7 +74,7 @@ def _episodes_folder(options: Namespace, port: int) -> Path:
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
-    from katana450.extensions.recording.live.route import recording_route
+    from katana450.extensions.recording.live.route import recording_routes
     from katana450.extensions.recording.places import default_folder
     from katana450.extensions.recording.playback.routes import PlaybackRoutes
     from katana450.extensions.recording.playback.store import RecordingStore
@@ -85,7 +85,7 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
     if options is not None and not options.no_record:
         folder = options.record or default_folder(port)
     store = RecordingStore(folder)
-    routes = [recording_route(context, store), *PlaybackRoutes(context, store).routes()]
+    routes = [*recording_routes(context, store), *PlaybackRoutes(context, store).routes()]
     if options is not None and folder is not None:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes, follow_episodes
 

@@ -25,16 +25,16 @@ TIMEOUT = 60.0
 """[s] Timeout for making a file of ten minutes."""
 
 
-def recording_route(context: RouteContext, store: RecordingStore) -> Route:
-    """Return the route that answers with a recording of the last minutes, or a part of one.
+def recording_routes(context: RouteContext, store: RecordingStore) -> list[Route]:
+    """Return the routes of a recording of the last minutes, or a part of one, and of its script.
 
-    ``store`` has the folder of the ring, and the files that people opened.
+    The script runs the recorded motion again. ``store`` has the folder of the ring, and the files
+    that people opened.
     """
     working = asyncio.Lock()
 
-    async def recording(request: Request) -> Response:
-        sender = context.identity(request)
-        if not sender.role.may_drive:
+    async def made(request: Request, *, script: bool) -> bytes:
+        if not context.identity(request).role.may_drive:
             raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not record.")
         command = _command(store, request.query_params)
         if working.locked():
@@ -42,11 +42,22 @@ def recording_route(context: RouteContext, store: RecordingStore) -> Route:
                 HTTPStatus.TOO_MANY_REQUESTS, "Another recording is being made. Wait a moment."
             )
         async with working:
-            content = await _made(command)
+            with tempfile.TemporaryDirectory(prefix="katana450-") as temporary:
+                kept, again = Path(temporary) / "kept.mcap", Path(temporary) / "again.yaml"
+                await _record(*command, "--out", str(kept))
+                if script:
+                    await _record("again", str(kept), "--out", str(again))
+                return await asyncio.to_thread((again if script else kept).read_bytes)
+
+    async def recording(request: Request) -> Response:
         headers = {"Content-Disposition": 'attachment; filename="katana450.mcap"'}
+        content = await made(request, script=False)
         return Response(content, media_type="application/octet-stream", headers=headers)
 
-    return Route(f"{ROOT}/recording", recording)
+    async def script(request: Request) -> Response:
+        return Response(await made(request, script=True), media_type="application/yaml")
+
+    return [Route(f"{ROOT}/recording", recording), Route(f"{ROOT}/recording/script", script)]
 
 
 def _command(store: RecordingStore, query: Mapping[str, str]) -> tuple[str, ...]:
@@ -81,29 +92,25 @@ def _seconds(query: Mapping[str, str], name: str) -> float:
     return value
 
 
-async def _made(command: tuple[str, ...]) -> bytes:
-    """Return the recording that ``katana450 record`` makes by ``command``.
+async def _record(*command: str) -> None:
+    """Run ``katana450 record`` in another process, so that the work delays nobody.
 
-    Another process makes it, so that the work delays nobody.
+    Raises HTTPException with its error, and after TIMEOUT.
     """
-    with tempfile.TemporaryDirectory(prefix="katana450-") as temporary:
-        out = Path(temporary) / "kept.mcap"
-        words = ("record", *command, "--out", str(out))
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-P", "-m", "katana450", *words, stdout=PIPE, stderr=PIPE
-        )
-        try:
-            async with asyncio.timeout(TIMEOUT):
-                _, errors = await process.communicate()
-        except TimeoutError as error:
-            raise HTTPException(
-                HTTPStatus.SERVICE_UNAVAILABLE, f"The recording took more than {TIMEOUT:g} s."
-            ) from error
-        finally:
-            if process.returncode is None:
-                process.kill()
-                await process.wait()
-        if process.returncode:
-            why = errors.decode(errors="replace").strip().removeprefix("katana450: ")
-            raise HTTPException(HTTPStatus.CONFLICT, why)
-        return await asyncio.to_thread(out.read_bytes)
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-P", "-m", "katana450", "record", *command, stdout=PIPE, stderr=PIPE
+    )
+    try:
+        async with asyncio.timeout(TIMEOUT):
+            _, errors = await process.communicate()
+    except TimeoutError as error:
+        raise HTTPException(
+            HTTPStatus.SERVICE_UNAVAILABLE, f"The recording took more than {TIMEOUT:g} s."
+        ) from error
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+    if process.returncode:
+        why = errors.decode(errors="replace").strip().removeprefix("katana450: ")
+        raise HTTPException(HTTPStatus.CONFLICT, why)
