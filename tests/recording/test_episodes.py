@@ -16,6 +16,7 @@ from mcap.reader import make_reader
 
 import katana450
 from katana450.arm.runtime.tick import TickRecord
+from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes import keeper as keeper_module
 from katana450.extensions.recording.episodes.episode import (
@@ -37,10 +38,11 @@ from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
 from katana450.extensions.recording.episodes.undoable_judgement import UNDO_SECONDS
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.live import ring as ring_module
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.topics import EPISODES, STATE
-from tests.recording.recorded import header, record, run
+from tests.recording.recorded import header, run
 
 ADA = EpisodeGiver("Ada", "operator", "0a1b2c3d4e5f")
 
@@ -48,7 +50,13 @@ ADA = EpisodeGiver("Ada", "operator", "0a1b2c3d4e5f")
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
-    record(path, 300, 3)
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header())
+        for number, each in enumerate(motion()[:300]):
+            writer.put(each)
+            if number % 100 == 99:
+                writer.flush()
+        writer.close()
     return path
 
 
@@ -360,6 +368,29 @@ def test_crash_leaves_the_running_episode_unfinished(bench: Bench) -> None:
     bench.keeper = again
     again.handle(episode_request('{"do": "judge", "number": 2, "outcome": "failure"}'), ADA)
     assert bench.folder.find(2).episode.outcome is EpisodeOutcome.FAILURE
+
+
+def test_folder_is_listed_and_recovered_by_the_command(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(bench.folder.folder)
+    bench.ask(do="start", task="pour")
+    bench.move(60)
+    bench.ask(do="stop", outcome="success")
+    bench.ask(do="start", task="stir")
+    bench.move(100)
+    bench.ring.sync()
+    assert main(["record", "episodes", "recover", folder]) == 1
+    assert "Another server uses" in capsys.readouterr().err
+    assert main(["record", "episodes", "list", folder]) == 0
+    assert "success     pour\nEpisode 2 runs" in capsys.readouterr().out
+    # As after a crash of the server.
+    bench.folder.release()
+    assert main(["record", "episodes", "recover", folder]) == 0
+    assert "Episode 2 was interrupted and is kept as unfinished" in capsys.readouterr().out
+    assert main(["record", "list", folder]) == 0
+    assert "episode 2, unfinished: stir" in capsys.readouterr().out
+    bench.keeper = bench.made()
 
 
 def test_only_one_server_uses_a_folder(bench: Bench) -> None:

@@ -24,6 +24,7 @@ from katana450.extensions.recording.files.checking import session_for, verify_re
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.conftest import LONG
+from tests.gateway.client import ask, enter
 from tests.recording.test_recorder import MAX_LOSS, POSTURES, RECORDER, waited_for
 
 KILLS = 8 if LONG else 1
@@ -66,6 +67,7 @@ def move(server: AppServer, *postures: tuple[float, ...]) -> float:
     return time.perf_counter()
 
 
+@pytest.mark.long
 def test_client_and_command_record_episodes(
     server: AppServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -93,6 +95,14 @@ def test_client_and_command_record_episodes(
         assert words in capsys.readouterr().out
     assert main(["record", "episodes", "discard", "7", *url]) == 1
     assert "There is no episode 7" in capsys.readouterr().err
+    address, cookie = f"{server.url}/api/v1/episodes", enter(server.url)
+    assert ask(f"{address}/99", Cookie=cookie)[0] == 404
+    for body, status in (("{", 422), ('{"do": "win"}', 422), ('{"do": "stop"}', 409)):
+        answer = ask(address, data=body.encode(), Cookie=cookie, Origin=server.url)
+        assert answer[0] == status, answer[2]
+    # A page of another site has the cookie and another origin.
+    answer = ask(address, data=b'{"do": "start"}', Cookie=cookie, Origin="http://elsewhere")
+    assert answer[0] == 403, answer[2]
     client.download(1, tmp_path / "mine.mcap")
     (downloaded,) = katana450.open(tmp_path / "mine.mcap").episodes
     assert downloaded.outcome is EpisodeOutcome.SUCCESS
