@@ -1,5 +1,5 @@
 // Episodes: REC, the judgement of attempts, and their list. Loaded when the server records.
-import { html, set, write } from "../instruments/shape.js";
+import { html, write } from "../instruments/shape.js";
 
 const OUTCOMES = { success: "Success", failure: "Failure", unjudged: "Not judged", unfinished: "Unfinished" };
 // Name and key of each button below REC.
@@ -65,7 +65,6 @@ export class Episodes {
     button.classList.toggle("on", Boolean(running));
     const parts = running ? [`REC ${clock(running.seconds)}`, size(running.bytes)] : ["REC", ""];
     [...button.children].forEach((each, i) => write(each, parts[i]));
-    set(button, "aria-label", running ? `Episodes: ${parts.join(", ")}` : "Episodes");
     for (const each of [this.#task.parentElement, this.#rec, this.#acts]) each.hidden = !this.#may;
     if (document.activeElement !== this.#task && before?.task !== state.task) this.#task.value = state.task;
     this.#rec.replaceChildren(saving ? "Saving…" : running ? `End episode ${running.number}, ${clock(running.seconds)}` : "Start an episode", key("T"));

@@ -21,6 +21,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.session import bar
 from tests.browser.sizes import PHONE, PORTRAIT, SCHEMES, WIDE
+from tests.browser.test_accessibility import AXE, VIOLATIONS
 from tests.gateway.client import ask, enter
 
 LEAST_FINGER = 44.0
@@ -142,6 +143,7 @@ def test_whole_flow_on_a_phone(
     move(server, *POSTURES)
     page.keep(artefacts / f"episodes-phone-running-{scheme}.png")
     assert_fits(page)
+    assert_accessible(page)
     tap(page, "Success")
     page.wait_until(lambda: outcomes(server) == ["success"], "the success")
     sheet.locator("summary").first.tap()
@@ -170,6 +172,13 @@ def test_whole_flow_on_a_phone(
 
 def tap(page: ViserPage, name: str) -> None:
     page.page.locator("#episodes").get_by_role("button", name=name).first.tap()
+
+
+def assert_accessible(page: ViserPage) -> None:
+    """Check names and contrast of all controls by axe-core, which `make check-js` fetches."""
+    if AXE.exists():
+        page.page.evaluate(AXE.read_text(encoding="utf-8"))
+        assert page.page.evaluate(VIOLATIONS) == []
 
 
 def assert_fits(page: ViserPage) -> None:
@@ -219,6 +228,7 @@ def test_windows_agree_and_a_reload_keeps_rec(
     first.wait_until(lambda: rec(first) == "REC", "the end")
     second.page.locator("#episodes summary").first.click()
     second.keep(artefacts / f"episodes-desk-{scheme}.png")
+    assert_accessible(second)
     assert second.page.locator("#episodes i.success").inner_text() == "Success"
     # While Jog is open, its keys move the arm, and those of episodes are others.
     second.page.focus("#jog-button")
