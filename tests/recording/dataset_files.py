@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ def write_copy(
     episodes: Iterable[Mapping[str, Any]] = (),
     metadata: Mapping[str, str] | None = None,
     gap: float | None = None,
+    change: Callable[[Message], Message] = lambda message: message,
 ) -> Path:
     """Copy ``source`` to ``out``, with changes.
 
@@ -33,6 +34,7 @@ def write_copy(
         episodes: messages to add.
         metadata: metadata to change.
         gap: time after the begin at which ticks are missing [s].
+        change: changes each message.
     """
     with RecordingFile.open(source) as file, out.open("wb") as target:
         copy = RecordingCopy(target, {**file.metadata, **(metadata or {})}, file.attachments())
@@ -41,7 +43,7 @@ def write_copy(
                 lost = {"t": message.t, "missing": "the disk was slow", "ticks": 7}
                 copy.add(message._replace(data=json.dumps(lost).encode()))
                 gap = None
-            copy.add(message)
+            copy.add(change(message))
         at = round(1e9 * file.end)
         for each in episodes:
             copy.add(Message(EPISODES, 0, at, json.dumps(each).encode()))

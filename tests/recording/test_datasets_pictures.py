@@ -100,7 +100,7 @@ def test_statistics_of_pictures_are_those_of_all_pixels() -> None:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
-    record(path, 200, 5)
+    record(path, 150, 5)
     return path
 
 
@@ -166,9 +166,10 @@ def begun(files: list[Path], out: Path, *words: str) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.long
 def test_interrupted_export_leaves_nothing(run: Path, tmp_path: Path) -> None:
     out = tmp_path / "set"
-    process = begun([run] * 200, out)
+    process = begun([run] * 100, out)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode == 130
@@ -180,7 +181,7 @@ def test_interrupted_export_leaves_nothing(run: Path, tmp_path: Path) -> None:
 )
 def test_killed_export_leaves_no_dataset(run: Path, tmp_path: Path, number: int) -> None:
     out = tmp_path / "set"
-    process = begun([run] * 200, out)
+    process = begun([run] * 100, out)
     time.sleep(0.3 * random.Random(number).random())
     process.kill()
     process.communicate(timeout=60)

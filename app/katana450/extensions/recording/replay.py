@@ -6,6 +6,7 @@ bit, with the same libraries and rounding.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -110,6 +111,8 @@ def check_fits(session: Session, state: State) -> None:
     """Raise InputError if ``state`` is of a robot with another number of joints."""
     n = len(session.ready)
     motion = state.motion
+    if not math.isfinite(state.t):
+        raise InputError(f"The recording is damaged: {state.t} is not the time of a state.")
     for values in (state.q, state.goal, motion.q, motion.qd, motion.qdd):
         if values.shape != (n,) or not np.isfinite(values).all():
             raise InputError(f"The recording is not of this robot, which has {n} joints.")

@@ -6,6 +6,7 @@ and the answer of the driver, unless it differs from the setpoint.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,10 +100,13 @@ def tick_input(codec: Codec, form: Any) -> TickInput:
     sent, digest, failed = form.get(SENT), form.get(DIGEST), form.get(FAILED, False)
     if not isinstance(digest, str) or type(failed) is not bool:
         raise FormError(f"{shown(form)} is not a tick")
-    optional = codec.decoded(float | None, form.get(T_BEFORE))
+    t, t_before = codec.decoded(float, form.get(T)), codec.decoded(float | None, form.get(T_BEFORE))
+    # Compiled code of the simulation reads beyond its memory at a time that is no number.
+    if not (math.isfinite(t) and (t_before is None or math.isfinite(t_before))):
+        raise FormError(f"{t} is not the time of a tick", (T,))
     return TickInput(
-        t=codec.decoded(float, form.get(T)),
-        t_before=optional,
+        t=t,
+        t_before=t_before,
         submissions=tuple(
             _submission(codec, each, place) for place, each in enumerate(submissions)
         ),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from katana450.errors import InputError
 from katana450.extensions.recording.datasets.arrow import arrow
 from katana450.extensions.recording.datasets.lerobot_form import (
     ACTION,
@@ -37,6 +38,9 @@ from katana450.extensions.recording.datasets.statistics import Statistics, colum
 from katana450.maths.geometry.arrays import FloatArray
 
 MEGABYTE = 2**20
+MAX_VALUE = 1e6
+"""[rad or m] Maximum value of a joint; 32 bits hold it."""
+
 TASK_COLUMN = "__index_level_0__"
 """Column of a table that pandas writes for an index without a name."""
 
@@ -82,7 +86,21 @@ class LerobotWriter:
             success: whether the task was done; None if that is not known.
             videos: further columns of its row, which tell where its pictures are.
             picture_statistics: statistics of the pictures, by features.
+
+        Raises:
+            InputError: the episode has another number of joints, or impossible values.
         """
+        if state.shape[1] != len(self._shape.names):
+            raise InputError(
+                f"Episode {len(self._rows)} of the dataset has states of {state.shape[1]} numbers, "
+                f"not {len(self._shape.names)}: its recording is of another robot."
+            )
+        farthest = max(float(np.abs(each).max(initial=0.0)) for each in (state, action))
+        if farthest > MAX_VALUE:
+            raise InputError(
+                f"Episode {len(self._rows)} of the dataset has a joint at {farthest:g} rad or m. "
+                "Its recording is damaged."
+            )
         count, number = len(state), len(self._rows)
         last = np.arange(count) == count - 1
         columns: dict[str, npt.NDArray[Any]] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.loader import load
@@ -12,6 +12,9 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import Attachment
 from katana450.extensions.recording.files.recording_file import RecordingFile
+
+URDF, XACRO = ".urdf", ".xacro"
+"""Ends of the names of descriptions."""
 
 
 def attached_urdf(file: RecordingFile) -> Attachment:
@@ -34,8 +37,8 @@ def recorded_robot(file: RecordingFile) -> Robot:
         tool, without_gripper = used["tool"], bool(used["bare"])
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise InputError(f"{file.path} does not state the settings of its session.") from error
-    # The name comes from the file, so it must not lead out of the folder.
-    name = PureWindowsPath(PurePosixPath(urdf.name).name).name or "robot.urdf"
+    # The name comes from the file, so only its end is used, which tells what to expand.
+    name = f"robot{XACRO if urdf.name.endswith(XACRO) else URDF}"
     with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
         path = Path(folder) / name
         path.write_bytes(urdf.data)

@@ -218,8 +218,8 @@ class _Bag:
         span.last = max(span.last, t)
 
     def _add_state(self, t: int, numbers: dict[str, Any]) -> None:
-        q, gripper = self._values(numbers, "q"), numbers.get("gripper", 0.0)
-        values = self._robot.joint_values(q, float(gripper))
+        q, gripper = self._values(numbers, "q"), self._value(numbers, "gripper")
+        values = self._robot.joint_values(q, gripper)
         self._add(JOINT_STATES, t, joint_state(t, values))
         setpoint = self._values(numbers, "setpoint")
         arm = self._robot.arm
@@ -230,7 +230,7 @@ class _Bag:
             driven = [name for name, follows in arm.fingers.items() if follows == (1.0, 0.0)]
             # The rate of the fingers is not recorded, and a message has all rates or none.
             qd = [] if driven else qd
-            target.update({name: float(numbers["gripper_setpoint"]) for name in driven[:1]})
+            target.update({name: self._value(numbers, "gripper_setpoint") for name in driven[:1]})
         self._add(SETPOINTS, t, joint_state(t, target, qd))
         self._place_objects(numbers)
         shown = self._span.shown
@@ -258,6 +258,10 @@ class _Bag:
         robot = self._robot
         count = len(robot.driven if robot.arm is None else robot.arm.chain.names)
         return finite_array(numbers.get(name), (count,), f"{name} of {self._file.path}")  # type: ignore[arg-type]
+
+    def _value(self, numbers: dict[str, Any], name: str) -> float:
+        value = finite_array([numbers.get(name)], (1,), f"{name} of {self._file.path}")  # type: ignore[arg-type]
+        return float(value[0])
 
     def _fixed(self) -> Iterator[Transform]:
         for link in self._robot.links:

@@ -12,6 +12,9 @@ from katana450.maths.geometry.arrays import FloatArray
 MIN_FPS, MAX_FPS = 1, 100
 """[Hz] Range of frames per second: more than the recorded ticks would only repeat them."""
 
+MAX_FRAMES = 10_000_000
+"""Maximum number of frames of an episode, more than a day."""
+
 TICK = 0.01
 """[s] Time between two ticks of the control loop."""
 
@@ -32,7 +35,15 @@ def check_fps(fps: int) -> None:
 
 
 def frame_times(start: float, end: float, fps: int) -> FloatArray:
-    """Return the times (N,) [s] of the frames from ``start`` to ``end``, 1 / ``fps`` apart."""
+    """Return the times (N,) [s] of the frames from ``start`` to ``end``, 1 / ``fps`` apart.
+
+    Raises InputError for too many.
+    """
+    if (end - start) * fps > MAX_FRAMES:
+        raise InputError(
+            f"{end - start:.0f} s at {fps} frames per second are more than {MAX_FRAMES} frames. "
+            "Choose a part, or fewer frames per second."
+        )
     count = max(math.floor((end - start) * fps + ROUNDING) + 1, 0)
     return start + np.arange(count) / fps
 

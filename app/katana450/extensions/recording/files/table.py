@@ -18,8 +18,9 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.topics import CHECKPOINTS, STATE
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
-WIDTHS = {"q": None, "qd": None, "setpoint": None, "position": 3, "orientation": 4}
-NUMBERS = ("t", "gripper", "gripper_setpoint", "speed")
+NUMBERS = ("t", "gripper", "gripper_setpoint", "speed", "q", "qd", "setpoint")
+POSE = ("position", "orientation")
+"""Names of the columns of every robot, and of those with a tool only."""
 
 
 def rows(
@@ -60,7 +61,7 @@ def columns(
     found = list(rows(file, start, end))
     if not found:
         raise InputError(f"{file.path} has no states in that time.")
-    names = [*NUMBERS, *(name for name in WIDTHS if name in found[0])]
+    names = [*NUMBERS, *(name for name in POSE if name in found[0])]
     table = {}
     for name in names:
         first = found[0].get(name)
