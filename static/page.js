@@ -356,7 +356,7 @@
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
-    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard))) return drawLink();
+    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard) || timeline?.hear(data.heard))) return drawLink();
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) {
       toast(data.heard.why);
@@ -442,7 +442,7 @@
     kept?.setItem(PAST, shown ? "yes" : "no");
     const { Timeline } = await import("./timeline/timeline.js");
     const fold = () => showTimeline(false);
-    timeline ??= new Timeline(byId("timeline"), { page, scene, stage: byId("stage"), toast, status: () => status, fold });
+    timeline ??= new Timeline(byId("timeline"), { page, scene, stage: byId("stage"), say, toast, status: () => status, fold });
     await timeline.show(shown);
     then?.(timeline);
   }

@@ -1,6 +1,7 @@
 // The timeline: what the server has recorded, or a file, shown in this window alone at any moment.
 import { html, svg } from "../instruments/shape.js";
 import { keep } from "../more/keep.js";
+import { ScriptRun } from "../teach/run.js";
 import * as api from "./api.js";
 import { atPlace, lengthOf, placeOf } from "./axis.js";
 import { Plot } from "./plot.js";
@@ -24,6 +25,7 @@ export class Timeline {
   #box;
   #part = {}; // elements by name
   #plot;
+  #run; // of a recorded motion
   #of = RING; // the recording
   #names = new Map([[RING, "Last minutes"]]);
   #spans = [];
@@ -41,6 +43,7 @@ export class Timeline {
   constructor(box, page) {
     this.#box = box;
     this.#page = page;
+    this.#run = new ScriptRun(page.say, "run again");
     document.head.append(html("link", { rel: "stylesheet", href: new URL("timeline.css", import.meta.url).href }));
     this.#build();
     this.#plot = new Plot(this.#part.plot);
@@ -137,6 +140,7 @@ export class Timeline {
       part.plot,
       html("div", { class: "row" }, part.play, part.clock, track, part.speed, part.events, part.of, part.second,
         button("Save selection", () => this.#save()),
+        button("Run the selected motion again", () => this.#again(), "Run again"),
         button("Copy link to this moment", () => this.#copy(), "Copy link"),
         button("Fold the timeline away", () => this.#page.fold(), "×"), part.file),
     );
@@ -294,10 +298,39 @@ export class Timeline {
     this.#draw();
   }
 
+  // The recording and the times of the selection; null if nothing is recorded.
+  #selection() {
+    if (this.#spans.length) return { of: this.#of, from: this.#ends[0] ?? this.#spans[0][0], to: this.#ends[1] ?? this.#spans.at(-1)[1] };
+    this.#page.toast("Nothing is recorded yet: the arm has not moved.");
+    return null;
+  }
+
   #save() {
-    if (!this.#spans.length) return this.#page.toast("Nothing is recorded yet: the arm has not moved.");
-    const [from, to] = [this.#ends[0] ?? this.#spans[0][0], this.#ends[1] ?? this.#spans.at(-1)[1]];
-    keep(this.#page.toast, { of: this.#of, from, to });
+    const selection = this.#selection();
+    if (selection) keep(this.#page.toast, selection);
+  }
+
+  // Drive the arm along the selected motion, as a program that the bar shows and steers.
+  async #again() {
+    const { toast, status } = this.#page;
+    const { revocations } = status() ?? {};
+    const selection = this.#selection();
+    if (!selection || this.#run.busy) return;
+    this.live();
+    toast("The motion is being made a program.");
+    try {
+      const answer = await fetch(`api/v1/recording/script?${new URLSearchParams(selection)}`);
+      if (!answer.ok) throw new Error(await answer.text());
+      const { status: end, why } = await this.#run.play(await answer.text(), "run", revocations, () => {});
+      toast(end === "done" ? "The motion has run again." : `The motion did not run to its end: ${why || end}`);
+    } catch (error) {
+      toast(`The motion cannot run again: ${error.message}`);
+    }
+  }
+
+  // Take an answer; return whether it was for the motion that runs again.
+  hear(answer) {
+    return this.#run.hear(answer);
   }
 
   async #copy() {

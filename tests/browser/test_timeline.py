@@ -305,3 +305,28 @@ def test_timeline_covers_nothing(
 def slider_place(page: ViserPage) -> float:
     """Return the place [s] of the moment that ``page`` shows."""
     return float(page.page.get_by_label(NOW).input_value())
+
+
+@pytest.mark.long
+def test_selected_motion_runs_again_as_a_program(
+    server: AppServer, folder: Path, open_page: OpenPage
+) -> None:
+    page = open_page(server.url, nodes=("/arm",))
+    opened(page)
+    with connect(server.url, "Ada") as arm:
+        moved = np.array(arm.query(answers.State).q)
+        page.page.get_by_role("button", name="Run again").click()
+        page.page.get_by_text("The motion has run again.").wait_for(timeout=90_000)
+        state = arm.query(answers.State)
+    assert state.program is not None
+    assert state.program.status == "done"
+    np.testing.assert_allclose(state.q, moved, atol=1e-4)
+    run = PlaybackRun(lambda: recordings_in(folder))
+    run.update()
+    turns = [
+        at.row.q[0]
+        for t in np.linspace(run.spans[-1].start, run.spans[-1].end, 200)
+        if (at := run.at(float(t)))
+    ]
+    # It went back to the begin, and through both turns.
+    assert max(turns) > TURNS[0] - 0.01
