@@ -70,11 +70,11 @@ export class Episodes {
     this.#rec.replaceChildren(saving ? "Saving…" : running ? `End episode ${running.number}, ${clock(running.seconds)}` : "Start an episode", key("T"));
     this.#rec.disabled = saving;
     this.#rec.classList.toggle("on", Boolean(running));
-    const asks = running || last;
+    const asks = running || saving || last;
     for (const each of this.#acts.children) each.hidden = each.dataset.act === "undo" ? !undo : !asks;
     const left = running?.left != null ? ` It ends by itself in ${clock(running.left)}: an episode has at most an hour.` : "";
     const one = last && `Episode ${last.number}, ${last.seconds.toFixed(1)} s: `;
-    const now = running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
+    const now = saving ? "Saving…" : running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
     write(this.#says, problem || now);
     this.#says.classList.toggle("bad", Boolean(problem));
     this.#tell(before);
@@ -98,10 +98,10 @@ export class Episodes {
     if (!this.#state || !this.#may || event.ctrlKey || event.metaKey || event.altKey) return false;
     // The letter on the key, which is elsewhere on other keyboards.
     const letter = /^[a-z]$/i.test(event.key) ? event.key.toUpperCase() : event.code.slice(3);
-    const { running, last, undo } = this.#state;
+    const { running, saving, last, undo } = this.#state;
     const judged = last && !["unjudged", "unfinished"].includes(last.outcome);
     const act = letter === "T" ? "rec" : Object.keys(ACTS).find((each) => ACTS[each][1] === letter);
-    const asks = act === "undo" ? undo : running || (last && (!judged || !this.sheet.hidden));
+    const asks = act === "undo" ? undo : running || saving || (last && (!judged || !this.sheet.hidden));
     if (!act || (act !== "rec" && !asks)) return false;
     if (event.type === "keydown" && !event.repeat) this.#act(act);
     return true;
