@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,13 +14,11 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 import katana450
-from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes import keeper as keeper_module
 from katana450.extensions.recording.episodes.episode import (
     Episode,
-    EpisodeGiver,
     EpisodeOutcome,
     episode_of,
     episodes_of,
@@ -34,17 +31,14 @@ from katana450.extensions.recording.episodes.episode_file import (
 )
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episode_files
 from katana450.extensions.recording.episodes.episode_requests import episode_request
-from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
 from katana450.extensions.recording.episodes.undoable_judgement import UNDO_SECONDS
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.live import ring as ring_module
-from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.topics import EPISODES, STATE
-from tests.recording.recorded import header, run
-
-ADA = EpisodeGiver("Ada", "operator", "0a1b2c3d4e5f")
+from tests.recording.episode_bench import ADA, Bench, motion
+from tests.recording.recorded import header
 
 
 @pytest.fixture(scope="module")
@@ -150,41 +144,6 @@ def test_last_description_of_each_number_counts(found: list[Episode]) -> None:
 def test_wrong_description_is_refused(text: str, why: str) -> None:
     with pytest.raises(InputError, match=why):
         episode_of(text)
-
-
-@cache
-def motion() -> tuple[TickRecord, ...]:
-    """Return the ticks of a random session."""
-    found: list[TickRecord] = []
-    run(450, 9, found.append, odd=False)
-    return tuple(found)
-
-
-class Bench:
-    """A ring on a test clock, and the episodes that are marked in it."""
-
-    def __init__(self, folder: Path) -> None:
-        self.t = 1000.0
-        self.ring_folder, self.folder = folder / "ring", EpisodeFolder(folder / "episodes")
-        self.header = header()
-        self.ring = Ring(self.ring_folder, self.header)
-        self.records = list(motion())
-        self.folder.claim()
-        self.keeper = self.made()
-
-    def made(self) -> EpisodeKeeper:
-        run_name = self.header.metadata["utc_offset_ns"]
-        return EpisodeKeeper(self.folder, self.ring, self.ring_folder, run_name, lambda: self.t)
-
-    def move(self, ticks: int) -> None:
-        """Record the next ``ticks``."""
-        for each in self.records[:ticks]:
-            self.ring.put(each)
-            self.t = each.t
-        del self.records[:ticks]
-
-    def ask(self, **request: object) -> dict[str, object]:
-        return self.keeper.handle(episode_request(json.dumps(request)), ADA)
 
 
 @pytest.fixture
