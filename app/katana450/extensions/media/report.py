@@ -22,7 +22,7 @@ from katana450.errors import InputError
 from katana450.extensions.media import figures
 from katana450.extensions.media.measures import Bound, alongs, bounds, measurements
 from katana450.extensions.media.pour_record import COLUMNS, PourRecord
-from katana450.extensions.programs.measures import MEASURES
+from katana450.extensions.programs.measures import MEASURES, title_of, unit_of
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.simulation import Trace
@@ -30,17 +30,6 @@ from katana450.maths.kinematics.forward import forward
 
 NONE: Mapping[str, bytes] = {}
 """The pictures of a report without pictures."""
-
-UNITS = {
-    "_m_s3": "m/s³",
-    "_mm_s": "mm/s",
-    "_mm": "mm",
-    "_ml": "ml",
-    "_percent": "%",
-    "_deg": "deg",
-    "_s": "s",
-}
-"""Unit of a measure by the suffix of its name; longer suffixes first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +78,7 @@ class Report:
     def lines(self) -> list[str]:
         """The measures as text lines."""
         return [
-            f"{_title(name):<32} {_with_unit(name, value)}" for name, value in self.values.items()
+            f"{title_of(name):<32} {_with_unit(name, value)}" for name, value in self.values.items()
         ]
 
     def json(self, written: datetime) -> str:
@@ -197,12 +186,12 @@ class Report:
             for name, image in images.items()
         )
         rows = "\n".join(
-            f"<tr><th>{_title(name)}<small>{MEASURES[name]}</small></th>"
+            f"<tr><th>{title_of(name)}<small>{MEASURES[name]}</small></th>"
             f"<td>{_with_unit(name, value)}</td></tr>"
             for name, value in self.values.items()
         )
         checks = "\n".join(
-            f'<li class="{"held" if bound.held else "missed"}">{_title(bound.name)}: '
+            f'<li class="{"held" if bound.held else "missed"}">{title_of(bound.name)}: '
             f"{_with_unit(bound.name, bound.value)}; {bound.wanted}</li>"
             for bound in self.bounds
         )
@@ -310,18 +299,9 @@ footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 """Template of the HTML page."""
 
 
-def _unit(name: str) -> str:
-    return next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
-
-
-def _title(name: str) -> str:
-    end = next((end for end in UNITS if name.endswith(end)), "")
-    return name.removesuffix(end).replace("_", " ").capitalize()
-
-
 def _with_unit(name: str, value: float | None) -> str:
     """Return a measure with its unit as text."""
-    return "none" if value is None else f"{_shown(value)} {_unit(name)}".rstrip()
+    return "none" if value is None else f"{_shown(value)} {unit_of(name)}".rstrip()
 
 
 def _shown(value: float) -> str:

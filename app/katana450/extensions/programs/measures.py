@@ -25,3 +25,25 @@ MEASURES: Final = {
     "cup_peak_jerk_m_s3": "maximum of the cup's middle, over one tick",
 }
 """Name of each measure, with its unit at the end, and its definition."""
+
+UNITS: Final = {
+    "_m_s3": "m/s³",
+    "_mm_s": "mm/s",
+    "_mm": "mm",
+    "_ml": "ml",
+    "_percent": "%",
+    "_deg": "deg",
+    "_s": "s",
+}
+"""Unit of a measure by the suffix of its name; longer suffixes first."""
+
+
+def unit_of(measure: str) -> str:
+    """Return the unit of ``measure``; "" for a number."""
+    return next((unit for end, unit in UNITS.items() if measure.endswith(end)), "")
+
+
+def title_of(measure: str) -> str:
+    """Return the name of ``measure`` for people, without its unit."""
+    end = next((end for end in UNITS if measure.endswith(end)), "")
+    return measure.removesuffix(end).replace("_", " ").capitalize()

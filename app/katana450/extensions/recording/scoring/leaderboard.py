@@ -8,13 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from katana450.errors import InputError
+from katana450.extensions.programs.measures import title_of, unit_of
 from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEASURES, Scored
-
-UNITS = {
-    "_m_s3": "m/s³", "_mm_s": "mm/s", "_mm": "mm", "_ml": "ml", "_percent": "%", "_deg": "deg",
-    "_s": "s",
-}  # fmt: skip
-"""Unit of a measure by the end of its name; longer ends first."""
 
 BEST = "*"
 """Mark of the best value of a measure."""
@@ -74,7 +69,7 @@ class Leaderboard:
                 shown(each.values[measure]) + (f" {BEST}" if self.is_best(each, measure) else "  ")
                 for each in self.rows
             ]
-            table.append([f"{title_of(measure)} {unit_of(measure)}".rstrip(), *cells])
+            table.append([f"{name_of(measure)} {unit_of(measure)}".rstrip(), *cells])
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
         return [
             "  ".join((row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:]))).rstrip()
@@ -97,17 +92,9 @@ class Leaderboard:
         ]
 
 
-def unit_of(measure: str) -> str:
-    """Return the unit of ``measure``; "" for a number."""
-    return next((unit for end, unit in UNITS.items() if measure.endswith(end)), "")
-
-
-def title_of(measure: str) -> str:
+def name_of(measure: str) -> str:
     """Return the name of ``measure`` for people, without its unit."""
-    if measure == "sparc":
-        return "SPARC"
-    end = next((end for end in UNITS if measure.endswith(end)), "")
-    return measure.removesuffix(end).replace("_", " ").capitalize()
+    return "SPARC" if measure == "sparc" else title_of(measure)
 
 
 def shown(value: float | None) -> str:

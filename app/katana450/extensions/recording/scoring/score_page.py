@@ -8,12 +8,8 @@ from datetime import datetime
 
 import numpy as np
 
-from katana450.extensions.recording.scoring.leaderboard import (
-    Leaderboard,
-    shown,
-    title_of,
-    unit_of,
-)
+from katana450.extensions.programs.measures import unit_of
+from katana450.extensions.recording.scoring.leaderboard import Leaderboard, name_of, shown
 from katana450.extensions.recording.scoring.scored import MEASURES, Scored
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -68,7 +64,7 @@ def _row(board: Leaderboard, measure: str) -> str:
         for each in board.rows
     )
     unit = unit_of(measure)
-    title = title_of(measure) + (f", {unit}" if unit else "")
+    title = name_of(measure) + (f", {unit}" if unit else "")
     return f'<tr><th scope="row">{title}<small>{MEASURES[measure]}</small></th>{cells}</tr>'
 
 

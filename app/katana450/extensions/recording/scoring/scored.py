@@ -13,6 +13,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
+from katana450.extensions.programs.measures import MEASURES as REPORTED
 from katana450.extensions.programs.motion_measures import motion_measures, water_measures
 from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.files.recorded_states import recorded_states
@@ -31,14 +32,14 @@ MEASURES: Final = {
     "dimensionless_jerk": "mean squared jerk of the tool over time and length; at best 720",
     "sparc": "spectral arc length of the tool's speed; the nearer to 0, the smoother",
     "nearest_clearance_mm": "minimum of all pairs of parts, without objects that fingers touch",
-    "margin_to_limits_deg": "minimum of all joints",
-    "smallest_singular_value": "of the Jacobian, translations divided by the characteristic length",
-    "max_speed_fraction": "maximum of all joints, as a fraction of the limit",
-    "max_tool_speed_mm_s": "of the tool point",
+    "margin_to_limits_deg": REPORTED["margin_to_limits_deg"],
+    "smallest_singular_value": REPORTED["smallest_singular_value"],
+    "max_speed_fraction": REPORTED["max_speed_fraction"],
+    "max_tool_speed_mm_s": REPORTED["max_tool_speed_mm_s"],
     "emptied_ml": "water in the basin at the end",
-    "emptied_percent": "fraction of the water that is in the basin at the end",
-    "spilled_ml": "water on table and floor at the end",
-    "cup_peak_jerk_m_s3": "maximum of the cup's middle, over one tick",
+    "emptied_percent": REPORTED["emptied_percent"],
+    "spilled_ml": REPORTED["spilled_ml"],
+    "cup_peak_jerk_m_s3": REPORTED["cup_peak_jerk_m_s3"],
     "placing_error_mm": "maximum distance of an object's final place from its target",
     "stops": "number of times that the arm was stopped",
     "contacts": "number of times that the arm waited before a contact",
