@@ -192,9 +192,13 @@ def driven_difference(
 
 
 def _report(part: RecordedPart, found: PathDifference) -> None:
+    slower = ""
+    if found.duration > SLOWER * part.duration:
+        slower = " Limits, starts from rest, the fingers or pauses made it slower."
     print(
         printable(
             f"Largest difference of a joint from the recorded setpoints: {found.joints:.2g} rad. "
             f"It took {found.duration:.2f} s, recorded {part.duration:.2f} s{_left_out(part)}."
+            f"{slower}"
         )
     )

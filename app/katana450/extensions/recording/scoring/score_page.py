@@ -194,7 +194,7 @@ polyline {{ fill: none; stroke-width: 2; stroke-linejoin: round; }}
 polyline:nth-of-type(even) {{ stroke-dasharray: 7 5; }}
 @media (max-width: 40rem) {{ .figures {{ grid-template-columns: 1fr; }} td b, th small {{
   display: none; }} tbody th {{ min-width: 8rem; }} th, td {{ padding: .4rem .5rem; }}
-  table {{ font-size: .9rem; }} thead th {{ white-space: normal; overflow-wrap: anywhere; }}
+  table {{ font-size: .9rem; }} thead th + th {{ white-space: normal; overflow-wrap: anywhere; }}
   figure:first-child .grid text {{ font-size: 20px; }} }}
 {colours}footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 </style>
