@@ -140,7 +140,7 @@ export class Timeline {
       part.plot,
       html("div", { class: "row" }, part.play, part.clock, track, part.speed, part.events, part.of, part.second,
         button("Save selection", () => this.#save()),
-        button("Run the selected motion again", () => this.#again(), "Run again"),
+        button("Run again the selected motion", () => this.#again(), "Run again"),
         button("Copy link to this moment", () => this.#copy(), "Copy link"),
         button("Fold the timeline away", () => this.#page.fold(), "×"), part.file),
     );

@@ -315,7 +315,7 @@ def test_selected_motion_runs_again_as_a_program(
     opened(page)
     with connect(server.url, "Ada") as arm:
         moved = np.array(arm.query(answers.State).q)
-        page.page.get_by_role("button", name="Run again").click()
+        page.page.get_by_role("button", name="Run again the selected motion").click()
         page.page.get_by_text("The motion has run again.").wait_for(timeout=90_000)
         state = arm.query(answers.State)
     assert state.program is not None
@@ -323,10 +323,7 @@ def test_selected_motion_runs_again_as_a_program(
     np.testing.assert_allclose(state.q, moved, atol=1e-4)
     run = PlaybackRun(lambda: recordings_in(folder))
     run.update()
-    turns = [
-        at.row.q[0]
-        for t in np.linspace(run.spans[-1].start, run.spans[-1].end, 200)
-        if (at := run.at(float(t)))
-    ]
+    times = np.linspace(run.spans[-1].start, run.spans[-1].end, 200).tolist()
+    turns = [found.row.q[0] for t in times if (found := run.at(t)) is not None]
     # It went back to the begin, and through both turns.
     assert max(turns) > TURNS[0] - 0.01
