@@ -53,7 +53,8 @@ class EventList:
 
 def problem_page(problem: str) -> str:
     """Return the ``problem`` of the event log on disk as HTML; empty for none."""
-    return f"<div class='k450'><p class='status fault'>{escape(problem)}</p></div>" * bool(problem)
+    text = f"<div class='k450'><p class='status fault'>{escape(problem)}</p></div>"
+    return text if problem else ""
 
 
 def _page(rows: list[str], problem: str) -> str:
