@@ -23,8 +23,9 @@
   const page = name();
   const worker = new Worker("static/link.js");
   const say = (message) => {
-    timeline?.said(message);
     worker.postMessage({ say: message });
+    // Only now: an error of the drawing must keep no request.
+    timeline?.said(message);
   };
   let status = null;
   let up = false;
@@ -65,10 +66,11 @@
   function stop() {
     press = randomName();
     say({ do: "stop", press, id: press });
-    timeline?.live();
     Jog.quiet();
     stopButton.classList.add("asked");
     insist();
+    // Last: an error of the drawing must not keep the press from any path.
+    timeline?.live();
   }
 
   function insist() {
