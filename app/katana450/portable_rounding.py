@@ -21,13 +21,18 @@ LIBM = "GLIBC_TUNABLES"
 LIBM_CHOICE = "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"
 
 
+def can_round_portably() -> bool:
+    """Return whether this processor is one of those that can round alike."""
+    return platform.machine() in PROCESSORS
+
+
 def portable_rounding(environment: Mapping[str, str]) -> dict[str, str]:
     """Return ``environment`` with the variables that make rounding independent of the processor.
 
     On processors other than x86-64 it is returned unchanged.
     """
     found = dict(environment)
-    if platform.machine() in PROCESSORS:
+    if can_round_portably():
         tunables = found.get(LIBM, "")
         if not tunables.endswith(LIBM_CHOICE):
             # The last one counts.

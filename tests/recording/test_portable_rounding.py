@@ -6,12 +6,14 @@ Other processors are imitated by the variables that make BLAS, libm and numpy ch
 from __future__ import annotations
 
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from katana450.extensions.recording.files import verifying
 from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.topics import COMMANDS
@@ -80,6 +82,16 @@ def test_simulation_is_identical_on_other_processors(
     assert ticks > TICKS // 2
     assert f"identical to the bit over {ticks - 1} ticks" in done.stdout, done.stdout + done.stderr
     assert done.returncode == 0
+
+
+def test_another_kind_of_processor_simulates_in_this_process(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A process of its own would not round otherwise, and start one more for the same reason.
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
+    monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
+    monkeypatch.setattr(verifying, "_verified_apart", None)
+    assert verifying.verified(path).ticks > TICKS // 2
 
 
 def test_tunables_of_the_user_are_kept_and_ours_come_last() -> None:

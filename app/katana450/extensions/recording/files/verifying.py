@@ -15,7 +15,11 @@ from katana450.extensions.recording.files.checking import session_for, verify_re
 from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.replay import Verification
-from katana450.portable_rounding import portable_rounding, rounds_portably
+from katana450.portable_rounding import (
+    can_round_portably,
+    portable_rounding,
+    rounds_portably,
+)
 
 
 def verified(
@@ -23,7 +27,8 @@ def verified(
 ) -> Verification:
     """Return the comparison of the recording at ``path`` with its simulation.
 
-    The simulation runs in a process of its own if this one rounds otherwise than the server did.
+    The simulation runs in a process of its own if this one rounds otherwise than the server did,
+    and this processor has the rounding of the server.
 
     Args:
         path: file of the recording.
@@ -37,7 +42,7 @@ def verified(
     """
     with RecordingFile.open(path) as file:
         portable = file.metadata.get(ROUNDING) == PORTABLE
-        if portable and not rounds_portably(os.environ):
+        if portable and can_round_portably() and not rounds_portably(os.environ):
             return _verified_apart(path, urdf, shows=progress is not None)
         start, length = file.start, file.end - file.start
         inner = None if progress is None else lambda t: progress(t - start, length)
