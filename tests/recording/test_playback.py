@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.records import Chunk
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
@@ -23,9 +24,12 @@ from katana450.arm.control.stop_cause import pressed
 from katana450.arm.runtime.tick import TickRecord
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
+from katana450.extensions.recording.files.recording_file import checked_size, utc_offset_of
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.places import recordings_in
+from katana450.extensions.recording.playback import chunks
+from katana450.extensions.recording.playback import run as run_module
 from katana450.extensions.recording.playback.chunks import ChunkIndex
 from katana450.extensions.recording.playback.difference import difference
 from katana450.extensions.recording.playback.routes import PlaybackRoutes
@@ -119,6 +123,29 @@ def test_broken_files_are_refused(recorded: tuple[Path, list[TickRecord]], tmp_p
             run.marks()
         except InputError:
             continue
+
+
+def test_files_that_would_fill_the_memory_are_refused(
+    recorded: tuple[Path, list[TickRecord]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ValueError, match="the size of a chunk is wrong"):
+        checked_size(Chunk("", bytes(100), 0, 0, 0, 10))
+    with monkeypatch.context() as patched:
+        patched.setattr(chunks, "MAX_RECORDS", 3)
+        with pytest.raises(InputError, match="more than 3 records") as caught:
+            opened(recorded[0])
+        assert str(caught.value).startswith("The file is")
+    run = opened(recorded[0])
+    monkeypatch.setattr(run_module, "MAX_BLOCK_BYTES", 20_000)
+    with pytest.raises(InputError, match="more than 20000 bytes"):
+        run.at(run.spans[0].start)
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("-1500000000", -1.5), ("--5", 0.0), ("\u00b2", 0.0), ("x", 0.0)]
+)
+def test_wrong_offset_counts_as_none(text: str, seconds: float) -> None:
+    assert utc_offset_of({"utc_offset_ns": text}) == seconds
 
 
 class StopAndPlan:

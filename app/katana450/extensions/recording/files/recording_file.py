@@ -6,6 +6,7 @@ Memory is bounded: no record is longer than the file, and no chunk unpacks to mo
 from __future__ import annotations
 
 import math
+import re
 import struct
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -33,6 +34,9 @@ MAX_RECORD_BYTES = 256_000_000
 
 PART_START: Final = "part_start_s"
 """Name of the metadata with the begin of a part that was cut out of a recording [s]."""
+
+WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
+"""Pattern of a whole number of nanoseconds."""
 
 FAULTS: Final = (
     McapError,
@@ -89,16 +93,22 @@ class BoundedStream:
         return True
 
 
+def checked_size(chunk: Chunk) -> int:
+    """Return the unpacked size of ``chunk`` [bytes]. Raises ValueError for one that is not true."""
+    size = len(chunk.data)
+    if chunk.compression == "zstd":
+        # The unpacker uses as much memory as this says.
+        size = zstandard.get_frame_parameters(chunk.data).content_size
+    if size != chunk.uncompressed_size:
+        raise ValueError("the size of a chunk is wrong")
+    return size
+
+
 def unpacked(chunk: Chunk) -> list[Any]:
     """Return the records in ``chunk``. Raises one of FAULTS."""
     if chunk.compression not in ("", "zstd"):
         raise ValueError(f"its chunks are compressed by {chunk.compression!r}, not by zstd")
-    size = chunk.uncompressed_size
-    if chunk.compression == "zstd":
-        # The unpacker uses as much memory as this says.
-        stated = zstandard.get_frame_parameters(chunk.data).content_size
-        if stated != size:
-            raise ValueError("the size of a chunk is wrong")
+    size = checked_size(chunk)
     if size > MAX_CHUNK_BYTES:
         raise ValueError(f"a chunk has {size} bytes, more than {MAX_CHUNK_BYTES}")
     return breakup_chunk(chunk, validate_crc=True)
@@ -218,8 +228,7 @@ class RecordingFile:
     @property
     def utc_offset(self) -> float:
         """Seconds to add to the times of the recording for seconds since the epoch."""
-        text = self.metadata.get("utc_offset_ns", "")
-        return int(text) / NANO if text.lstrip("-").isdigit() and len(text) < 20 else 0.0
+        return utc_offset_of(self.metadata)
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the files that belong to the recording. Raises InputError."""
@@ -280,6 +289,12 @@ class RecordingFile:
                 if isinstance(record, McapMessage)
                 and (topic := self._topics.get(record.channel_id, "")) in topics
             ]
+
+
+def utc_offset_of(metadata: Mapping[str, str]) -> float:
+    """Return the seconds from times of a recording to those since the epoch; 0 if unknown."""
+    text = metadata.get("utc_offset_ns", "")
+    return int(text) / NANO if WHOLE.fullmatch(text) else 0.0
 
 
 def nanoseconds_of(t: float) -> float:

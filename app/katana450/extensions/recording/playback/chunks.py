@@ -22,13 +22,18 @@ from katana450.extensions.recording.files.recording_file import (
     PART_START,
     BoundedStream,
     Message,
+    checked_size,
     records_at,
     unpacked,
+    utc_offset_of,
 )
 from katana450.extensions.recording.state_message import NANO
 
 MAX_UNPACKED = 16_000_000
 """Maximum size of an unpacked chunk [bytes]; one holds a second of motion, half a megabyte."""
+
+MAX_RECORDS = 1_000_000
+"""Maximum number of records of a file; a second of motion has about ten."""
 
 MAGIC_BYTES: Final = 8
 HEAD: Final = struct.Struct("<BQ")
@@ -62,15 +67,14 @@ class ChunkIndex:
         self.chunks: list[ChunkSpan] = []
         """The chunks, in the order of the file."""
         self._topics: dict[int, str] = {}
-        self._next = MAGIC_BYTES
+        self._next, self._count = MAGIC_BYTES, 0
         self._ended = False
         self.update()
 
     @property
     def utc_offset(self) -> float:
         """Seconds to add to the times of the recording for seconds since the epoch."""
-        text = self.metadata.get("utc_offset_ns", "")
-        return int(text) / NANO if text.lstrip("-").isdigit() and len(text) < 20 else 0.0
+        return utc_offset_of(self.metadata)
 
     @property
     def part_start(self) -> float:
@@ -136,6 +140,9 @@ class ChunkIndex:
                 self._ended = True
                 return
             self._next += HEAD.size + length
+            self._count += 1
+            if self._count > MAX_RECORDS:
+                raise ValueError(f"it has more than {MAX_RECORDS} records")
 
     def _add_chunk(self, file: BinaryIO, stream: BoundedStream) -> None:
         first, last, size = TIMES.unpack(file.read(TIMES.size))
@@ -157,16 +164,13 @@ class ChunkIndex:
 
 def _content(chunk: Chunk) -> bytes:
     """Return the unpacked records of ``chunk``. Raises one of FAULTS."""
-    size = chunk.uncompressed_size
-    if size > MAX_UNPACKED:
-        raise ValueError(f"a chunk has {size} bytes, more than {MAX_UNPACKED}")
     if chunk.compression not in ("", "zstd"):
         raise ValueError(f"its chunks are compressed by {chunk.compression!r}, not by zstd")
+    size = checked_size(chunk)
+    if size > MAX_UNPACKED:
+        raise ValueError(f"a chunk has {size} bytes, more than {MAX_UNPACKED}")
     content = chunk.data
     if chunk.compression == "zstd":
-        # The unpacker uses as much memory as the frame says.
-        if zstandard.get_frame_parameters(chunk.data).content_size != size:
-            raise ValueError("the size of a chunk is wrong")
         content = zstandard.ZstdDecompressor().decompress(chunk.data)
     if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
         raise ValueError("the checksum of a chunk is wrong")

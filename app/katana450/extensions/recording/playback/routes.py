@@ -158,6 +158,10 @@ class PlaybackRoutes:
                 raise HTTPException(
                     TOO_SLOW, f"The file took more than {UPLOAD_TIMEOUT:g} s."
                 ) from error
+            except OSError as error:
+                path.unlink(missing_ok=True)
+                why = f"The server cannot keep the file: {error.strerror or error}."
+                raise HTTPException(NOT_NOW, why) from error
             except BaseException:
                 path.unlink(missing_ok=True)
                 raise

@@ -127,6 +127,8 @@ class Block:
                 poses = poses | {each.name: each for each in row.objects}
                 for name in row.removed:
                     poses.pop(name, None)
+                if len(poses) > MAX_POSES:
+                    raise InputError(f"The recording has more than {MAX_POSES} objects at a time.")
             self._poses.append(poses)
         self._puddles: tuple[Puddle, ...] = ()
         for each in descriptions:
@@ -181,6 +183,9 @@ class Block:
 
 LEFT = b'"left":'
 """Part of the messages of states in which water has left the cup."""
+
+MAX_POSES = 256
+"""Maximum number of objects at a time, several times that of a scene."""
 
 MAX_FLIGHT = 1.0
 """[s] Time after which water has landed that fell 5 m."""

@@ -33,6 +33,15 @@ from katana450.extensions.recording.topics import (
 MAX_BLOCKS = 24
 """Number of decoded blocks that are kept, 4 min of motion; each has about 1 MB."""
 
+MAX_BLOCK_BYTES = 32_000_000
+"""Maximum memory of the states of a block [bytes]; one of 10 s of motion takes about 2 MB."""
+
+STATE_BYTES = 1000
+"""Memory of a state besides its message [bytes]."""
+
+MAX_SOLID_BYTES = 128_000_000
+"""Maximum size of the solids of a file [bytes]."""
+
 MAX_MARKS = 400
 """Number of marks of a timeline; the newest are kept."""
 
@@ -48,6 +57,7 @@ class _File:
         self.starts: list[int] = []
         """The numbers of the chunks with a complete state."""
         self._searched = 0
+        self._solid_bytes = 0
 
     @property
     def chunks(self) -> list[ChunkSpan]:
@@ -63,6 +73,11 @@ class _File:
                 self.starts.append(self._searched)
             if self.index.has(chunk, SOLIDS):
                 for each in self.index.messages(chunk, SOLIDS):
+                    self._solid_bytes += len(each.data)
+                    if self._solid_bytes > MAX_SOLID_BYTES:
+                        raise InputError(
+                            f"The shapes in the recording have more than {MAX_SOLID_BYTES} bytes."
+                        )
                     self.describer.add_solid(each)
             self._searched += 1
 
@@ -203,6 +218,11 @@ class PlaybackRun:
                 if number > place.first and first is not None and not before:
                     break
                 states.append(each)
+            if sum(STATE_BYTES + len(each.data) for each in states) > MAX_BLOCK_BYTES:
+                raise InputError(
+                    f"The recording has more than {MAX_BLOCK_BYTES} bytes between two complete "
+                    "states."
+                )
         return Block(states, descriptions)
 
     def _marks(self, file: _File) -> list[Mark]:

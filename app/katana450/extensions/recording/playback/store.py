@@ -66,7 +66,11 @@ class RecordingStore:
 def opened(path: Path) -> PlaybackRun:
     """Return the run in the file ``path``. Raises InputError if it is no recording."""
     run = PlaybackRun(lambda: [path])
-    run.update()
+    try:
+        run.update()
+    except InputError as error:
+        # The path is one of this server, which says nothing to the person.
+        raise InputError(str(error).replace(str(path), "The file")) from error
     if not run.spans:
         raise InputError("The file is no recording of katana450, or it is empty.")
     return run
