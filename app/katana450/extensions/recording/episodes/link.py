@@ -37,6 +37,12 @@ IDLE_SECONDS = 60.0
 ACTIVE_SECONDS = 0.5
 """[s] Time between two states for a watcher while an episode runs."""
 
+GREETING_SECONDS = 5.0
+"""[s] Maximum time for which a client waits until the process that records greets it."""
+
+ANSWER_SECONDS = 300.0
+"""[s] Maximum time for which a request waits for its answer; saving an hour takes about 30 s."""
+
 MAX_MESSAGE_BYTES = 64_000
 
 NOT_READY = (
@@ -141,10 +147,23 @@ def connect_to_episodes(folder: Path, port: int) -> Any:
                 f"The server on port {found['port']} uses the folder of episodes {folder}. Name "
                 "another one by `serve --episodes FOLDER`."
             )
-        key = bytes.fromhex(found["key"])
-        connection: Any = Client(found["address"], authkey=key)
+        return _greeted(found["address"], bytes.fromhex(found["key"]))
     except (OSError, EOFError, ValueError, KeyError, TypeError, AuthenticationError) as error:
         raise InputError(NOT_READY) from error
+
+
+def _greeted(address: str, key: bytes) -> Any:
+    """Return a connection to ``address`` on which both ends have shown that they know ``key``."""
+    connection: Any = Client(address)
+    try:
+        # A process that hangs accepts connections too.
+        if not connection.poll(GREETING_SECONDS):
+            raise EOFError("The process that records does not answer.")
+        answer_challenge(connection, key)
+        deliver_challenge(connection, key)
+    except BaseException:
+        connection.close()
+        raise
     return connection
 
 
@@ -164,6 +183,11 @@ def request_episode(folder: Path, port: int, request: str, by: EpisodeGiver) -> 
     asked = {"request": request, "by": {"name": by.name, "role": by.role, "key": by.key}}
     try:
         connection.send_bytes(json.dumps(asked).encode())
+        if not connection.poll(ANSWER_SECONDS):
+            raise InputError(
+                f"The process that records has not answered for {ANSWER_SECONDS:g} s. Look at the "
+                "list of episodes, and start the server again if this repeats."
+            )
         answer = json.loads(connection.recv_bytes(MAX_MESSAGE_BYTES))
     except (OSError, EOFError, ValueError) as error:
         raise InputError(

@@ -19,7 +19,11 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes.episode import EpisodeGiver, message_of
+from katana450.extensions.recording.episodes.episode import (
+    MAX_NUMBER,
+    EpisodeGiver,
+    message_of,
+)
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode
 from katana450.extensions.recording.episodes.episode_requests import (
     MAX_REQUEST_BYTES,
@@ -34,8 +38,11 @@ from katana450.server.service.participants import actor_of
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
 from katana450.server.web.http_api import RouteContext
 
-MAX_WAITING = 8
-"""Maximum number of requests that wait for the process that records."""
+MAX_WAITING = 3
+"""Maximum number of requests that wait for the process that records.
+
+Each has one of the few threads of the event loop, which others need too.
+"""
 
 RECONNECT_SECONDS = 0.5
 """[s] Time between two attempts to reach the process that records."""
@@ -82,8 +89,9 @@ class EpisodeRoutes:
         """Return the file of an episode."""
         if not self._context.identity(request).role.may_drive:
             raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not record.")
-        path = self._read.path(request.path_params["number"])
-        if not path.exists():
+        number = request.path_params["number"]
+        path = self._read.path(number)
+        if number > MAX_NUMBER or not path.exists():
             raise HTTPException(HTTPStatus.NOT_FOUND, "There is no such episode.")
         return FileResponse(path, filename=path.name, media_type="application/octet-stream")
 
@@ -169,6 +177,8 @@ def follow_episodes(hub: Hub, folder: Path, port: int) -> threading.Thread:
                     show(json.loads(connection.recv_bytes()))
             except (OSError, EOFError, ValueError):
                 connection.close()
+                # A process that ends each connection must not keep this thread busy.
+                time.sleep(RECONNECT_SECONDS)
 
     thread = threading.Thread(target=follow, name="episodes", daemon=True)
     thread.start()

@@ -113,7 +113,7 @@ def lost_message(count: int, until: float) -> bytes:
 
 
 LOST = b"lost "
-"""Begin of the message about lost records; those of records begin with that of a pickle."""
+"""Begin of the message about lost records; that of a record begins with another byte."""
 
 
 def lost_records(message: bytes) -> tuple[int, float] | None:
