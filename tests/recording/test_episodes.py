@@ -230,7 +230,10 @@ def test_episode_is_trimmed_described_and_widened_again(bench: Bench) -> None:
     assert (described.note, described.task) == ("spilled", "pour more")
     bench.ask(do="trim", number=1, begin=0.0, end=kept.stop - kept.start)
     assert bench.folder.find(1).episode.length == pytest.approx(kept.episode.length)
-    for begin, end in ((1.0, 1.0), (0.0, 1000.0)):
+    # Each description makes another file, of which the newest alone is remembered.
+    assert len(bench.folder._known) == 1
+    length = kept.stop - kept.start
+    for begin, end in ((1.0, 1.0), (0.0, 1000.0), (length + 0.02, length + 0.05)):
         with pytest.raises(InputError, match="choose a begin"):
             bench.ask(do="trim", number=1, begin=begin, end=end)
 
@@ -318,6 +321,7 @@ def test_crash_leaves_the_running_episode_unfinished(bench: Bench) -> None:
     again = bench.made()
     assert begun == 2
     assert "unfinished" in again.status()["notice"]
+    assert again.status()["task"] == "second"
     first, second = bench.folder.kept()
     assert first.episode.outcome is EpisodeOutcome.SUCCESS
     assert second.episode.outcome is EpisodeOutcome.UNFINISHED

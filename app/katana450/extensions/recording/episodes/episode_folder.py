@@ -88,7 +88,7 @@ class EpisodeFolder:
         """Use ``folder``, which need not exist."""
         self.folder = folder
         self._lock: BinaryIO | None = None
-        self._known: dict[tuple[Path, int, int], KeptEpisode] = {}
+        self._known: dict[Path, tuple[tuple[int, int], KeptEpisode]] = {}
 
     def claim(self) -> None:
         """Create the folder, and claim it until this process ends.
@@ -247,13 +247,16 @@ class EpisodeFolder:
             about = path.stat()
         except OSError as error:
             raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-        key = path, about.st_mtime_ns, about.st_ino
-        if key not in self._known:
-            with RecordingFile.open(path) as file:
-                self._known[key] = KeptEpisode(
-                    path, only_episode(file), file.start, file.end, file.size, discarded
-                )
-        return self._known[key]
+        version = about.st_mtime_ns, about.st_ino
+        before = self._known.get(path)
+        if before is not None and before[0] == version:
+            return before[1]
+        with RecordingFile.open(path) as file:
+            found = KeptEpisode(
+                path, only_episode(file), file.start, file.end, file.size, discarded
+            )
+        self._known[path] = version, found
+        return found
 
 
 def _marker_in(path: Path) -> EpisodeMarker:

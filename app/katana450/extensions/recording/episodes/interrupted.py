@@ -30,9 +30,13 @@ class NothingRecordedError(InputError):
 def cut_out(folder: EpisodeFolder, marker: EpisodeMarker, kind: str) -> Episode:
     """Write the file of the episode of ``marker``, which may lack its end; return the episode.
 
-    Raises NothingRecordedError if the ring has no state of it, and InputError if the file cannot be
-    written.
+    Raises NothingRecordedError if the ring has no state of it, and InputError if the ring cannot be
+    found, or the file cannot be written.
     """
+    if not marker.ring.is_dir():
+        raise InputError(
+            f"There is no folder {marker.ring}, in which its motion was recorded. Bring it back."
+        )
     with _sources(marker) as sources:
         start, end, states = _extent(sources)
         if not states:

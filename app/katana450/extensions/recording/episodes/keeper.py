@@ -97,9 +97,10 @@ class EpisodeKeeper:
         self._notice = ""
         self._problem = ""
         self._revision = 0
-        self._task = ""
         for said in finish_interrupted(folder):
             self._notice = said
+        last = folder.last()
+        self._task = "" if last is None else last.episode.task
         self._hold_interrupted()
 
     # The state for the pages
@@ -226,7 +227,8 @@ class EpisodeKeeper:
         episode = Episode(number, task.strip(), t, None, EpisodeOutcome.RUNNING, "", by)
         with self._ring.lock:
             first = self._ring.newest
-            marker = EpisodeMarker(episode, self._ring_folder, first, self._run)
+            # It may be finished by a program with another working directory.
+            marker = EpisodeMarker(episode, self._ring_folder.absolute(), first, self._run)
             self._folder.mark(marker)
             self._ring.held = first
             self._size_before = self._ring.size_from(first)
@@ -293,7 +295,8 @@ class EpisodeKeeper:
 
     def _hold_interrupted(self) -> None:
         """Hold the files of the ring that interrupted episodes still need."""
-        firsts = [each.first for each in self._folder.markers() if each.ring == self._ring_folder]
+        ring = self._ring_folder.absolute()
+        firsts = [each.first for each in self._folder.markers() if each.ring == ring]
         self._ring.held = min(firsts, default=None)
 
     def _runs(self, number: int | None) -> bool:
@@ -353,13 +356,13 @@ class EpisodeKeeper:
     def _trim(self, number: int, begin: float, end: float) -> Episode:
         found = self._folder.find(number)
         length = found.stop - found.start
+        start, stop = found.start + begin, min(found.start + end, found.stop)
         # The page shows tenths of a second.
-        if not begin < end or end > length + 0.1:
+        if not start < stop or end > length + 0.1:
             raise InputError(
                 f"Episode {number} lasts {length:.1f} s: choose a begin from 0 s, and an end after "
                 "it up to there."
             )
-        start, stop = found.start + begin, min(found.start + end, found.stop)
         return self._folder.change(number, "trimmed", begin=start, end=stop)
 
     # Over time

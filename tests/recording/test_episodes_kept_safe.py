@@ -1,0 +1,61 @@
+"""Episodes are not lost with a missing ring, and nobody waits for a process that hangs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from multiprocessing.connection import Listener
+from pathlib import Path
+
+import pytest
+
+from katana450.cli.main import main
+from katana450.errors import InputError
+from katana450.extensions.recording.episodes import keeper as keeper_module
+from katana450.extensions.recording.episodes import link
+from katana450.platform_support import pipe_address
+from tests.recording.episode_bench import Bench
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    monkeypatch.setattr(keeper_module, "LATE_SECONDS", 0.0)
+    found = Bench(tmp_path)
+    yield found
+    found.keeper.close()
+    found.ring.close()
+
+
+def test_interrupted_episode_waits_until_its_ring_is_found(
+    bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, away = bench.folder.folder, bench.ring_folder.with_name("away")
+    monkeypatch.chdir(bench.ring_folder.parent)
+    bench.ring_folder = Path("ring")
+    bench.keeper = bench.made()
+    bench.ask(do="start", task="stir")
+    bench.move(100)
+    bench.ring.sync()
+    bench.folder.release()
+    monkeypatch.chdir("/")
+    away.with_name("ring").rename(away)
+    assert main(["record", "episodes", "recover", str(folder)]) == 0
+    assert "There is no folder" in capsys.readouterr().out
+    assert len(bench.folder.markers()) == 1
+    away.rename(away.with_name("ring"))
+    assert main(["record", "episodes", "recover", str(folder)]) == 0
+    assert "is kept as unfinished" in capsys.readouterr().out
+    assert not bench.folder.markers()
+    bench.keeper = bench.made()
+
+
+def test_process_that_hangs_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(link, "GREETING_SECONDS", 0.1)
+    address = pipe_address(tmp_path, "hangs")
+    with Listener(address):
+        about = {"port": 8080, "address": address, "key": "00" * 32}
+        (tmp_path / link.SERVER_FILE).write_text(json.dumps(about))
+        with pytest.raises(InputError, match="is not ready"):
+            link.connect_to_episodes(tmp_path, 8080)
