@@ -186,7 +186,9 @@ export class Timeline {
 
   async #refresh() {
     try {
-      const { spans, marks } = await api.timeline(this.#of);
+      const of = this.#of;
+      const { spans, marks } = await api.timeline(of);
+      if (of !== this.#of) return;
       [this.#spans, this.#marks] = [spans, marks];
       this.#failed = false;
     } catch (error) {
@@ -201,8 +203,9 @@ export class Timeline {
   async #choose(of) {
     this.live();
     this.#compare("");
-    [this.#of, this.#ends] = [of, [null, null]];
+    [this.#of, this.#ends, this.#spans, this.#marks, this.#failed] = [of, [null, null], [], [], false];
     await this.#refresh();
+    if (this.#failed && of !== RING) return this.#choose(RING); // the server no longer has it
     this.#list();
     if (of !== RING && this.#spans.length) this.#seek(this.#spans[0][0]);
   }
@@ -281,7 +284,7 @@ export class Timeline {
   }
 
   #frame(now) {
-    if (this.#playing === null) return;
+    if (this.#playing === null || !this.#spans.length) return this.#play(false);
     const place = placeOf(this.#spans, this.#t) + ((now - this.#playing) / 1000) * Number(this.#part.speed.value);
     this.#playing = now;
     const end = this.#ends[1] ?? this.#spans.at(-1)[1];
