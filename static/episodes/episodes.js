@@ -108,11 +108,13 @@ export class Episodes {
   }
 
   async #act(act) {
-    const { running, saving } = this.#state;
+    const { running, saving, last: before } = this.#state ?? {};
     if (act === "rec" && saving) return;
     const request =
       act === "rec" ? (running ? { do: "stop" } : { do: "start", task: this.#task.value })
       : act in OUTCOMES ? { do: "judge", outcome: act }
+      // The one that is seen, so that a second press does not reach the one before it.
+      : act === "discard" && !saving ? { do: act, number: (running ?? before)?.number }
       : { do: act };
     const done = await this.#ask(request);
     if (!done) return;
