@@ -8,8 +8,11 @@ so they are for processes that are yet to be started.
 
 from __future__ import annotations
 
+import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Final
 
 PROCESSORS = ("x86_64", "AMD64")
 
@@ -42,5 +45,25 @@ def portable_rounding(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def rounds_portably(environment: Mapping[str, str]) -> bool:
-    """Return whether processes with ``environment`` round independently of the processor."""
+    """Return whether a process that begins with ``environment`` rounds alike on all processors."""
     return BLAS in environment and portable_rounding(environment) == dict(environment)
+
+
+ROUNDS_PORTABLY: Final = rounds_portably(os.environ)
+"""Whether this process rounds alike on all processors. A later change of its environment does not
+matter."""
+
+
+@contextmanager
+def starting_portable_processes() -> Iterator[None]:
+    """Let processes that are started in the block round alike on all processors."""
+    before = {name: os.environ.get(name) for name in (BLAS, LIBM)}
+    os.environ.update(portable_rounding(os.environ))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -33,6 +33,7 @@ from katana450.assembly.supervised import (
     run_supervised,
 )
 from katana450.errors import ConfigurationError, KatanaError
+from katana450.portable_rounding import starting_portable_processes
 
 BEATS_BEFORE_DEADLINE = 8
 
@@ -130,7 +131,8 @@ class Child:
             name=self.spec.name,
             daemon=True,
         )
-        self.process.start()
+        with starting_portable_processes():
+            self.process.start()
         # Closed here, so that each side notices when the other is gone.
         theirs.close()
         self._first, self._ready_at, self.error = False, None, None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import secrets
 import shutil
 import signal
@@ -28,7 +27,6 @@ from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spe
 from katana450.errors import ConfigurationError
 from katana450.extension import ExtraProcess, ServerFacts, serve_extensions
 from katana450.platform_support import pipe_address, stop_signals
-from katana450.portable_rounding import portable_rounding
 from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
 from katana450.server.web.acceptor import raise_descriptor_limit
@@ -93,8 +91,6 @@ def serve(
     """
     start_log()
     raise_descriptor_limit()
-    # Read by the libraries of the processes that are started.
-    os.environ.update(portable_rounding(os.environ))
     stopping = threading.Event()
     _set_on_signals(stopping)
     # Held by this process, so that the port stays taken while the front end is started again.

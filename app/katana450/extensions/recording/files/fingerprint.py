@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import math
-import os
 import platform
 import struct
 import sys
@@ -21,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from katana450.cli.version import version
-from katana450.portable_rounding import rounds_portably
+from katana450.portable_rounding import ROUNDS_PORTABLY
 
 RELEVANT = (
     *("version", "python", "numpy", "blas", "blas_core", "libc", "machine", "cpu"),
@@ -51,7 +50,7 @@ def fingerprint() -> dict[str, str]:
         "machine": f"{sys.platform} {platform.machine()}",
         "cpu": _cpu(),
         "cpu_features": _cpu_features(),
-        ROUNDING: PORTABLE if rounds_portably(os.environ) else "of the processor",
+        ROUNDING: PORTABLE if ROUNDS_PORTABLY else "of the processor",
         "libm_rounding": _libm_rounding(),
         "blas_rounding": _blas_rounding(),
     }

@@ -15,11 +15,7 @@ from katana450.extensions.recording.files.checking import session_for, verify_re
 from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.replay import Verification
-from katana450.portable_rounding import (
-    can_round_portably,
-    portable_rounding,
-    rounds_portably,
-)
+from katana450.portable_rounding import ROUNDS_PORTABLY, can_round_portably, portable_rounding
 
 
 def verified(
@@ -42,7 +38,7 @@ def verified(
     """
     with RecordingFile.open(path) as file:
         portable = file.metadata.get(ROUNDING) == PORTABLE
-        if portable and can_round_portably() and not rounds_portably(os.environ):
+        if portable and can_round_portably() and not ROUNDS_PORTABLY:
             return _verified_apart(path, urdf, shows=progress is not None)
         start, length = file.start, file.end - file.start
         inner = None if progress is None else lambda t: progress(t - start, length)
