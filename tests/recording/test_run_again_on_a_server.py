@@ -76,6 +76,7 @@ def test_script_of_the_last_seconds_is_served(server: AppServer, recorded: Path)
     assert len(katana450.open(recorded).t) > 100
 
 
+@pytest.mark.long
 def test_stop_in_the_middle_ends_it_and_it_can_run_again(
     server: AppServer, recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -107,6 +108,7 @@ def _task(client: Client) -> str:
     return "" if program is None or program.status != "running" else program.task
 
 
+@pytest.mark.long
 def test_present_obstacle_is_refused(
     server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
