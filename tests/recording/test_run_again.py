@@ -24,15 +24,17 @@ from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recorded_states import recorded_states
-from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.run_again.again_command import part_and_script
 from katana450.extensions.recording.run_again.again_script import again_script
 from katana450.extensions.recording.run_again.path_difference import path_difference
 from katana450.extensions.recording.run_again.recorded_part import RecordedPart, read_part
+from katana450.extensions.recording.topics import COMMANDS, STATE
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
+from tests.recording.dataset_files import write_copy
 from tests.recording.recorded import described, header, run
 from tests.recording.sessions import drag, program, record_session
 
@@ -202,6 +204,30 @@ def test_gap_is_refused_with_its_time(tmp_path: Path) -> None:
         read(path)
     part, _ = read(path, 0.0, 1.2)
     assert part.duration > 1.0
+
+
+@pytest.mark.parametrize(
+    ("topic", "form"),
+    [(COMMANDS, {"missing": 5}), (STATE, {}), (STATE, {"t": None}), (STATE, {"t": 1e9})],
+)
+def test_damaged_message_is_refused_in_words(
+    dragged: Path,
+    tmp_path: Path,
+    topic: str,
+    form: dict[str, object],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    numbers = iter(range(10_000))
+
+    def change(message: Message) -> Message:
+        if message.topic != topic or next(numbers) != 20:
+            return message
+        return message._replace(data=json.dumps(form).encode())
+
+    path = write_copy(dragged, tmp_path / "changed.mcap", change=change)
+    assert main(["record", "again", str(path), "--out", str(tmp_path / "again.yaml")]) == 1
+    assert "is damaged" in capsys.readouterr().err
+    assert not (tmp_path / "again.yaml").exists()
 
 
 def test_other_robot_is_refused(dragged: Path, capsys: pytest.CaptureFixture[str]) -> None:

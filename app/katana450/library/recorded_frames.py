@@ -49,13 +49,16 @@ class RecordedFrames:
         poses: dict[str, FloatArray] = {}
         self._frames: list[tuple[dict[str, Any], dict[str, FloatArray]]] = []
         due = -math.inf
-        for number, row in enumerate(found):
-            poses = _moved(poses, row)
-            if row["t"] >= due or number == len(found) - 1:
-                self._frames.append((row, poses))
-                due = row["t"] + MIN_STEP
+        try:
+            for number, row in enumerate(found):
+                poses = _moved(poses, row)
+                if row["t"] >= due or number == len(found) - 1:
+                    self._frames.append((row, poses))
+                    due = row["t"] + MIN_STEP
+            self.points = frozen([row["position"] for row, _ in self._frames])
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"{path} is damaged: a state lacks {error}.") from error
         self.t = frozen([row["t"] - first for row, _ in self._frames])
-        self.points = frozen([row["position"] for row, _ in self._frames])
         self._path = path
         self._n = len(robot.session.ready)
 

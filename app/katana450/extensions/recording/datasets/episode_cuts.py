@@ -1,7 +1,4 @@
-"""Episodes of recordings: which part of which file is an episode of a dataset, and its label.
-
-Messages of episodes describe an episode completely; the last one of each number counts.
-"""
+"""Episodes of recordings: which part of which file is an episode of a dataset, and its label."""
 
 from __future__ import annotations
 
@@ -9,18 +6,13 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
-
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import MissingMessage
+from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
+from katana450.extensions.recording.episodes.episode_file import episodes_in
+from katana450.extensions.recording.files.checking import first_gap
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.topics import COMMANDS, EPISODES
 
-SUCCESS, FAILURE, UNJUDGED, UNFINISHED = "success", "failure", "unjudged", "unfinished"
-OUTCOMES = (SUCCESS, FAILURE, UNJUDGED, UNFINISHED)
-"""Outcomes of episodes that can be exported."""
-
-JUDGED = (SUCCESS, FAILURE)
+DEFAULT_OUTCOMES = tuple(each.value for each in JUDGED)
 """Outcomes that are exported unless others are asked for."""
 
 EPISODE_FILES = "episode-*.mcap"
@@ -31,16 +23,6 @@ MAX_OUTSIDE = 60.0
 
 IDENTITY = ("robot", "urdf_sha256", "settings")
 """Metadata that are the same in all recordings of one robot."""
-
-
-class EpisodeLabel(msgspec.Struct):
-    """Content of a message of the topic of episodes, as far as a dataset needs it."""
-
-    number: int
-    task: str
-    begin: float
-    end: float | None
-    outcome: str
 
 
 @dataclass(frozen=True)
@@ -81,21 +63,7 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
     return found
 
 
-def labels_of(file: RecordingFile) -> list[EpisodeLabel]:
-    """Return the episodes that ``file`` names, in their order. Raises InputError."""
-    labels: dict[int, EpisodeLabel] = {}
-    for message in file.messages(EPISODES):
-        try:
-            label = msgspec.json.decode(message.data, type=EpisodeLabel)
-        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-            raise InputError(
-                f"{file.path} is damaged: the episode at t = {message.t:.3f} s is wrong ({error})."
-            ) from error
-        labels[label.number] = label
-    return [labels[number] for number in sorted(labels)]
-
-
-def episodes_in(
+def cuts_in(
     file: RecordingFile, task: str, outcomes: Collection[str], part: tuple[float, float]
 ) -> Iterator[EpisodeCut]:
     """Yield the episodes of ``file`` with one of ``outcomes``; without any, the ``part`` of it.
@@ -109,27 +77,27 @@ def episodes_in(
     Raises:
         InputError: an episode has no task, or a part is asked for of a recording with episodes.
     """
-    labels = labels_of(file)
-    if not labels:
+    episodes = episodes_in(file)
+    if not episodes:
         start, end = (min(file.start + each, file.end) for each in part)
         yield EpisodeCut(file.path, start, end, _task(task, file), None)
         return
     if part[0] > 0.0 or file.start + part[1] < file.end:
         raise InputError(
-            f"{file.path} has {len(labels)} episodes. --from and --to cut recordings without "
+            f"{file.path} has {len(episodes)} episodes. --from and --to cut recordings without "
             "episodes only."
         )
-    for label in labels:
-        if label.outcome in outcomes and label.end is not None:
-            if not file.start - MAX_OUTSIDE <= label.begin < label.end <= file.end + MAX_OUTSIDE:
+    for each in episodes:
+        if each.outcome.value in outcomes and each.end is not None:
+            if not file.start - MAX_OUTSIDE <= each.begin < each.end <= file.end + MAX_OUTSIDE:
                 raise InputError(
-                    f"Episode {label.number} of {file.path} is from {label.begin:.3f} to "
-                    f"{label.end:.3f} s, but the recording is from {file.start:.3f} to "
+                    f"Episode {each.number} of {file.path} is from {each.begin:.3f} to "
+                    f"{each.end:.3f} s, but the recording is from {file.start:.3f} to "
                     f"{file.end:.3f} s. The file was changed or is damaged."
                 )
-            success = label.outcome == SUCCESS if label.outcome in JUDGED else None
-            task_text = _task(label.task or task, file, label.number)
-            yield EpisodeCut(file.path, label.begin, label.end, task_text, success)
+            success = each.outcome is EpisodeOutcome.SUCCESS if each.outcome in JUDGED else None
+            task_text = _task(each.task or task, file, each.number)
+            yield EpisodeCut(file.path, each.begin, each.end, task_text, success)
 
 
 def _task(task: str, file: RecordingFile, number: int | None = None) -> str:
@@ -142,19 +110,13 @@ def _task(task: str, file: RecordingFile, number: int | None = None) -> str:
 
 def check_without_gaps(file: RecordingFile, cut: EpisodeCut) -> None:
     """Raise InputError if the recording of ``cut`` lacks ticks."""
-    for message in file.messages(COMMANDS, start=cut.start, end=cut.end):
-        if b'"missing"' not in message.data:
-            continue
-        try:
-            found = msgspec.json.decode(message.data, type=MissingMessage)
-        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-            raise InputError(f"{cut} is damaged: {error}.") from error
-        if found.missing is not None:
-            raise InputError(
-                f"{cut} has a gap: {found.ticks} ticks are missing until t = {message.t:.3f} s "
-                f"({found.missing}). Leave this file out, or cut out a part without gaps by "
-                "`katana450 record trim`."
-            )
+    found = first_gap(file, cut.start, cut.end)
+    if found is not None:
+        t, gap = found
+        raise InputError(
+            f"{cut} has a gap: {gap.ticks} ticks are missing until t = {t:.3f} s ({gap.missing}). "
+            "Leave this file out, or cut out a part without gaps by `katana450 record trim`."
+        )
 
 
 def check_same_robot(first: RecordingFile, other: RecordingFile) -> None:

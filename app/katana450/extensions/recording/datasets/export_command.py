@@ -11,7 +11,7 @@ from pathlib import Path
 
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
-from katana450.extensions.recording.datasets.episode_cuts import JUDGED, files_of
+from katana450.extensions.recording.datasets.episode_cuts import DEFAULT_OUTCOMES, files_of
 from katana450.extensions.recording.datasets.export_options import (
     DEFAULT_FPS,
     DEFAULT_SIZES,
@@ -104,7 +104,7 @@ def _lerobot(options: argparse.Namespace) -> Exported:
     asked = LerobotOptions(
         fps=DEFAULT_FPS["lerobot"] if options.fps is None else options.fps,
         task=options.task or "",
-        outcomes=options.outcomes or JUDGED,
+        outcomes=options.outcomes or DEFAULT_OUTCOMES,
         part=(options.start, options.end),
         views=views,
         size=size,

@@ -16,11 +16,11 @@ from katana450.errors import InputError
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.arrow import arrow
 from katana450.extensions.recording.datasets.episode_cuts import (
-    JUDGED,
+    DEFAULT_OUTCOMES,
     EpisodeCut,
     check_same_robot,
     check_without_gaps,
-    episodes_in,
+    cuts_in,
     files_of,
 )
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
@@ -55,7 +55,7 @@ class LerobotOptions:
 
     fps: int
     task: str = ""
-    outcomes: Collection[str] = JUDGED
+    outcomes: Collection[str] = DEFAULT_OUTCOMES
     part: tuple[float, float] = (0.0, float("inf"))
     views: tuple[str, ...] = ()
     size: tuple[int, int] = (0, 0)
@@ -155,7 +155,7 @@ def _cuts(paths: Sequence[Path], options: LerobotOptions) -> tuple[list[EpisodeC
         for path in paths:
             with RecordingFile.open(path) as file:
                 check_same_robot(first, file)
-                for cut in episodes_in(file, options.task, options.outcomes, options.part):
+                for cut in cuts_in(file, options.task, options.outcomes, options.part):
                     check_without_gaps(file, cut)
                     if len(frame_times(cut.start, cut.end, options.fps)) < MIN_FRAMES:
                         raise InputError(

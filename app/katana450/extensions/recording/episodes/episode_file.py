@@ -21,7 +21,10 @@ from katana450.extensions.recording.topics import EPISODES
 
 def episodes_in(file: RecordingFile) -> tuple[Episode, ...]:
     """Return all episodes that ``file`` describes, by number. Raises InputError."""
-    return episodes_of(message.data for message in file.messages(EPISODES))
+    try:
+        return episodes_of(message.data for message in file.messages(EPISODES))
+    except InputError as error:
+        raise InputError(f"{file.path} is damaged: {error}") from error
 
 
 def episode_in(path: Path) -> Episode:

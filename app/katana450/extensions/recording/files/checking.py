@@ -135,6 +135,23 @@ def _setpoint(message: Message) -> np.ndarray[Any, np.dtype[np.float64]]:
             raise FormError("the setpoint is not a row of numbers") from None
 
 
+def first_gap(
+    file: RecordingFile, start: float, end: float
+) -> tuple[float, MissingMessage] | None:
+    """Return the first gap from ``start`` to ``end`` [s] with its time [s]; None without one.
+
+    Raises InputError for a damaged recording.
+    """
+    for message in file.messages(COMMANDS, start=start, end=end):
+        if b'"missing"' not in message.data:
+            continue
+        with _placed(message):
+            gap = msgspec.json.decode(message.data, type=MissingMessage)
+        if gap.missing is not None:
+            return message.t, gap
+    return None
+
+
 def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot:
     """Return the robot of ``file`` with a new session like the recorded one.
 

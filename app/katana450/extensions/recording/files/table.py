@@ -28,7 +28,12 @@ def rows(
 ) -> Iterator[dict[str, Any]]:
     """Yield the states that were written from ``start`` to ``end`` [s]. Raises InputError."""
     for message in file.messages(STATE, start=start, end=end):
-        yield state_numbers(message)
+        row = state_numbers(message)
+        if not isinstance(row.get("t"), int | float):
+            raise InputError(
+                f"{file.path} is damaged: the state at t = {message.t:.3f} s has no time."
+            )
+        yield row
 
 
 def state_at(file: RecordingFile, t: float) -> dict[str, Any] | None:

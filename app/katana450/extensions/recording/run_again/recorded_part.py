@@ -7,16 +7,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.control.state import Status
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import MissingMessage
+from katana450.extensions.recording.files.checking import first_gap
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import rows, state_at
-from katana450.extensions.recording.topics import COMMANDS
 from katana450.maths.geometry.arrays import FloatArray, IntArray, finite_array
 
 WAITING = (Status.PAUSED.value, Status.STOPPED.value)
@@ -24,7 +22,6 @@ WAITING = (Status.PAUSED.value, Status.STOPPED.value)
 
 MIN_STEP = 5e-3
 """[s] Minimum time between two states that are used; an extra tick for a STOP comes sooner."""
-
 
 MIN_GAP, TICK = 0.03, 0.01
 """[s] Time between two states from which on the arm rested between them, and period of ticks."""
@@ -101,15 +98,13 @@ def read_part(
 
 def check_whole(file: RecordingFile, first: float, last: float) -> None:
     """Raise InputError with the time of the first gap from ``first`` to ``last`` [s]."""
-    for message in file.messages(COMMANDS, start=first, end=last):
-        if b'"missing"' not in message.data:
-            continue
-        gap = msgspec.json.decode(message.data, type=MissingMessage)
-        if gap.missing is not None:
-            raise InputError(
-                f"{file.path} has a gap at {message.t - file.start:.2f} s: {gap.ticks} ticks are "
-                f"missing ({gap.missing}). Choose a part before or after it by --from and --to."
-            )
+    found = first_gap(file, first, last)
+    if found is not None:
+        t, gap = found
+        raise InputError(
+            f"{file.path} has a gap at {t - file.start:.2f} s: {gap.ticks} ticks are missing "
+            f"({gap.missing}). Choose a part before or after it by --from and --to."
+        )
 
 
 def _states(file: RecordingFile, first: float, last: float) -> Iterator[dict[str, Any]]:
