@@ -27,7 +27,7 @@ from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEAS
 from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from tests.recording.recorded import described
+from tests.recording.recorded import PERIOD, described
 from tests.recording.sessions import drag, program, record_session
 
 LINE = "frame: base\ntool: tcp\nsteps:\n  - line: {by: {z: 60}}\n  - gripper: open\n"
@@ -55,6 +55,11 @@ def test_smoothness_does_not_depend_on_size_and_falls_with_each_stop() -> None:
     two, three = np.concatenate((one, one)), np.concatenate((one, one, one))
     assert dimensionless_jerk(one) < dimensionless_jerk(two) < dimensionless_jerk(three)
     assert sparc(one[:, 0]) > sparc(two[:, 0]) > sparc(three[:, 0])
+
+
+def test_part_of_a_motion_has_no_step_at_its_ends() -> None:
+    """The middle half of a minimum-jerk motion: 275.6 / 32 / 0.793^2 by integration."""
+    assert dimensionless_jerk(bell(4.0)[100:301]) == pytest.approx(13.7, rel=0.05)
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +113,17 @@ def test_stops_are_counted(stopped: Path) -> None:
     part = score(stopped, start=0.0, end=0.8)
     assert part.values["stops"] == 0.0
     assert (part.values["sparc"] or 0.0) > (found.values["sparc"] or 0.0)
+
+
+def test_rest_before_the_first_motion_does_not_count(stopped: Path) -> None:
+    """The arm makes no ticks while it stands stopped, so the last state before is old."""
+    run = katana450.open(stopped)
+    moved = run.t[1:][np.abs(np.diff(run.setpoint, axis=0)).max(axis=1) > 0.0]
+    rest = int(np.argmax(np.diff(moved)))
+    found = score(stopped, start=float(moved[rest] - run.start + 0.02))
+    lasted = moved[-1] - moved[rest + 1] + PERIOD
+    assert found.values["duration_s"] == pytest.approx(lasted, abs=1e-6)
+    assert found.t[-1] == pytest.approx(lasted, abs=0.02)
 
 
 @pytest.mark.long

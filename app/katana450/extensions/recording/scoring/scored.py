@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,12 @@ from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.run_again.recorded_part import check_whole
-from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
+from katana450.extensions.recording.scoring.smoothness import (
+    RATE,
+    WINDOW,
+    dimensionless_jerk,
+    sparc,
+)
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.contact import Contact
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -124,7 +129,9 @@ def scored(
     if moving is None:
         raise InputError(f"Nothing moves in this part of {file.path}.")
     begin, stop = moving
-    run = states[begin : stop + 1]
+    # An arm at rest makes no ticks, so the state before the first motion may be much older.
+    first_t = max(states[begin].t, states[begin + 1].t - 1.0 / RATE)
+    run = [replace(states[begin], t=first_t), *states[begin + 1 : stop + 1]]
     t, tool = _tool_points(robot, run)
     velocity = np.gradient(tool, 1.0 / RATE, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
@@ -136,7 +143,7 @@ def scored(
         np.array([state.setpoint for state in run]),
         np.array([state.motion.qd for state in run]),
     )
-    moved = float(speed.max()) > 0.0
+    moved = float(speed.max()) > 0.0 and len(speed) >= WINDOW
     values: dict[str, float | None] = dict.fromkeys(MEASURES)
     values |= {
         "duration_s": run[-1].t - run[0].t,

@@ -21,7 +21,7 @@ def sparc(speed: FloatArray) -> float:
 
     It is the negative length of the normalised magnitude spectrum of the speed, up to CUTOFF and
     to the last frequency with at least AMPLITUDE of the largest one. A motion with one bell-shaped
-    rise and fall of its speed has about -1.5; every stop in between makes it more negative.
+    rise and fall of its speed has about -1.41; every stop in between makes it more negative.
 
     Source: Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet, On the analysis of movement
     smoothness, Journal of NeuroEngineering and Rehabilitation 12:112 (2015).
@@ -45,18 +45,22 @@ def dimensionless_jerk(velocity: FloatArray) -> float:
     It is the integral of the squared jerk times T^5 / L^2, with the time T and the length L of the
     path. The smoothest motion from rest to rest on a line, of minimum jerk, has 720; each stop in
     between and each tremor increases it. Derivatives are those of polynomials fitted to WINDOW
-    samples (Savitzky and Golay, Analytical Chemistry 36:1627, 1964).
+    samples (Savitzky and Golay, Analytical Chemistry 36:1627, 1964), at both ends those of the
+    first and the last polynomial, so that a part that begins in motion has no step there.
+
+    Args:
+        velocity: at least WINDOW samples.
 
     Source: Hogan and Sternad, Sensitivity of smoothness measures to movement duration, amplitude,
     and arrests, Journal of Motor Behavior 41:529 (2009).
     """
     half = WINDOW // 2
-    padded = np.pad(velocity, ((half, half), (0, 0)))
     times = np.arange(-half, half + 1) / RATE
     fit = np.linalg.pinv(times[:, None] ** np.arange(DEGREE + 1))
-    jerk = np.stack(
-        [np.convolve(column, 2.0 * fit[2][::-1], "valid") for column in padded.T], axis=1
-    )
+    inner = [np.convolve(column, 2.0 * fit[2][::-1], "valid") for column in velocity.T]
+    second = 2.0 * fit[2] + 6.0 * times[:, None] * fit[3]
+    begin, end = second[:half] @ velocity[:WINDOW], second[-half:] @ velocity[-WINDOW:]
+    jerk = np.concatenate((begin, np.stack(inner, axis=1), end))
     duration = (len(velocity) - 1) / RATE
     length = float(np.linalg.norm(velocity, axis=1).sum()) / RATE
     return float((jerk * jerk).sum()) / RATE * duration**5 / length**2
