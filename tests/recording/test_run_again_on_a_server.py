@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import threading
 import time
+from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
 
 import katana450
+from katana450.arm.control.lease import Role
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.extensions.programs.script import parse
+from katana450.extensions.recording.live.route import recording_routes
+from katana450.extensions.recording.playback.store import RecordingStore
+from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Shape
+from katana450.server.service.identity import Identity
+from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.gateway.client import ask, enter
 from tests.recording.test_recorder import waited_for
@@ -101,6 +112,36 @@ def test_stop_in_the_middle_ends_it_and_it_can_run_again(
         posture = found.run_again(client, end=end).q
         number = int(np.searchsorted(found.t - found.start, end, side="right")) - 1
         np.testing.assert_allclose(posture, found.setpoint[number], atol=1e-6)
+
+
+def test_script_is_made_for_the_robot_of_the_server_only(recorded: Path, tmp_path: Path) -> None:
+    """A page may open a recording of another robot than that of ``serve --urdf``."""
+    other = tmp_path / "other.urdf"
+    other.write_bytes(URDF_PATH.read_bytes() + b"<!-- another -->")
+    options = Namespace(urdf=other)
+    ada = Identity("session", "Ada", Role.OPERATOR)
+    context = RouteContext(None, None, lambda _: ada, options)  # type: ignore[arg-type]
+    store = RecordingStore(recorded.parent)
+    request = Request({"type": "http", "query_string": b"", "headers": []})
+    with pytest.raises(HTTPException, match="is a recording of") as caught:
+        asyncio.run(recording_routes(context, store)[1].endpoint(request))
+    assert caught.value.status_code == 409
+
+
+def test_server_with_another_arm_is_refused(server: AppServer, recorded: Path) -> None:
+    with katana450.connect(server.url, "Ada") as client:
+        arm = client.query(answers.Arm)
+        other = msgspec.structs.replace(arm, upper=[each + 0.1 for each in arm.upper])
+
+        class OtherArm:
+            """The client of a server whose joints go farther; it takes no script."""
+
+            def query(self, kind: type[answers.Arm]) -> answers.Arm:
+                assert kind is answers.Arm
+                return other
+
+        with pytest.raises(katana450.InputError, match="joint limits or tool frames differ"):
+            katana450.open(recorded).run_again(OtherArm())  # type: ignore[arg-type]
 
 
 def _task(client: Client) -> str:

@@ -29,7 +29,10 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.replay import Verification
-from katana450.extensions.recording.run_again.again_command import part_and_script
+from katana450.extensions.recording.run_again.again_command import (
+    check_same_arm,
+    part_and_script,
+)
 from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import Scored
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, PLANS, SOLIDS
@@ -199,7 +202,13 @@ class Recording:
             return part_and_script(file, found, start, end)[1]
 
     def run_again(
-        self, client: Client, start: float = 0.0, end: float = math.inf, *, speed: float = 1.0
+        self,
+        client: Client,
+        start: float = 0.0,
+        end: float = math.inf,
+        *,
+        speed: float = 1.0,
+        urdf: str | os.PathLike[str] | None = None,
     ) -> State:
         """Drive the arm of a server along this motion; return its state at the end.
 
@@ -211,15 +220,20 @@ class Recording:
             start: begin of the part [s] after that of the recording.
             end: its end [s].
             speed: fraction of the recorded speed, up to 1.
+            urdf: file of the recorded robot, if it is not the Katana450 of this package.
 
         Raises:
-            InputError: as `script`.
+            InputError: as `script`, or the server has another arm.
             RefusedError: the server refuses the motion, with the moment and the parts of a contact;
                 or it was stopped.
         """
         from katana450.library.script_run import run_script
 
-        return run_script(client, self.script(start, end), speed)
+        with RecordingFile.open(self.path) as file:
+            found = session_for(file, None if urdf is None else Path(urdf))
+            text = part_and_script(file, found, start, end)[1]
+        check_same_arm(client, found.session.require_arm(), self.path)
+        return run_script(client, text, speed)
 
     def score(
         self,

@@ -28,10 +28,12 @@ TIMEOUT = 60.0
 def recording_routes(context: RouteContext, store: RecordingStore) -> list[Route]:
     """Return the routes of a recording of the last minutes, or a part of one, and of its script.
 
-    The script runs the recorded motion again. ``store`` has the folder of the ring, and the files
-    that people opened.
+    The script runs the recorded motion again; a recording of another robot than the server's has
+    none. ``store`` has the folder of the ring, and the files that people opened.
     """
     working = asyncio.Lock()
+    urdf = getattr(context.options, "urdf", None)
+    described = () if urdf is None else ("--urdf", str(urdf))
 
     async def made(request: Request, *, script: bool) -> bytes:
         if not context.identity(request).role.may_drive:
@@ -46,7 +48,7 @@ def recording_routes(context: RouteContext, store: RecordingStore) -> list[Route
                 kept, again = Path(temporary) / "kept.mcap", Path(temporary) / "again.yaml"
                 await _record(*command, "--out", str(kept))
                 if script:
-                    await _record("again", str(kept), "--out", str(again))
+                    await _record("again", str(kept), *described, "--out", str(again))
                 return await asyncio.to_thread((again if script else kept).read_bytes)
 
     async def recording(request: Request) -> Response:

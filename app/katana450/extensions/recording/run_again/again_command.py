@@ -125,7 +125,7 @@ def _drive(options: Namespace, found: DescribedRobot, part: RecordedPart, text: 
     began: float | None = None
     try:
         with connect(options.url, "Look", options.token) as client:
-            _check_same_arm(client, found.session.require_arm(), options)
+            check_same_arm(client, found.session.require_arm(), options.file)
             began = client.query(answers.State).sent
     except LostError:
         # `katana450 run` starts a server, or reports that there is none.
@@ -148,8 +148,8 @@ def _drive(options: Namespace, found: DescribedRobot, part: RecordedPart, text: 
     return 0
 
 
-def _check_same_arm(client: Client, arm: ArmModel, options: Namespace) -> None:
-    """Raise InputError if the arm of the server is not the recorded one."""
+def check_same_arm(client: Client, arm: ArmModel, file: Path) -> None:
+    """Raise InputError if the arm of the server is not ``arm``, that of the recording ``file``."""
     there = client.query(answers.Arm)
     pairs = [(there.lower, arm.chain.lower), (there.upper, arm.chain.upper)]
     for one, other in (
@@ -158,8 +158,8 @@ def _check_same_arm(client: Client, arm: ArmModel, options: Namespace) -> None:
     ):
         if one.shape != other.shape or not np.allclose(one, other, 0.0, SAME):
             raise InputError(
-                f"{options.file} is not a recording of {there.name}, the arm of the server at "
-                f"{options.url}: its joint limits or tool frames differ."
+                f"{file} is not a recording of {there.name}, the arm of the server: its joint "
+                "limits or tool frames differ."
             )
 
 
