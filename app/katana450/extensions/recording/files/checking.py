@@ -135,9 +135,7 @@ def _setpoint(message: Message) -> np.ndarray[Any, np.dtype[np.float64]]:
             raise FormError("the setpoint is not a row of numbers") from None
 
 
-def first_gap(
-    file: RecordingFile, start: float, end: float
-) -> tuple[float, MissingMessage] | None:
+def first_gap(file: RecordingFile, start: float, end: float) -> tuple[float, MissingMessage] | None:
     """Return the first gap from ``start`` to ``end`` [s] with its time [s]; None without one.
 
     Raises InputError for a damaged recording.
