@@ -206,9 +206,7 @@ def test_odd_input_is_refused(
         short = write_copy(
             run, tmp_path / "short.mcap", [episode(file, 1, "success", part=(0.5, 0.51))]
         )
-        far = write_copy(
-            run, tmp_path / "far.mcap", [episode(file, 3, "success", part=(0.5, 1e9))]
-        )
+        far = write_copy(run, tmp_path / "far.mcap", [episode(file, 3, "success", part=(0.5, 1e9))])
         untold = write_copy(run, tmp_path / "untold.mcap", [episode(file, 1, "success", "")])
         judged = write_copy(run, tmp_path / "judged.mcap", [episode(file, 1, "unjudged")])
     out = tmp_path / "set"
