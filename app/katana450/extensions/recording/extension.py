@@ -74,25 +74,34 @@ def _episodes_folder(options: Namespace, port: int) -> Path:
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
-    from katana450.extensions.recording.live.route import recording_routes
+    from katana450.extensions.recording.late_routes import LateRoutes
     from katana450.extensions.recording.places import default_folder
-    from katana450.extensions.recording.playback.routes import PlaybackRoutes
-    from katana450.extensions.recording.playback.store import RecordingStore
+    from katana450.server.api.fields import ROOT
 
     options = context.options
     port = context.hub.stop_path.main_port
     folder: Path | None = None
+    episodes: Path | None = None
     if options is not None and not options.no_record:
-        folder = options.record or default_folder(port)
-    store = RecordingStore(folder)
-    routes = [*recording_routes(context, store), *PlaybackRoutes(context, store).routes()]
-    if options is not None and folder is not None:
-        from katana450.extensions.recording.episodes.routes import EpisodeRoutes, follow_episodes
+        from katana450.extensions.recording.episodes.follower import follow_episodes
 
-        episodes = _episodes_folder(options, port)
+        folder, episodes = options.record or default_folder(port), _episodes_folder(options, port)
         follow_episodes(context.hub, episodes, port)
-        routes += EpisodeRoutes(context, episodes, port).routes()
-    return routes
+
+    def make() -> list[BaseRoute]:
+        from katana450.extensions.recording.episodes.routes import EpisodeRoutes
+        from katana450.extensions.recording.live.route import recording_routes
+        from katana450.extensions.recording.playback.routes import PlaybackRoutes
+        from katana450.extensions.recording.playback.store import RecordingStore
+
+        store = RecordingStore(folder)
+        routes = [*recording_routes(context, store), *PlaybackRoutes(context, store).routes()]
+        if episodes is not None:
+            routes += EpisodeRoutes(context, episodes, port).routes()
+        return routes
+
+    names = [f"{ROOT}/{name}" for name in ("recording", "playback", "episodes")]
+    return LateRoutes(names, make).routes()
 
 
 def _folder(context: FolderContext) -> PanelFolder:

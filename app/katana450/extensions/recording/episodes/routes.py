@@ -1,12 +1,8 @@
-"""Routes about episodes, and their state for all pages."""
+"""Routes about episodes."""
 
 from __future__ import annotations
 
 import asyncio
-import json
-import threading
-import time
-import weakref
 from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
@@ -29,10 +25,10 @@ from katana450.extensions.recording.episodes.episode_requests import (
     MAX_REQUEST_BYTES,
     episode_request,
 )
-from katana450.extensions.recording.episodes.link import connect_to_episodes, request_episode
+from katana450.extensions.recording.episodes.follower import ENTRY
+from katana450.extensions.recording.episodes.link import request_episode
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
-from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
@@ -43,12 +39,6 @@ MAX_WAITING = 3
 
 Each has one of the few threads of the event loop, which others need too.
 """
-
-RECONNECT_SECONDS = 0.5
-"""[s] Time between two attempts to reach the process that records."""
-
-ENTRY = "episodes"
-"""Name of the state of episodes in the status of all pages."""
 
 
 class EpisodeRoutes:
@@ -151,35 +141,3 @@ def described(kept: KeptEpisode) -> dict[str, Any]:
         "bytes": kept.size,
         "file": kept.path.name,
     }
-
-
-def follow_episodes(hub: Hub, folder: Path, port: int) -> threading.Thread:
-    """Show the state of the episodes to all pages of ``hub``, in a thread of its own."""
-    # The thread waits when this process ends, and must not keep the hub then.
-    shown = weakref.ref(hub)
-
-    def show(state: Any) -> None:
-        found = shown()
-        if found is not None:
-            found.shown = {**found.shown, ENTRY: state}
-
-    def follow() -> None:
-        while True:
-            try:
-                connection = connect_to_episodes(folder, port)
-            except InputError:
-                show(None)
-                time.sleep(RECONNECT_SECONDS)
-                continue
-            try:
-                connection.send_bytes(json.dumps({"watch": True}).encode())
-                while True:
-                    show(json.loads(connection.recv_bytes()))
-            except (OSError, EOFError, ValueError):
-                connection.close()
-                # A process that ends each connection must not keep this thread busy.
-                time.sleep(RECONNECT_SECONDS)
-
-    thread = threading.Thread(target=follow, name="episodes", daemon=True)
-    thread.start()
-    return thread

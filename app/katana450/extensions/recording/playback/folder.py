@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from katana450.extensions.recording.playback.drawing import PlaybackWindows
-from katana450.extensions.recording.playback.routes import WINDOWS
+from weakref import WeakKeyDictionary
+
+from katana450.server.service.hub import Hub
 from katana450.server.view.panel_folder import FolderContext
-from katana450.server.viser_bridge.gestures import Gestures
+
+CONTEXTS: WeakKeyDictionary[Hub, FolderContext] = WeakKeyDictionary()
+"""The context of the view of each server, which has one once its scene is there."""
 
 
 class PlaybackFolder:
@@ -13,13 +16,7 @@ class PlaybackFolder:
 
     def __init__(self, context: FolderContext) -> None:
         """Let the windows of ``context`` play back."""
-        if isinstance(context.gestures, Gestures):
-            WINDOWS[context.hub] = PlaybackWindows(
-                context.server,
-                context.robot,
-                context.gestures,
-                lambda: context.hub.present().session,
-            )
+        CONTEXTS[context.hub] = context
 
     def follow(self) -> None:
         """Do nothing: what is played back follows its window, not the arm."""

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, TypeVar
-from weakref import WeakKeyDictionary
 
 import msgspec
 from starlette.exceptions import HTTPException
@@ -20,6 +19,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.recording.playback.difference import difference, times_of
 from katana450.extensions.recording.playback.drawing import PlaybackWindows
+from katana450.extensions.recording.playback.folder import CONTEXTS
 from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.spans import at_place, length_of, place_of
@@ -33,6 +33,7 @@ from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of, key_of
+from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.web.admission import client_of
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_LONG, TOO_MANY, TOO_SLOW
 from katana450.server.web.http_api import RouteContext
@@ -48,9 +49,6 @@ WRITTEN_BYTES = 1_000_000
 
 T = TypeVar("T")
 
-WINDOWS: WeakKeyDictionary[Hub, PlaybackWindows] = WeakKeyDictionary()
-"""The windows of each server, which has them once its scene is there."""
-
 
 class PlaybackRoutes:
     """The HTTP routes of play back."""
@@ -61,6 +59,7 @@ class PlaybackRoutes:
         self._working = asyncio.Semaphore(AT_ONCE)
         self._receiving = asyncio.Lock()
         self._waiting = 0
+        self._windows: PlaybackWindows | None = None
 
     def routes(self) -> list[BaseRoute]:
         """Return all routes."""
@@ -179,7 +178,9 @@ class PlaybackRoutes:
 
     def _window(self, request: Request) -> tuple[PlaybackWindows, str]:
         """Return all windows, and the key of the one that asks. Raises HTTPException."""
-        windows, page = WINDOWS.get(self._context.hub), request.query_params.get("page", "")
+        if self._windows is None:
+            self._windows = windows_of(self._context.hub)
+        windows, page = self._windows, request.query_params.get("page", "")
         client = client_of(self._context.authenticator, request)
         if windows is None or client is None or not PAGE.fullmatch(page):
             raise HTTPException(
@@ -199,6 +200,14 @@ class PlaybackRoutes:
             raise HTTPException(NOT_UNDERSTOOD, str(error)) from error
         finally:
             self._waiting -= 1
+
+
+def windows_of(hub: Hub) -> PlaybackWindows | None:
+    """Return the windows of the server of ``hub``; None before its scene is there."""
+    view = CONTEXTS.get(hub)
+    if view is None or not isinstance(view.gestures, Gestures):
+        return None
+    return PlaybackWindows(view.server, view.robot, view.gestures, lambda: hub.present().session)
 
 
 async def _received(request: Request, path: Path) -> None:
