@@ -106,6 +106,8 @@ def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
     """Check the phases of figures 9 to 12: initial posture, grasping, approaching, emptying."""
     done = katana450("demo", "pour", "--headless", "--report", str(tmp_path), seconds=150.0)
     assert done.returncode == 0, done.stderr
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert report["margin_to_limits_deg"] > 2.0
     shown = []
     for name in ("initial", "grasping", "approaching", "emptying"):
         with Image.open(tmp_path / f"{name}.png") as picture:
