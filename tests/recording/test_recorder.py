@@ -141,7 +141,7 @@ def test_killed_recorder_loses_a_second_and_the_arm_nothing(
         client.joints(POSTURES[1])
         waited_for(lambda: recordings_in(folder), "the first file")
         for kill in range(KILLS):
-            known = len(recordings_in(folder))
+            before = recordings_in(folder)[-1]
             for posture in POSTURES:
                 client.joints(posture)
             moved = time.perf_counter()
@@ -153,7 +153,7 @@ def test_killed_recorder_loses_a_second_and_the_arm_nothing(
             client.joints(POSTURES[kill % 2])
             waited_for(partial(_other_child, server, recorder), "another recorder")
             client.joints(POSTURES[1 - kill % 2])
-            waited_for(partial(_has_files, folder, min(known + 1, ring.MAX_FILES)), "a file")
+            waited_for(partial(_has_newer, folder, before), "a file")
             broken = recordings_in(folder)[-2]
             # Made whole by the next process. What was synced a second before is there.
             assert verified(broken) > 0
@@ -170,8 +170,9 @@ def _other_child(server: AppServer, than: int) -> bool:
         return False
 
 
-def _has_files(folder: Path, count: int) -> bool:
-    return len(recordings_in(folder)) >= count
+def _has_newer(folder: Path, before: Path) -> bool:
+    """Return whether ``folder`` has a recording after ``before``."""
+    return recordings_in(folder)[-1] != before
 
 
 def test_ring_keeps_the_newest_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
