@@ -381,12 +381,12 @@ def test_released_jog_is_ended_explicitly(table: Table) -> None:
 def test_age_is_that_of_the_windows_own_picture(table: Table) -> None:
     first, second = (table.join(page) for page in PAGES)
     picture = FakePicture()
-    table.hub.show(first.person.key, picture)
+    table.hub.pictures.show(first.person.key, picture)
     table.t += 1.5
-    assert table.hub.age(first) == pytest.approx(1.5)
-    assert table.hub.age(second) == 0.0
-    table.hub.hide(picture)
-    assert table.hub.age(first) == 0.0
+    assert table.hub.pictures.age(first.person.key, table.hub.clock()) == pytest.approx(1.5)
+    assert table.hub.pictures.age(second.person.key, table.hub.clock()) == 0.0
+    table.hub.pictures.hide(picture)
+    assert table.hub.pictures.age(first.person.key, table.hub.clock()) == 0.0
 
 
 def test_no_lease_before_the_arm_is_ready() -> None:

@@ -34,7 +34,7 @@ def table(session: Session, monkeypatch: pytest.MonkeyPatch) -> Staged:
 
 def watch(table: Staged) -> None:
     """Let one page of the table get pictures."""
-    table.hub.show(PAGES[0], Mock())
+    table.hub.pictures.show(PAGES[0], Mock())
 
 
 def wait_for_planning(table: Staged) -> None:

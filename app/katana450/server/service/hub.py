@@ -25,7 +25,7 @@ from katana450.server.service.driver_watch import DriverWatch
 from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
-from katana450.server.service.interfaces import ArmInterface, MeasuresAge
+from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.known_pages import KnownPages
 from katana450.server.service.mutes import MutedError
 from katana450.server.service.names import renamed
@@ -37,6 +37,7 @@ from katana450.server.service.participants import (
     session_of,
 )
 from katana450.server.service.people import People
+from katana450.server.service.pictures import ShownPictures
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
@@ -79,7 +80,7 @@ class Hub:
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._participants: dict[str, Participant] = {}
-        self._pictures: dict[MeasuresAge, str] = {}
+        self.pictures = ShownPictures()
         self._known = KnownPages()
         self._takeover: Takeover | None = None
         self._ticked = clock()
@@ -209,24 +210,6 @@ class Hub:
         if participant is None:
             raise LeaseError("Open the start page to drive the arm.")
         return Actor(participant.person, CommandChannel.SCENE, seen)
-
-    def show(self, key: str, picture: MeasuresAge) -> None:
-        """Add the connection of a page to viser. ``picture`` measures the age of its picture."""
-        self._pictures[picture] = key
-
-    def hide(self, picture: MeasuresAge) -> None:
-        """Remove the closed connection of a page to viser."""
-        del self._pictures[picture]
-
-    @property
-    def watching(self) -> int:
-        """Number of browsers that get pictures."""
-        return len(self._pictures)
-
-    def age(self, participant: Participant) -> float:
-        """Return the age of the picture that the window shows [s]."""
-        pictures = [each for each, key in self._pictures.items() if key == participant.person.key]
-        return pictures[-1].age(self.clock()) if pictures else 0.0
 
     @property
     def participants(self) -> list[Participant]:

@@ -122,7 +122,7 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     program = hub.runner.progress()
     planning = program is not None and program.status == "planning"
     taker = hub.taken_by(participant)
-    age = hub.age(participant)
+    age = hub.pictures.age(participant.person.key, hub.clock())
     own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
     rights = hub.gate.clear_rights
     clears = rights.allow(person)

@@ -127,7 +127,7 @@ class _Line:
 
     async def run(self, upstream: ClientConnection) -> None:
         """Pass messages until either side closes; ``upstream`` is the connection to viser."""
-        self._hub.show(self._key, self._flow)
+        self._hub.pictures.show(self._key, self._flow)
         directions = (self._down(), self._up(upstream), upstream.wait_closed())
         tasks = [asyncio.create_task(each) for each in directions]
         try:
@@ -141,7 +141,7 @@ class _Line:
             await asyncio.gather(*tasks, return_exceptions=True)
             # A close frame would wait behind frames that are not read any more.
             upstream.transport.abort()
-            self._hub.hide(self._flow)
+            self._hub.pictures.hide(self._flow)
         # After the tasks have ended, so that no frame follows the close frame.
         if self._unwelcome:
             with suppress(WebSocketDisconnect, WebSocketDisconnected):
@@ -164,7 +164,7 @@ class _Line:
     def _pause(self, t: float) -> float:
         """Return the time [s] to wait before the next frame, so that many browsers share a core."""
         holder = self._hub.lease.holder
-        interval = self._hub.watching / MAX_FRAMES_PER_SECOND
+        interval = self._hub.pictures.watching / MAX_FRAMES_PER_SECOND
         if interval <= FRAME_INTERVAL or (holder is not None and holder.key == self._key):
             return 0.0
         self._due = max(self._due + interval, t)

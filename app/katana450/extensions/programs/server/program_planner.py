@@ -91,7 +91,11 @@ class ProgramPlanner:
     def plan_idly(self, t: float, *, used: bool) -> None:
         """Plan the scripts of the library if nobody uses the server; see ``IdlePlanner.tick``."""
         arm = self._hub.arm
-        used = used or not self._hub.watching or (self.planning is not None and self.planning.busy)
+        used = (
+            used
+            or not self._hub.pictures.watching
+            or (self.planning is not None and self.planning.busy)
+        )
         if self._idle is None:
             if not self._idly or used or arm is None or arm.robot.arm is None:
                 return
