@@ -249,11 +249,11 @@ def test_selection_is_saved_opened_and_compared(
     page.page.locator("#toast", has_text="part.mcap is open").wait_for()
     page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
 
-    # What is no recording is refused with the reason.
+    # What is not a recording is refused with the reason.
     broken = tmp_path / "broken.mcap"
     broken.write_bytes(b"nothing")
     page.page.locator("#timeline input[type=file]").set_input_files(broken)
-    page.page.locator("#toast", has_text="no recording").wait_for()
+    page.page.locator("#toast", has_text="not a recording").wait_for()
 
 
 @pytest.mark.long

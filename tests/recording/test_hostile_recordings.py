@@ -186,8 +186,8 @@ def test_length_beyond_the_file_reserves_no_memory(path: Path, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        (b"", "is no recording, or is damaged"),
-        (b"PK\x03\x04" * 100, "is no recording, or is damaged: not a valid MCAP file"),
+        (b"", "is not a recording, or is damaged"),
+        (b"PK\x03\x04" * 100, "is not a recording, or is damaged: not a valid MCAP file"),
         (MAGIC + bytes(100), "has no valid end, as after a crash"),
         (bomb(TEN).replace(b"katana450", b"kathana45"), "but no recording"),
     ],
@@ -213,7 +213,9 @@ def test_file_without_any_recording_is_not_recovered(
     path = tmp_path / "file.mcap"
     path.write_bytes(b"no recording")
     assert main(["record", "recover", str(path)]) == 1
-    assert "cannot be recovered: its beginning is no recording" in capsys.readouterr().err
+    assert (
+        "cannot be recovered: its beginning is not that of a recording" in capsys.readouterr().err
+    )
     assert path.read_bytes() == b"no recording"
 
 

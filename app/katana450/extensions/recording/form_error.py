@@ -1,4 +1,4 @@
-"""The error of a value that has no text form, or of a text form that is no value."""
+"""The error of a value that has no text form, or of a text form that does not give a value."""
 
 from __future__ import annotations
 

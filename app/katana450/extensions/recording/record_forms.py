@@ -159,7 +159,7 @@ class ClassCoder:
                     and found.shape == wanted.shape
                     and np.allclose(found, wanted, ROUNDING, ROUNDING, equal_nan=True)
                 ):
-                    raise FormError(f"this is no valid {name} of {self.kind.__name__}")
+                    raise FormError(f"this is not a valid {name} of {self.kind.__name__}")
                 object.__setattr__(value, name, wanted)
             elif found is not wanted and found != wanted:
                 raise FormError(f"{name} of {self.kind.__name__} cannot be {shown(wanted)}")

@@ -96,12 +96,12 @@ def tick_input(codec: Codec, form: Any) -> TickInput:
         raise FormError(f"{shown(form)} is not a tick")
     submissions = form.get(COMMANDS, [])
     if not isinstance(submissions, list) or len(submissions) > MAX_COMMANDS:
-        raise FormError(f"{shown(submissions)} are no commands of a tick")
+        raise FormError(f"{shown(submissions)} are not commands of a tick")
     sent, digest, failed = form.get(SENT), form.get(DIGEST), form.get(FAILED, False)
     if not isinstance(digest, str) or type(failed) is not bool:
         raise FormError(f"{shown(form)} is not a tick")
     t, t_before = codec.decoded(float, form.get(T)), codec.decoded(float | None, form.get(T_BEFORE))
-    # Compiled code of the simulation reads beyond its memory at a time that is no number.
+    # Compiled code of the simulation reads beyond its memory at a time that is not a number.
     if not (math.isfinite(t) and (t_before is None or math.isfinite(t_before))):
         raise FormError(f"{t} is not the time of a tick", (T,))
     return TickInput(

@@ -269,4 +269,4 @@ def _marker_in(path: Path) -> EpisodeMarker:
             episode, Path(str(found["ring"])), str(found["first"]), str(found["run"])
         )
     except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(f"{path} is no marker of an episode: {error}.") from error
+        raise InputError(f"{path} does not describe a running episode: {error}.") from error

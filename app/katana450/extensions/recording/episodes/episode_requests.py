@@ -137,5 +137,5 @@ def episode_request(text: bytes | str) -> EpisodeRequest:
     try:
         found: EpisodeRequest = _decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise InputError(f"This is no valid request about episodes: {error}.") from error
+        raise InputError(f"This is not a valid request about episodes: {error}.") from error
     return found

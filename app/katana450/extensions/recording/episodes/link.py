@@ -41,7 +41,7 @@ GREETING_SECONDS = 5.0
 """[s] Maximum time for which a client waits until the process that records greets it."""
 
 ANSWER_SECONDS = 300.0
-"""[s] Maximum time for which a request waits for its answer; saving an hour takes about 30 s."""
+"""[s] Maximum time for which a request waits for its answer, such as the saving of an hour."""
 
 MAX_MESSAGE_BYTES = 64_000
 

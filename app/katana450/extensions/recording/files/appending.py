@@ -1,7 +1,6 @@
 """A whole recording with one more message: its data is copied as it is, and gets a new index.
 
-Copying takes a fraction of a second for an hour of motion, where writing all messages again would
-take half a minute.
+Copying takes less time than to decode and write all messages again.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ DATA_END_BYTES = 13
 def append_message(path: Path, message: Message) -> None:
     """Add ``message`` to the whole recording at ``path``, in one step.
 
-    Raises InputError if the file is no whole recording or cannot be written.
+    Raises InputError if the file is not a whole recording or cannot be written.
     """
     with RecordingFile.open(path):
         pass
@@ -55,7 +54,7 @@ def append_message(path: Path, message: Message) -> None:
             )
             summary = reader.get_summary()
             if summary is None or summary.statistics is None:
-                raise InputError(f"{path} has no index, so it is no whole recording.")
+                raise InputError(f"{path} has no index, so it is not a whole recording.")
             data = _data(path, file)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error

@@ -187,7 +187,7 @@ class RecordingFile:
                 f"`katana450 record recover {self.path}`."
             ) from error
         if summary is None or not summary.channels:
-            raise InputError(f"{self.path} has no index, so it is no whole recording.")
+            raise InputError(f"{self.path} has no index, so it is not a whole recording.")
         return summary
 
     @contextmanager
@@ -198,7 +198,7 @@ class RecordingFile:
             raise
         except FAULTS as error:
             raise InputError(
-                f"{self.path} is no recording, or is damaged: {error or type(error).__name__}."
+                f"{self.path} is not a recording, or is damaged: {error or type(error).__name__}."
             ) from error
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error

@@ -92,7 +92,8 @@ def recover(path: Path, out: Path) -> Recovered | None:
             found = _scan(file)
             if not found.metadata:
                 raise InputError(
-                    f"{path} cannot be recovered: its beginning is no recording ({found.why})."
+                    f"{path} cannot be recovered: its beginning is not that of a recording "
+                    f"({found.why})."
                 )
             write_files({out: lambda target: _write(file, found, target)})
             size = BoundedStream(file).size

@@ -93,7 +93,7 @@ class ChunkIndex:
                 self._scan(file)
         except FAULTS as error:
             why = str(error) or type(error).__name__
-            raise InputError(f"{self.path} is no recording, or is damaged: {why}.") from error
+            raise InputError(f"{self.path} is not a recording, or is damaged: {why}.") from error
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
 

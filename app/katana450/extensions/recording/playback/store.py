@@ -64,7 +64,7 @@ class RecordingStore:
 
 
 def opened(path: Path) -> PlaybackRun:
-    """Return the run in the file ``path``. Raises InputError if it is no recording."""
+    """Return the run in the file ``path``. Raises InputError if it is not a recording."""
     run = PlaybackRun(lambda: [path])
     try:
         run.update()
@@ -72,5 +72,5 @@ def opened(path: Path) -> PlaybackRun:
         # The path is one of this server, which says nothing to the person.
         raise InputError(str(error).replace(str(path), "The file")) from error
     if not run.spans:
-        raise InputError("The file is no recording of katana450, or it is empty.")
+        raise InputError("The file is not a recording of katana450, or has no motion.")
     return run
