@@ -10,9 +10,8 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.joint_path import VIA_TOLERANCE, point_of
+from katana450.maths.planning.joint_path import VIA_TOLERANCE, PolynomialPath
 from katana450.maths.planning.polyline import PiecewisePolynomial
-from katana450.maths.planning.posture import FiveJets, ThreeJets
 
 MIN_INTERVAL = 1e-3
 """[s] Minimum time from one posture to the next."""
@@ -69,7 +68,7 @@ def _second_derivatives(h: FloatArray, slopes: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class TrajectoryPath:
+class TrajectoryPath(PolynomialPath):
     """A joint path through postures at given times, as recorded.
 
     Its sigma grows evenly with the time. Raises InputError for times that do not rise, and for a
@@ -132,20 +131,6 @@ class TrajectoryPath:
     def end(self) -> FloatArray:
         """The joint angles (5,) [rad] at the end."""
         return frozen(self.postures[-1])
-
-    @property
-    def joins(self) -> tuple[float, ...]:
-        """The places of the inner postures."""
-        return self._line.joins
-
-    def joints(self, sigma: Jet) -> FiveJets:
-        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
-        one, two, three, four, five = self._line.at(sigma)
-        return one, two, three, four, five
-
-    def point(self, sigma: Jet) -> ThreeJets:
-        """Return the tool point [m], in {C}."""
-        return point_of(self.chain, self.joints(sigma))
 
     def time(self, sigma: float) -> float:
         """Return the time [s] at the place ``sigma``, on the clock of ``times``."""

@@ -12,15 +12,41 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.polyline import Polyline
+from katana450.maths.planning.polyline import PiecewisePolynomial, Polyline
 from katana450.maths.planning.posture import FiveJets, ThreeJets, tool_point
 
 VIA_TOLERANCE = 1e-9
 """Vias nearer to each other than this [rad] are the same."""
 
 
+class PolynomialPath:
+    """A joint path whose joint angles are piecewise polynomials of sigma."""
+
+    chain: Chain
+    _line: PiecewisePolynomial
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places where pieces meet."""
+        return self._line.joins
+
+    def joints(self, sigma: Jet) -> FiveJets:
+        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
+        one, two, three, four, five = self._line.at(sigma)
+        return one, two, three, four, five
+
+    def point(self, sigma: Jet) -> ThreeJets:
+        """Return the tool point [m], in {C}."""
+        arm = arm_of(self.chain)
+        one, two, three, four, five = (
+            sign * q + shift
+            for q, sign, shift in zip(self.joints(sigma), arm.signs, arm.shifts, strict=True)
+        )
+        return tool_point(arm, (one, two, three, four, five))
+
+
 @dataclass(frozen=True, eq=False)
-class JointPath:
+class JointPath(PolynomialPath):
     """Straight lines in joint space from via to via, with corners rounded as in `Polyline`.
 
     The path is inside the limits, because its vias must be. Raises InputError for a via beyond a
@@ -66,26 +92,3 @@ class JointPath:
     def end(self) -> FloatArray:
         """The joint angles (5,) [rad] at the end."""
         return frozen(self.vias[-1])
-
-    @property
-    def joins(self) -> tuple[float, ...]:
-        """The places where legs and corners meet."""
-        return self._line.joins
-
-    def joints(self, sigma: Jet) -> FiveJets:
-        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
-        one, two, three, four, five = self._line.at(sigma)
-        return one, two, three, four, five
-
-    def point(self, sigma: Jet) -> ThreeJets:
-        """Return the tool point [m], in {C}."""
-        return point_of(self.chain, self.joints(sigma))
-
-
-def point_of(chain: Chain, q: FiveJets) -> ThreeJets:
-    """Return the tool point [m], in {C}, at the joint angles `q` [rad]."""
-    arm = arm_of(chain)
-    one, two, three, four, five = (
-        sign * each + shift for each, sign, shift in zip(q, arm.signs, arm.shifts, strict=True)
-    )
-    return tool_point(arm, (one, two, three, four, five))
