@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -144,15 +143,6 @@ def test_last_description_of_each_number_counts(found: list[Episode]) -> None:
 def test_wrong_description_is_refused(text: str, why: str) -> None:
     with pytest.raises(InputError, match=why):
         episode_of(text)
-
-
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr(keeper_module, "LATE_SECONDS", 0.0)
-    found = Bench(tmp_path)
-    yield found
-    found.keeper.close()
-    found.ring.close()
 
 
 def test_episode_is_begun_judged_and_undone(bench: Bench) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from multiprocessing.connection import Listener
 from pathlib import Path
 
@@ -11,19 +10,9 @@ import pytest
 
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes import keeper as keeper_module
 from katana450.extensions.recording.episodes import link
 from katana450.platform_support import pipe_address
 from tests.recording.episode_bench import Bench
-
-
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr(keeper_module, "LATE_SECONDS", 0.0)
-    found = Bench(tmp_path)
-    yield found
-    found.keeper.close()
-    found.ring.close()
 
 
 def test_interrupted_episode_waits_until_its_ring_is_found(
