@@ -30,10 +30,12 @@ if TYPE_CHECKING:
 
     from katana450.arm.control.scene_objects import Environment
     from katana450.arm.control.session import Session
+    from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
     from katana450.arm.runtime.arm_listener import ArmAddress, Greeting
     from katana450.arm.runtime.tick import TickRecord
+    from katana450.maths.geometry.arrays import FloatArray
     from katana450.server.service.nodes import Nodes
     from katana450.server.service.recorder import Recorder
     from katana450.server.service.runner import Runner
@@ -47,6 +49,7 @@ PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
 
 BUILT_IN = (
+    "server_commands",
     "event_log",
     "programs",
     "importers",
@@ -159,6 +162,10 @@ class ServeExtension:
             the others.
         tick_sender: Returns the sender of the record of each tick to that process, or None. Called
             in the process of the arm.
+        driver: Returns the driver of the arm according to the options, in place of the ideal
+            simulation, or None. Its further arguments are the robot, the joints (n,) [rad] and the
+            finger joint [rad] at which a simulation begins. Called in the process of the arm.
+            Raises KatanaError.
         needs: Built-in extensions that must be installed; without them this part is left out.
     """
 
@@ -174,6 +181,7 @@ class ServeExtension:
         None
     )
     tick_sender: Callable[[Namespace], TickSender | None] | None = None
+    driver: Callable[[Namespace, Robot, FloatArray, float], Driver | None] | None = None
     process: Callable[[Namespace, ServerFacts], ExtraProcess | None] | None = None
     needs: tuple[str, ...] = ()
 

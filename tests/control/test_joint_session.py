@@ -16,6 +16,7 @@ from katana450.arm.control.appearance import AppearanceTrait, DisplayMode
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.session import MAX_STEP_TIME, Session
 from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.runtime.tick import failed
 from katana450.errors import InputError
 
 DT = 0.01
@@ -184,6 +185,6 @@ def test_late_tick_makes_no_leap_and_internal_error_holds(session: Session, stat
     late = session.step(moving, (), moving.t + 5.0)
     on_time = session.step(moving, (), moving.t + MAX_STEP_TIME)
     np.testing.assert_array_equal(late.setpoint, on_time.setpoint)
-    failed = session.fail(moving)
-    assert failed.status is Status.FAULT
-    np.testing.assert_array_equal(after(session, failed, 1.0).q, moving.setpoint)
+    held = failed(moving, [])
+    assert held.status is Status.FAULT
+    np.testing.assert_array_equal(after(session, held, 1.0).q, moving.setpoint)

@@ -13,6 +13,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.session import MAX_STEP_TIME, Session
 from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.runtime.tick import failed
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -294,9 +295,9 @@ def test_unsupported_request_changes_nothing(
 
 def test_arm_holds_after_a_failure(session: Session, state: State) -> None:
     moving = run(session, state, [cmd.SetJoint(0, 2.0)], ticks=5)
-    failed = session.fail(moving)
-    assert failed.status is Status.FAULT
-    after = run(session, failed, [], ticks=5)
+    held = failed(moving, [])
+    assert held.status is Status.FAULT
+    after = run(session, held, [], ticks=5)
     assert (after.setpoint == moving.setpoint).all()
     assert run(session, after, [cmd.Home()]).status is Status.OK
 

@@ -9,6 +9,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import AppearanceTrait
+from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.scene_objects import Attachment, SceneObject, Shape
 from katana450.arm.control.session import Session
@@ -58,6 +59,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
             cmd.SetAppearance("ball", AppearanceTrait.CHOICE, 0),
             cmd.Fill(1e-4),
         ),
+        cmd.OperateArm(ArmAct.UNBLOCK),
         cmd.Batch((cmd.Home(),)),
     ]
 

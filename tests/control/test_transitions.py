@@ -11,6 +11,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import AppearanceTrait
+from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
     MODES,
@@ -99,6 +100,7 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.Fill: lambda: cmd.Fill(1e-4),
         cmd.MoveObject: lambda: cmd.MoveObject("cup", np.array([0.3, 0.35, 0.0])),
         cmd.SetAppearance: lambda: cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1),
+        cmd.OperateArm: lambda: cmd.OperateArm(ArmAct.UNBLOCK),
         cmd.Batch: lambda: cmd.Batch((cmd.SpeedScale(0.5),)),
         cmd.SpeedScale: lambda: cmd.SpeedScale(0.5),
         cmd.Jog: lambda: cmd.Jog(np.array([0.0, 0.05, 0.0, 0.0, 0.0])),

@@ -19,7 +19,7 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.arm.control.stop_cause import pressed
-from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
@@ -72,13 +72,13 @@ class OddDriver(SimulatedDriver):
 
     count = 0
 
-    def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
+    def send(self, q: FloatArray, gripper: float, t: float, stopped: bool = False) -> DriverAnswer:
         self.count += 1
         if self.count % FAILING_EVERY == 0:
             raise OSError("the cable came out")
-        sent = super().send(q, gripper, t)
+        sent = super().send(q, gripper, t, stopped)
         behind = self.count % 50 < 5
-        return SentSetpoint(sent.q - 1e-3, sent.gripper) if behind else sent
+        return DriverAnswer(sent.q - 1e-3, sent.gripper) if behind else sent
 
 
 def random_commands(

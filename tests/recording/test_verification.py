@@ -15,7 +15,7 @@ import pytest
 
 import katana450
 from katana450.arm.control import commands as cmd
-from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
@@ -196,7 +196,7 @@ def test_mechanism_without_an_arm_is_recorded(
     for number in range(60):
         given = [cmd.SetJoint(0, 0.2)] if number == 5 else []
         before, t = state, 10.0 + 0.01 * (number + 1)
-        state = stepped(found.session, before, list(given), t, lambda q, g, _t: SentSetpoint(q, g))
+        state = stepped(found.session, before, list(given), t, lambda q, g, *_: DriverAnswer(q, g))
         inputs = [Submission(each, ADA) for each in given]
         records.append(TickRecord(before.t, t, inputs, False, state))
     with path.open("wb") as file:

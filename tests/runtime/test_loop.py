@@ -15,7 +15,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Status
 from katana450.arm.control.stop_cause import pressed
-from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
@@ -92,10 +92,10 @@ class BrokenDriver(SimulatedDriver):
 
     broken = False
 
-    def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
+    def send(self, q: FloatArray, gripper: float, t: float, stopped: bool = False) -> DriverAnswer:
         if self.broken:
             raise OSError("the cable came out")
-        return super().send(q, gripper, t)
+        return super().send(q, gripper, t, stopped)
 
 
 def test_failing_driver_makes_the_arm_hold_and_report_it(

@@ -10,6 +10,7 @@ import sys
 import threading
 from argparse import Namespace
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,9 +22,12 @@ from katana450.settings import Settings
 
 if TYPE_CHECKING:
     from katana450.arm.control.state import State
+    from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.initial_scene import InitialScene
+    from katana450.arm.robot.robot import Robot
     from katana450.arm.runtime.state_publisher import StatePublisher
     from katana450.assembly.robot_session import DescribedRobot
+    from katana450.maths.geometry.arrays import FloatArray
 
 WAKE_INTERVAL = 0.2
 """[s] Interval at which the end of the control loop is checked."""
@@ -69,7 +73,10 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
     robot, scene = _with_scene(config) if state is None else (None, None)
     found = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
     again = kept is not None
-    arm = RunningArm(config.settings, found, scene, again=again, kept=state)
+    make_driver = partial(_driver, config.options)
+    arm = RunningArm(
+        config.settings, found, scene, again=again, kept=state, make_driver=make_driver
+    )
     roles: Roles = {FRONT: arm.attach, STOP: arm.attach_stop}
     for part in () if config.options is None else serve_extensions():
         sender = part.tick_sender(config.options) if part.tick_sender and config.options else None
@@ -101,6 +108,15 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
     keeper.join()
     # A supervisor that was killed leaves it.
     shutil.rmtree(config.folder, ignore_errors=True)
+
+
+def _driver(
+    options: Namespace | None, robot: Robot, q: FloatArray, gripper: float
+) -> Driver | None:
+    """Return the driver that an extension has for the arm; None if none has."""
+    makers = [] if options is None else [each.driver for each in serve_extensions()]
+    found = (make(options, robot, q, gripper) for make in makers if make and options)
+    return next(filter(None, found), None)
 
 
 def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene | None]:

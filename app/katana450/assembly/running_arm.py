@@ -1,10 +1,11 @@
-"""A simulated arm with its control loop, for the other processes at the ends of pipes."""
+"""An arm with its control loop, for the other processes at the ends of pipes."""
 
 from __future__ import annotations
 
 import gc
 import threading
 import time
+from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import Connection
 
@@ -12,8 +13,10 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.restart import restarted
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import State
+from katana450.arm.drivers.driver import Driver
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.initial_scene import InitialScene
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.arm_end import ArmEnd
 from katana450.arm.runtime.arm_listener import Greeting
 from katana450.arm.runtime.clock import MonotonicClock
@@ -23,6 +26,7 @@ from katana450.arm.runtime.state_publisher import StatePublisher
 from katana450.arm.runtime.stop_end import StopEnd
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.extension import TickSender
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.platform_support import raise_priority
 from katana450.settings import Settings
 
@@ -31,7 +35,7 @@ BRAKING_TIMEOUT = 2.0
 
 
 class RunningArm:
-    """A simulated arm with its control loop, for the other processes at the ends of pipes."""
+    """An arm with its control loop, for the other processes at the ends of pipes."""
 
     def __init__(
         self,
@@ -41,6 +45,7 @@ class RunningArm:
         *,
         again: bool = False,
         kept: State | None = None,
+        make_driver: Callable[[Robot, FloatArray, float], Driver | None] = lambda *_: None,
     ) -> None:
         """Prepare the arm; it does not run yet.
 
@@ -50,6 +55,8 @@ class RunningArm:
             scene: scene in place of the robot's own, and initial joint angles.
             again: whether the arm ran before in another process. It then begins stopped.
             kept: last known state of that process, where the arm and its objects begin.
+            make_driver: returns the driver; None for that of the ideal simulation. Raises
+                KatanaError.
         """
         robot, session, self.notes = found
         arm = robot.joint_group if robot.arm is None else robot.arm
@@ -58,7 +65,7 @@ class RunningArm:
             q, gripper = kept.q, kept.gripper
         elif scene is not None and scene.joints is not None:
             q = scene.joints
-        driver = SimulatedDriver(arm, q, gripper)
+        driver = make_driver(robot, q, gripper) or SimulatedDriver(arm, q, gripper)
         strict = settings.strict_silence
         self._mailbox = Mailbox(session.check)
         if scene is not None:

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from katana450.arm.control.arm_commands import OperateArm
 from katana450.arm.control.checked import check_finite, vector
 from katana450.arm.control.joint_commands import (
     JOG_TIME,
@@ -64,6 +65,7 @@ __all__ = [
     "MoveTool",
     "Nudge",
     "OfferDetour",
+    "OperateArm",
     "Pause",
     "PlaceObject",
     "Remove",
@@ -394,6 +396,7 @@ Command = (
     | MoveObject
     | SetAppearance
     | Batch
+    | OperateArm
     | SpeedScale
     | Jog
 )

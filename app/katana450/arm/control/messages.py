@@ -70,6 +70,12 @@ def _contact(finding: Finding) -> str:
     )
 
 
+def _within(finding: Finding) -> str:
+    if not finding.time:
+        return ""
+    return f" within {_short(1e3 * finding.amount)} mm and {finding.time:.2f} s"
+
+
 def _lopsided(finding: Finding) -> str:
     finger, item = finding.parts or ("a finger", "something")
     return (
@@ -79,10 +85,7 @@ def _lopsided(finding: Finding) -> str:
 
 
 REASONS: dict[Reason, Callable[[Finding], str]] = {
-    Reason.STOPPED: lambda f: (
-        f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
-        "press Clear stop, then give a new target"
-    ),
+    Reason.STOPPED: lambda f: f"stopped{_within(f)}: press Clear stop, then give a new target",
     Reason.PAUSED: lambda _: "paused: press Resume to continue",
     Reason.CONTACT: _contact,
     Reason.ACROSS_GAP: lambda f: (
@@ -125,6 +128,19 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     ),
     Reason.MACHINE_BUSY: lambda f: (
         f"the server was {f.amount:.2f} s late: this machine is too busy"
+    ),
+    Reason.NOT_FOLLOWING: lambda _: "the arm does not follow its setpoints",
+    Reason.ARM_SILENT: lambda f: (
+        f"the arm sent no measurement for {f.amount:.2f} s and may still move"
+    ),
+    Reason.TRACKING_ERROR: lambda f: (
+        f"{axis(f.axis)} is {degrees(f.amount)} from where it should be: look for what holds it"
+    ),
+    Reason.MEASURED_CONTACT: lambda f: "{} and {} touch, as measured".format(
+        *map(part, f.parts or ("a link", "another"))
+    ),
+    Reason.MEASURED_STOP: lambda f: (
+        f"the arm came to rest after {f.time:.2f} s and {degrees(f.amount)}, as measured"
     ),
 }
 
@@ -213,6 +229,8 @@ def sentence(state: State) -> str:
 
 def _reason(state: State, finding: Finding) -> str:
     """Return the text of one finding; that of a gap offers the detour, if there is one."""
+    if finding.reason is Reason.NOT_FOLLOWING and state.report is not None and state.report.note:
+        return state.report.note.removesuffix(".")
     if finding.reason is not Reason.ACROSS_GAP or state.detour is None:
         return REASONS[finding.reason](finding)
     beyond = state.beyond_gap

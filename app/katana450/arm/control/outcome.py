@@ -66,6 +66,13 @@ def refusal(state: State, command: cmd.Command) -> str:
     match command:
         case cmd.ClearStop(known=newest, t=t):
             return clear_refusal(state, max(t, state.t), newest)
+        case cmd.OperateArm() if state.report is None:
+            return "This arm is simulated: it has no connection, calibration or motors to operate."
+        case cmd.OperateArm() if state.stopped is None or state.moving:
+            return "Stop the arm first, and wait until it is at rest."
+        case cmd.OperateArm(act=act) if state.report and act not in state.report.mode.acts:
+            now = state.report.mode.value
+            return f"{act.value.capitalize()} is not possible while the arm is {now}."
         case cmd.Go() if state.detour is None:
             return NO_DETOUR
         case cmd.OfferDetour(plan=plan) if not may_offer(state, plan):

@@ -12,6 +12,7 @@ from katana450 import tolerances
 from katana450.arm.control import commands as cmd
 from katana450.arm.control import tool_targets
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.branch_options import BranchOption, branch_options, current_target
 from katana450.arm.control.checks import check, check_joints
 from katana450.arm.control.findings import of_joints
@@ -32,6 +33,7 @@ from katana450.arm.control.goals import (
 from katana450.arm.control.grip import gripped
 from katana450.arm.control.joint_stepper import JointStepper, Travel, no_travel
 from katana450.arm.control.joints import JointSet
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.modes import (
     IDLE,
     Jogging,
@@ -46,13 +48,14 @@ from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_changes import with_scene_change
 from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
 from katana450.arm.control.state import ACCEPTED, ActiveStop, Finding, Outcome, Reason, State
+from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.control.stopping import stopped_again, with_presses
+from katana450.arm.control.supervision import fault_of, held_where_measured, with_tracking_time
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
-from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.water.environment import WaterEnvironment
 
 TOOL_SPEED = 0.5
@@ -219,23 +222,23 @@ class Session:
 
     @staticmethod
     def observe(state: State, q: FloatArray, gripper: float) -> State:
-        """Return ``state`` with the place of the robot that the driver reports.
+        """Return ``state`` of a robot that follows exactly, at the place that its driver reports.
 
         q: (n,) [rad or m]. gripper: the finger joint [rad or m].
         """
-        return replace(state, q=q, gripper=gripper)
+        return replace(state, q=q, gripper=gripper, report=None)
 
-    @staticmethod
-    def fail(state: State) -> State:
-        """Return ``state`` that holds after an internal error; all targets are dropped."""
-        held = replace(
-            state,
-            motion=JointMotion.rest(state.setpoint),
-            goal=state.setpoint,
-            gripper_goal=state.gripper_setpoint,
-            mode=IDLE,
-        )
-        return replace(held, findings=(Finding(Reason.INTERNAL),))
+    def supervised(self, state: State, report: ArmReport) -> State:
+        """Return ``state``, at the measured place, stopped if ``report`` is a reason to."""
+        state = with_tracking_time(state, report)
+        if state.stopped is None:
+            world = self.world_at(state) if state.moving else None
+            cause = fault_of(state, report, None if world is None else world.nearest(state.x))
+            if cause is None:
+                return state
+            why = report.note or f"{finding_text(cause)}."
+            state = self._stop_motion(state, cmd.Stop(StopCause(why), cause))
+        return held_where_measured(state, report)
 
     def _take(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` after ``command``, as defined by the table of transitions."""
@@ -260,6 +263,8 @@ class Session:
                 return paused(state)
             case cmd.Resume():
                 return resumed(state)
+            case cmd.OperateArm():
+                return state
             case cmd.SpeedScale(value=value):
                 return replace(state, speed=value)
             case cmd.SetTool(name=name):

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from katana450.arm.control.appearance import ALL_AS_MADE, Appearance
+from katana450.arm.control.arm_report import ArmMode, ArmReport
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
     IDLE,
@@ -77,6 +78,11 @@ class Reason(Enum):
     SERVER_SILENT = "server silent"
     LOOP_LATE = "loop late"
     MACHINE_BUSY = "machine busy"
+    NOT_FOLLOWING = "arm does not follow"
+    ARM_SILENT = "arm silent"
+    TRACKING_ERROR = "tracking error"
+    MEASURED_CONTACT = "measured contact"
+    MEASURED_STOP = "measured stop"
 
 
 CAUSES = (
@@ -86,6 +92,11 @@ CAUSES = (
     Reason.SERVER_SILENT,
     Reason.LOOP_LATE,
     Reason.MACHINE_BUSY,
+    Reason.NOT_FOLLOWING,
+    Reason.ARM_SILENT,
+    Reason.TRACKING_ERROR,
+    Reason.MEASURED_CONTACT,
+    Reason.MEASURED_STOP,
 )
 """The reasons for which the server itself stops or pauses the arm."""
 
@@ -102,7 +113,8 @@ class Finding:
         amount: the size of the effect [m or rad]. For a limit, the limit itself [rad or m]; for a
             gap, the leap across it [rad]; for a contact, the remaining distance [m]; for a
             stop, the travel of the tool, or else of any link, until rest [m]; for a plan, the
-            distance of the arm from its start [rad]; for silence and lateness, the time [s].
+            distance of the arm from its start [rad]; for silence and lateness, the time [s]; for a
+            tracking error and a measured stop, the angle of a joint [rad].
         axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
         parts: the two links or objects that the finding concerns; None if it concerns none.
         time: for a stop, the time until rest [s].
@@ -204,6 +216,8 @@ class State:
             hand.
         poured: the water of the cup; None if there is none.
         appearance: how links and objects are drawn.
+        report: the report of the driver; None for an arm that follows its setpoints exactly.
+        astray_since: time since which the tracking error is too large [s]; None if it is not.
         outcomes: the outcomes of the commands of this tick, one for each.
     """
 
@@ -228,6 +242,8 @@ class State:
     grip: float | None = None
     poured: MotionWithWater | None = None
     appearance: Appearance = ALL_AS_MADE
+    report: ArmReport | None = None
+    astray_since: float | None = None
     outcomes: tuple[Outcome, ...] = ()
 
     @staticmethod
@@ -321,6 +337,8 @@ class State:
     @cached_property
     def moving(self) -> bool:
         """True if the arm or the gripper is still under way."""
+        if self.report is not None and self.report.mode is ArmMode.MOVING:
+            return True
         resting = self.blocked or self.paused or self.stopped is not None
         return self.under_way and not (resting and self.motion.at_rest)
 

@@ -29,7 +29,9 @@ def clear_refusal(state: State, t: float, known: float = math.inf) -> str:
         return ""
     if state.stopped.newest > known:
         return f"{state.stopped.cause.why} You may not know yet. Clear the stop if it is safe."
-    if not state.motion.at_rest:
+    if state.report is not None and not state.report.mode.follows:
+        return state.report.note or "The arm does not follow its setpoints."
+    if not state.motion.at_rest or state.moving:
         return "The arm still brakes. Clear the stop when it is at rest."
     remaining = HOLD_OFF - (t - state.stopped.newest)
     if remaining > 0.0:

@@ -85,6 +85,8 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     cmd.Remove: _row(None,              A,   A,   A,   A,   A,   A),
     cmd.Fill: _row(None,                A,   A,   A,   A,   A,   A),
     cmd.SetAppearance: _row(None,               A,   A,   A,   A,   A,   A),
+    # The driver performs the act; the session has stopped.
+    cmd.OperateArm: _row(None,          A,   A,   A,   A,   A,   A),
     # Each of its commands has the effect of its own row.
     cmd.Batch: _row(None,               A,   A,   A,   A,   A,   A),
 }  # fmt: skip

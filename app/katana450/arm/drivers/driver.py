@@ -5,22 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.silence import SilenceProfile
 from katana450.maths.geometry.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class SentSetpoint:
-    """The setpoint that a driver sent to the arm: ``q`` (n,) [rad] and the finger joint [rad]."""
+class DriverAnswer:
+    """The answer of a driver to a setpoint: where the arm is.
+
+    Attributes:
+        q: (n,) joint angles, as measured [rad].
+        gripper: the finger joint, as measured [rad].
+        report: what else the driver knows; None for an arm that follows its setpoints exactly.
+    """
 
     q: FloatArray
     gripper: float
+    report: ArmReport | None = None
 
 
 class Driver(Protocol):
-    """An arm that takes a position setpoint each tick, 20 a second at rest.
+    """An arm that takes a position setpoint each tick, about 12 a second at rest.
 
-    Only the control loop calls it.
+    Only the control loop calls it. No method waits for the arm: a driver of hardware exchanges
+    messages in a thread of its own, and puts an arm that does not answer into its report.
 
     Attributes:
         silence_profile: reaction of the moving arm to silence.
@@ -28,16 +38,30 @@ class Driver(Protocol):
 
     silence_profile: SilenceProfile
 
-    def start(self, t: float) -> SentSetpoint:
-        """Connect to the arm, and return where it stands. ``t``: now [s]."""
+    def start(self, t: float) -> DriverAnswer:
+        """Begin to connect to the arm, and return where it is. ``t``: now [s]."""
         ...
 
-    def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
-        """Send a setpoint to the arm, and return what was sent.
+    def send(self, q: FloatArray, gripper: float, t: float, stopped: bool = False) -> DriverAnswer:
+        """Send a setpoint to the arm, and return where the arm is.
 
-        q: (n,) [rad]. gripper: the finger joint [rad]. t: now [s]. A driver protects its arm: it
-        raises InputError for a setpoint that is not finite, and clips all others to the limits and
-        speeds of the arm.
+        A driver protects its arm: it raises InputError for a setpoint that is not finite, and clips
+        all others to the limits and speeds of the arm.
+
+        Args:
+            q: (n,) [rad].
+            gripper: the finger joint [rad].
+            t: now [s].
+            stopped: whether the arm is to come to rest as fast as it can and to stay there. An arm
+                that is measured then ignores setpoints; a simulated one follows them, because they
+                brake as it can.
+        """
+        ...
+
+    def perform(self, act: ArmAct, t: float) -> None:
+        """Begin an act that a person has asked for; the report tells what becomes of it.
+
+        t: now [s].
         """
         ...
 

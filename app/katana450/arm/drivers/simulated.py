@@ -7,8 +7,9 @@ from typing import Protocol
 import numpy as np
 
 from katana450.arm.control.arm import GripperModel
+from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.driver import DriverAnswer
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import Limits
@@ -40,19 +41,25 @@ class SimulatedDriver:
         """
         self._limits = arm.limits
         self._fingers = arm.gripper
-        self._sent = SentSetpoint(self._clamped(q), self._fingers.clamp(gripper))
+        self._sent = DriverAnswer(self._clamped(q), self._fingers.clamp(gripper))
         self._t: float | None = None
 
-    def start(self, t: float) -> SentSetpoint:
+    def start(self, t: float) -> DriverAnswer:
         """Start the clock at ``t`` [s], and return where the arm stands."""
         self._t = t
         return self._sent
 
-    def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
-        """Move towards the setpoint within limits and speeds, and return what was sent.
+    def send(
+        self,
+        q: FloatArray,
+        gripper: float,
+        t: float,
+        stopped: bool = False,  # noqa: ARG002
+    ) -> DriverAnswer:
+        """Move towards the setpoint within limits and speeds, and return where the arm is.
 
-        q: (n,) [rad]. gripper: [rad or m]. t: now [s]. Raises InputError before ``start`` and for a
-        setpoint that is not finite.
+        q: (n,) [rad]. gripper: [rad or m]. t: now [s]. stopped: makes no difference. Raises
+        InputError before ``start`` and for a setpoint that is not finite.
         """
         if self._t is None:
             raise InputError("The simulated arm is not started: call `start` first.")
@@ -64,8 +71,11 @@ class SimulatedDriver:
             return self._sent
         step = self._limits.speed * dt
         moved = self._sent.q + np.clip(self._clamped(q) - self._sent.q, -step, step)
-        self._sent = SentSetpoint(frozen(moved), self._gripper(gripper, dt))
+        self._sent = DriverAnswer(frozen(moved), self._gripper(gripper, dt))
         return self._sent
+
+    def perform(self, act: ArmAct, t: float) -> None:
+        """Do nothing: the session refuses every act at an arm without a report."""
 
     def stop(self) -> None:
         """End the motion; ``start`` is needed before the next setpoint."""

@@ -9,13 +9,13 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from katana450.arm.control.commands import Stop
+from katana450.arm.control.commands import OperateArm, Stop
 from katana450.arm.control.event_log import LogEntry, entries_between
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.control.state import ACCEPTED, Finding, Reason, State
+from katana450.arm.control.state import ACCEPTED, Finding, Reason, State, Verdict
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
@@ -112,9 +112,12 @@ class ControlLoop:
         except Exception:
             # The loop continues after any error and the arm holds: the state reports the error.
             log.exception("The control loop met an error; the arm holds.")
-            state, has_failed = failed(self._session, before, commands), True
+            state, has_failed = failed(before, commands), True
             self._put_stops_again(drained)
         self._state = state
+        for command, outcome in zip(commands, state.outcomes, strict=False):
+            if isinstance(command, OperateArm) and outcome.verdict is not Verdict.REFUSED:
+                self._driver.perform(command.act, t)
         if self.record is not None and state is not before:
             self.record(TickRecord(before.t, t, drained.submissions, has_failed, state))
         # A state that differs only in its time is not published.
@@ -223,4 +226,5 @@ def _differs(a: State, b: State) -> bool:
         # Not by the time for which a film has still to drain.
         or (a.poured and a.poured.water) is not (b.poured and b.poured.water)
         or a.appearance is not b.appearance
+        or (a.report and a.report.mode) is not (b.report and b.report.mode)
     )

@@ -11,12 +11,14 @@ from typing import NamedTuple
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command
+from katana450.arm.control.modes import IDLE
 from katana450.arm.control.outcome import FAILED
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
-from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.drivers.driver import DriverAnswer
+from katana450.maths.motion.limiter import JointMotion
 
-Send = Callable[..., SentSetpoint]
+Send = Callable[..., DriverAnswer]
 """Gives a setpoint to the driver and returns its answer, as ``Driver.send``."""
 
 
@@ -52,13 +54,23 @@ def stepped(session: Session, state: State, commands: list[Command], t: float, s
     Raises any error of the session, and of ``send``.
     """
     state = session.step(state, commands, t)
-    sent = send(state.setpoint, state.gripper_setpoint, t)
-    return session.observe(state, sent.q, sent.gripper)
+    return _observed(session, state, _sent(state, t, send))
 
 
-def failed(session: Session, state: State, commands: list[Command]) -> State:
-    """Return the state after a tick from ``state`` in which an error occurred: the arm holds."""
-    return replace(session.fail(state), outcomes=(FAILED,) * len(commands))
+def failed(state: State, commands: list[Command]) -> State:
+    """Return the state after a tick from ``state`` in which an error occurred.
+
+    The arm holds, and all targets are dropped.
+    """
+    return replace(
+        state,
+        motion=JointMotion.rest(state.setpoint),
+        goal=state.setpoint,
+        gripper_goal=state.gripper_setpoint,
+        mode=IDLE,
+        findings=(Finding(Reason.INTERNAL),),
+        outcomes=(FAILED,) * len(commands),
+    )
 
 
 def waited(session: Session, state: State, t: float, send: Send) -> State:
@@ -66,7 +78,16 @@ def waited(session: Session, state: State, t: float, send: Send) -> State:
 
     If the driver reports another place, the state has it, and the time.
     """
-    sent = send(state.setpoint, state.gripper_setpoint, t)
-    if sent.q is state.q and sent.gripper == state.gripper:
+    answer = _sent(state, t, send)
+    if answer.q is state.q and answer.gripper == state.gripper and answer.report is state.report:
         return state
-    return session.observe(replace(state, t=t), sent.q, sent.gripper)
+    return _observed(session, replace(state, t=t), answer)
+
+
+def _sent(state: State, t: float, send: Send) -> DriverAnswer:
+    return send(state.setpoint, state.gripper_setpoint, t, state.stopped is not None)
+
+
+def _observed(session: Session, state: State, answer: DriverAnswer) -> State:
+    state = session.observe(state, answer.q, answer.gripper)
+    return state if answer.report is None else session.supervised(state, answer.report)

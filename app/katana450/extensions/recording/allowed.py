@@ -17,6 +17,8 @@ from katana450.arm.control.appearance import (
     DisplayMode,
     LinkAppearance,
 )
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmMode, ArmReport, MeasuredStop
 from katana450.arm.control.following import Following
 from katana450.arm.control.lease import Person, Role
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
@@ -46,6 +48,8 @@ from katana450.maths.water.slosh import Slosh
 
 ENUMS: Final[tuple[type, ...]] = (
     AppearanceTrait,
+    ArmAct,
+    ArmMode,
     CommandChannel,
     DisplayMode,
     Grounds,
@@ -69,6 +73,7 @@ CLASSES: Final[tuple[type, ...]] = (
     # The state and its mode.
     *(state.State, state.ActiveStop, state.Finding, state.Outcome, state.PartRefusal),
     *(modes.Idle, modes.Positioning, modes.Tracking, modes.Jogging, modes.Servoing),
+    *(ArmReport, MeasuredStop),
     *(modes.Leaving, modes.JointTarget, modes.PoseTarget, Following, ToolTarget),
     *(JointMotion, Stream, Projection, Branch),
     # Objects and water.

@@ -14,7 +14,7 @@ import numpy as np
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import failed, stepped
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.digest import Digester
@@ -81,10 +81,10 @@ def after(session: Session, before: State, tick: TickInput) -> State:
     if tick.t_before is not None:
         before = replace(before, t=tick.t_before)
     if tick.failed:
-        return failed(session, before, commands)
+        return failed(before, commands)
 
-    def send(q: FloatArray, gripper: float, _t: float) -> SentSetpoint:
-        return SentSetpoint(q, gripper) if tick.sent is None else tick.sent
+    def send(q: FloatArray, gripper: float, _t: float, _stopped: bool) -> DriverAnswer:
+        return DriverAnswer(q, gripper) if tick.sent is None else tick.sent
 
     try:
         return stepped(session, before, commands, tick.t, send)

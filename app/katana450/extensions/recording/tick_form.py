@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.commands import Command
 from katana450.arm.control.state import State
-from katana450.arm.drivers.driver import SentSetpoint
+from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.form_error import FormError, shown
@@ -47,7 +48,7 @@ class TickInput:
     t: float
     t_before: float | None
     submissions: tuple[Submission, ...]
-    sent: SentSetpoint | None
+    sent: DriverAnswer | None
     failed: bool
     digest: str
 
@@ -73,11 +74,13 @@ def tick_form(codec: Codec, record: TickRecord, t_before: float | None, digest: 
             for each in record.submissions
         ]
     state = record.state
-    if not (record.failed or _same(state.q, state.setpoint, state)):
+    if not record.failed and (state.report or not _same(state.q, state.setpoint, state)):
         form[SENT] = {
             "q": codec.encoded(FloatArray, state.q),
             "gripper": codec.encoded(float, state.gripper),
         }
+        if state.report is not None:
+            form[SENT]["report"] = codec.encoded(ArmReport, state.report)
     if record.failed:
         form[FAILED] = True
     form[DIGEST] = digest
@@ -127,11 +130,13 @@ def _submission(codec: Codec, form: Any, place: int) -> Submission:
     return Submission(command, actor)
 
 
-def _sent(codec: Codec, form: Any) -> SentSetpoint:
-    if not isinstance(form, dict) or form.keys() != {"q", "gripper"}:
+def _sent(codec: Codec, form: Any) -> DriverAnswer:
+    if not isinstance(form, dict) or form.keys() - {"report"} != {"q", "gripper"}:
         raise FormError(f"{shown(form)} is not an answer of a driver", (SENT,))
     try:
         q = codec.decoded(FloatArray, form["q"])
-        return SentSetpoint(q, codec.decoded(float, form["gripper"]))
+        gripper = codec.decoded(float, form["gripper"])
+        report = codec.decoded(ArmReport | None, form.get("report"))
+        return DriverAnswer(q, gripper, report)
     except FormError as error:
         raise error.within(SENT) from None

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from argparse import Namespace
 
-from katana450.cli.people_options import TOKEN_VARIABLE
 from katana450.client import connect
 from katana450.errors import ConfigurationError
+from katana450.extensions.server_commands.people_options import TOKEN_VARIABLE
 from katana450.server.api import answers
 
 NAME = "Terminal"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import msgspec
 
+from katana450.server.api.arm_answers import Margins, MeasuredArm, Water
 from katana450.server.api.fields import VERSION, Answer, Numbers
 from katana450.server.api.outcome_answers import Done, Finding, PartRefusal, Refused
 from katana450.server.api.people_answers import ConnectedPerson, People, PersonConnection
@@ -42,6 +43,7 @@ __all__ = [
     "LogLine",
     "Loop",
     "Margins",
+    "MeasuredArm",
     "Mesh",
     "Node",
     "Numbers",
@@ -95,48 +97,6 @@ class Echo(Answer, frozen=True, kw_only=True):
     n: int
 
 
-class Margins(msgspec.Struct, frozen=True, kw_only=True):
-    """Distances to joint limits, singularity and contact.
-
-    Attributes:
-        limit: Distance of the joint nearest to one of its limits from that limit [rad]; negative
-            beyond it.
-        axis: Number of that joint, counted from 1.
-        smallest_singular_value: Smallest singular value of the Jacobian over the characteristic
-            length of the arm [1]; 0 in a singularity.
-        clearance: Distance of the two nearest parts [m]; null where contacts are not checked.
-        parts: The two nearest parts; null where contacts are not checked.
-    """
-
-    limit: float
-    axis: int
-    smallest_singular_value: float
-    clearance: float | None
-    parts: tuple[str, str] | None
-
-
-class Water(msgspec.Struct, frozen=True, kw_only=True):
-    """Water, or another liquid, by its place.
-
-    Attributes:
-        liquid: Name of the liquid.
-        cup_ml: Volume in the cup, without the film on its wall [ml].
-        film_ml: Volume of the film on the wall of the cup [ml].
-        basin_ml: Volume in the basin [ml].
-        air_ml: Volume in free flight [ml].
-        spilled_ml: Volume elsewhere [ml].
-        margin_to_rim: Height of the cup's lip above the water [m]; negative while water flows out.
-    """
-
-    liquid: str
-    cup_ml: float
-    film_ml: float
-    basin_ml: float
-    air_ml: float
-    spilled_ml: float
-    margin_to_rim: float
-
-
 class State(Answer, frozen=True, kw_only=True):
     """The state of the arm.
 
@@ -186,6 +146,7 @@ class State(Answer, frozen=True, kw_only=True):
         age: Time since the arm's process last answered [s]. From 0.3 s the state counts as unknown.
         participants: Number of connected pages and programs.
         water: Water of the cup; null without one.
+        arm: Measurement and mode of a real arm; null for a simulated one that follows exactly.
         program: Program that is being planned, is running, or ran last.
         fields: Values of the watched fields of the VRML world.
     """
@@ -226,6 +187,7 @@ class State(Answer, frozen=True, kw_only=True):
     age: float
     participants: int
     water: Water | None
+    arm: MeasuredArm | None = None
     program: Progress | None = None
     fields: tuple[Value, ...] = ()
 

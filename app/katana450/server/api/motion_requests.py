@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
+from katana450.arm.control.arm_commands import ArmAct
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import (
     COMMAND,
@@ -202,3 +203,22 @@ class GoToZero(Request, frozen=True):
     """Move to the zero posture, in which the arm is stretched along x."""
 
     traits: ClassVar[RequestTraits] = COMMAND
+
+
+class OperateArm(Request, frozen=True, kw_only=True):
+    """Connect, calibrate or switch the motors of a real arm. It must be stopped and at rest.
+
+    The state lists the acts that are possible; its ``arm.mode`` tells what becomes of an act.
+
+    Attributes:
+        act: connect; disconnect; calibrate: the arm moves to its mechanical stops; engage: the
+            motors hold the arm, which was calibrated before; release: motors off, the arm falls;
+            unblock: hold again after a collision or an error.
+        confirmed: Whether a person has confirmed the hazard. Without it, an act that has one is
+            refused with the text of the hazard.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+    act: ArmAct
+    confirmed: bool = False

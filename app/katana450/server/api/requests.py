@@ -51,6 +51,7 @@ from katana450.server.api.motion_requests import (
     Jog,
     Joint,
     Joints,
+    OperateArm,
     Pose,
     Position,
     Servo,
@@ -105,6 +106,7 @@ __all__ = [
     "Load",
     "Mute",
     "Nudge",
+    "OperateArm",
     "Pause",
     "Place",
     "Pose",
@@ -307,6 +309,7 @@ AnyRequest = (
     | Home
     | GoToZero
     | Hold
+    | OperateArm
     | Pause
     | Resume
     | Place

@@ -193,6 +193,8 @@ class Dispatcher:
                 return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
             case requests.Gripper(angle=angle):
                 return cmd.SetGripper(angle)
+            case requests.OperateArm(act=act, confirmed=confirmed):
+                return cmd.OperateArm(act, confirmed)
             case requests.Set():
                 return self._setting(request)
         return self._tool_command(request) or self._objects.command(request)

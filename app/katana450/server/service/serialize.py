@@ -8,6 +8,7 @@ from typing import NamedTuple
 import msgspec
 
 from katana450.arm.control import state as control
+from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.grip import touching
 from katana450.arm.control.margins import Margins
@@ -15,6 +16,7 @@ from katana450.arm.control.messages import finding_text, sentence
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
+from katana450.arm.control.supervision import tracking_error
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -123,7 +125,28 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         age=0.0,
         participants=0,
         water=water(arm.pouring, now),
+        arm=None if now.report is None else measured_arm(now, now.report),
         program=None,
+    )
+
+
+def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
+    """Return the report of a driver as a part of an answer."""
+    error, axis = tracking_error(report, now.q)
+    stop = report.measured_stop
+    return answers.MeasuredArm(
+        mode=report.mode.value,
+        note=report.note,
+        acts=[each.value for each in report.mode.acts],
+        t=report.t,
+        expected=report.expected.tolist(),
+        tracking_error=error,
+        axis=axis + 1,
+        speeds=None if report.speeds is None else report.speeds.tolist(),
+        round_trip=report.round_trip,
+        stop_time=None if stop is None else stop.time,
+        stop_angle=None if stop is None else stop.angle,
+        sensors=list(report.sensors),
     )
 
 

@@ -51,8 +51,11 @@ GHOST_COLOURS: dict[Status, Colour] = {
 
 GHOST_OPACITY = 0.35
 
+SETPOINT_COLOUR: Colour = (120, 130, 145)
+SETPOINT_OPACITY = 0.2
+
 GHOST_FROM = np.deg2rad(0.2)
-"""Distance [rad] of a joint from its goal above which the ghost is shown."""
+"""Distance [rad] of a joint from its goal, or its setpoint, above which a ghost is shown."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,7 @@ class View(ViewUpdater):
         self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, robot, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, robot, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
+        self._setpoint: GhostNodes | None = None
         self._gap = Gap(server)
         self._traces = Traces(server, self._arm)
         self._gizmo = Gizmo(server, self._arm, gestures, lambda: state_publisher.snapshot.state)
@@ -168,6 +172,7 @@ class View(ViewUpdater):
         self._ghost.show(visible, GHOST_COLOURS[state.status])
         if visible:
             self._ghost.move(self._robot.joint_values(state.goal, state.gripper_goal))
+        self._show_setpoint(state)
         # Goals are immutable: a changed goal is another array.
         if state.goal is not self._goal or state.tool != self._tool:
             self._goal, self._tool = state.goal, state.tool
@@ -176,6 +181,19 @@ class View(ViewUpdater):
             self._gizmo.aim(state, self._T_base_goal)
         self._gizmo.follow()
         self._gap.show(self._desired(state), self._T_base_goal[:3, 3])
+
+    def _show_setpoint(self, state: State) -> None:
+        """Show where a measured arm will be soon: it lags behind its setpoint."""
+        lags = float(np.abs(state.setpoint - state.q).max()) > GHOST_FROM
+        if self._setpoint is None:
+            if not lags:
+                return
+            colour = SETPOINT_COLOUR
+            ghost = GhostNodes(self._server, self._robot, "/setpoint", colour, SETPOINT_OPACITY)
+            self._setpoint = ghost
+        self._setpoint.show(lags, SETPOINT_COLOUR)
+        if lags:
+            self._setpoint.move(self._robot.joint_values(state.setpoint, state.gripper_setpoint))
 
     def _desired(self, state: State) -> FloatArray | None:
         """Return the tool point (3,) [m] of the target in the base frame; None without one."""

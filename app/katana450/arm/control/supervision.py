@@ -1,0 +1,87 @@
+"""Supervision of an arm by the reports of its driver: what stops it, and where a stopped arm is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from katana450.arm.control.arm_report import ArmMode, ArmReport
+from katana450.arm.control.modes import IDLE
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.maths.collision.contact import Contact
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.motion.limiter import JointMotion
+
+MAX_TRACKING_ERROR = math.radians(3.0)
+"""[rad] Difference of a joint from where it should be above which the arm does not follow."""
+
+MAX_ASTRAY_TIME = 0.3
+"""[s] Time for which a tracking error may exceed MAX_TRACKING_ERROR."""
+
+MAX_REPORT_AGE = 0.5
+"""[s] Age of a measurement above which the arm counts as lost."""
+
+CONTACT_DISTANCE = 5e-4
+"""[m] Measured distance below which parts touch: encoders and calibration leave as much open."""
+
+
+def tracking_error(report: ArmReport, q: FloatArray) -> tuple[float, int]:
+    """Return the maximum difference of ``q`` (n,) from where it should be [rad], and its axis."""
+    differences = np.abs(q - report.expected[:-1])
+    axis = int(differences.argmax())
+    return float(differences[axis]), axis
+
+
+def with_tracking_time(state: State, report: ArmReport) -> State:
+    """Return ``state`` with ``report``, and the time since which the arm is astray."""
+    error, _ = tracking_error(report, state.q)
+    since = None
+    if error > MAX_TRACKING_ERROR and report.mode.follows and state.stopped is None:
+        since = report.t if state.astray_since is None else state.astray_since
+    return replace(state, report=report, astray_since=since)
+
+
+def fault_of(state: State, report: ArmReport, nearest: Contact | None) -> Finding | None:
+    """Return the reason for which ``state`` must be stopped by ``report``; None without one.
+
+    nearest: the two parts that are nearest to each other at the measured posture; None if they are
+    not known.
+    """
+    if not report.mode.follows:
+        return Finding(Reason.NOT_FOLLOWING)
+    age = state.t - report.t
+    if age > MAX_REPORT_AGE:
+        return Finding(Reason.ARM_SILENT, age)
+    if state.astray_since is not None and report.t - state.astray_since > MAX_ASTRAY_TIME:
+        return Finding(Reason.TRACKING_ERROR, *tracking_error(report, state.q))
+    if nearest is not None and nearest.distance < CONTACT_DISTANCE and state.moving:
+        return Finding(Reason.MEASURED_CONTACT, nearest.distance, parts=nearest.parts)
+    return None
+
+
+def held_where_measured(state: State, report: ArmReport) -> State:
+    """Return the stopped ``state`` whose setpoint is where the arm was measured.
+
+    The arm itself stays where it came to rest, so no motion follows when the stop is cleared. The
+    fingers keep their setpoint while the motors hold them, so that they keep what they hold.
+    """
+    gripper = state.gripper_setpoint if report.mode.follows else state.gripper
+    if not np.array_equal(state.setpoint, state.q):
+        q = frozen(state.q)
+        state = replace(state, motion=JointMotion.rest(q), goal=q)
+    findings = tuple(
+        replace(each, amount=0.0, time=0.0) if each.reason is Reason.STOPPED else each
+        for each in state.findings
+        if each.reason is not Reason.MEASURED_STOP
+    )
+    if report.measured_stop is not None and report.mode is ArmMode.HOLDING:
+        measured = report.measured_stop
+        found = Finding(Reason.MEASURED_STOP, measured.angle, time=measured.time)
+        findings = (findings[0], found, *findings[1:]) if findings else (found,)
+    if not report.mode.follows and all(f.reason is not Reason.NOT_FOLLOWING for f in findings):
+        findings = (*findings, Finding(Reason.NOT_FOLLOWING))
+    return replace(
+        state, gripper_setpoint=gripper, gripper_goal=gripper, mode=IDLE, findings=findings
+    )

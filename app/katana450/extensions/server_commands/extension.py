@@ -1,0 +1,44 @@
+"""The extension ``server_commands``: who may use a server, who is connected, and one motion."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from katana450.extension import CliCommand, Extension
+from katana450.extensions.server_commands.access_options import add_access_options
+from katana450.extensions.server_commands.go_options import add_go_options
+from katana450.extensions.server_commands.people_options import add_people_options
+
+
+def _go(options: Namespace) -> int:
+    from katana450.extensions.server_commands.go import go
+
+    return go(options)
+
+
+def _access(options: Namespace) -> int:
+    from katana450.extensions.server_commands.access import access
+
+    return access(options)
+
+
+def _people(options: Namespace) -> int:
+    from katana450.extensions.server_commands.people import people
+
+    return people(options)
+
+
+EXTENSION = Extension(
+    "server_commands",
+    (
+        CliCommand(
+            "go", "move the tool on a running server, by a detour if necessary", add_go_options, _go
+        ),
+        CliCommand(
+            "access", "give people links with which they sign in", add_access_options, _access
+        ),
+        CliCommand(
+            "people", "list who is connected, disconnect and mute", add_people_options, _people
+        ),
+    ),
+)
