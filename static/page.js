@@ -438,6 +438,14 @@
     episodes ??= new Episodes(byId("stage"), { page, toast });
     episodes.draw(status);
   });
+  // The real arm, loaded when a driver reports on it.
+  let arm = null;
+  window.addEventListener("status", async ({ detail }) => {
+    if (!arm && !detail.arm) return;
+    const { Arm } = await import("./arm/arm.js");
+    arm ??= new Arm(byId("stage"), { say });
+    arm.draw(status);
+  });
   // What was recorded, loaded on first use. `then` uses the timeline once it is shown.
   async function showTimeline(shown, then) {
     byId("timeline-button").setAttribute("aria-expanded", String(shown));

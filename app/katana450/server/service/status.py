@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
+
+from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.lease import Person
 from katana450.arm.control.messages import headline, mood, sentence
 from katana450.arm.control.state import State, Status
+from katana450.arm.control.supervision import tracking_error
 from katana450.arm.runtime.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
@@ -74,6 +79,21 @@ def paused_headline(hub: Hub, reader: Person | None) -> str:
     return f"Paused by {'you' if reader is not None and pause.key == reader.key else pause.name}"
 
 
+def arm_status(state: State, report: ArmReport) -> dict[str, Any]:
+    """Return what a page shows of a real arm, with angles in degrees."""
+    stop = report.measured_stop
+    return {
+        "mode": report.mode.value,
+        "note": report.note,
+        "acts": {each.value: each.hazard for each in report.mode.acts},
+        "lag": round(math.degrees(float(np.abs(state.setpoint - state.q).max())), 1),
+        "error": round(math.degrees(tracking_error(report, state.q)[0]), 1),
+        "age": round(state.t - report.t, 2),
+        "round_trip": round(report.round_trip, 3),
+        "stop": None if stop is None else (round(stop.time, 2), math.degrees(stop.angle)),
+    }
+
+
 def pace_refusal(hub: Hub, participant: Participant) -> str:
     """Return why ``participant`` may not pause, resume or slow down the arm; empty if allowed."""
     driver, program, person = hub.lease.driver, hub.gate.program, participant.person
@@ -105,6 +125,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "detour": state is not None and state.detour is not None and age is None,
         "speed": 1.0 if state is None else state.speed,
         "paused": state is not None and state.paused,
+        "arm": None if state is None or state.report is None else arm_status(state, state.report),
         "participants": len(hub.participants),
         "revocations": hub.gate.revocations,
         # A robot without a tool has only joints, which scripts do not move.

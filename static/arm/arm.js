@@ -1,0 +1,88 @@
+// The real arm: its mode, what it measures, and the acts of a person. Loaded when a driver reports.
+import { html, signed, write } from "../instruments/shape.js";
+
+const NAMES = {
+  connect: "Connect", disconnect: "Disconnect", calibrate: "Calibrate…",
+  engage: "Hold by motors…", release: "Motors off…", unblock: "Hold again",
+};
+const FOLLOWS = ["holding", "moving"];
+
+export class Arm {
+  #mode = "";
+  #acts = "";
+  #about = html("span", {});
+  #note = html("p", { role: "status" });
+  #facts = html("dl", {});
+  #buttons = html("div", { class: "acts", role: "group", "aria-label": "Acts at the arm" });
+  #dialog = html("dialog", { "aria-labelledby": "hazard-title", class: "hazard" });
+
+  // `say` sends a request.
+  constructor(stage, { say }) {
+    this.say = say;
+    document.head.append(html("link", { rel: "stylesheet", href: new URL("arm.css", import.meta.url).href }));
+    const why = html("p", { class: "why" }, "STOP on this page is no emergency stop: keep the hardware stop button, or the switch of the arm, in reach.");
+    this.card = html("details", { id: "arm" }, html("summary", {}, html("i"), this.#about), this.#note, this.#facts, this.#buttons, why);
+    stage.querySelector("#toast").before(this.card);
+    stage.parentElement.append(this.#dialog);
+  }
+
+  // Show the arm of a status.
+  draw({ arm, role }) {
+    this.card.hidden = !arm;
+    if (!arm) return;
+    const { mode, note, acts, lag, error, age, round_trip: trip, stop } = arm;
+    // What a person must do next is seen without a click; a working arm needs no room.
+    if (mode !== this.#mode && FOLLOWS.includes(mode) !== FOLLOWS.includes(this.#mode)) this.card.open = !FOLLOWS.includes(mode);
+    this.#mode = mode;
+    this.card.dataset.mode = mode;
+    write(this.#about, `Arm ${mode}`);
+    write(this.#note, note);
+    const facts = {
+      "Behind the setpoint": `${signed(lag)}°`,
+      "Tracking error": `${signed(error)}°`,
+      "Age of the measurement": `${Math.round(1000 * age)} ms`,
+      "Reply time": `${Math.round(1000 * trip)} ms`,
+      ...(stop && { "Last stop, measured": `${stop[0].toFixed(2)} s, ${signed(stop[1])}°` }),
+    };
+    this.#facts.hidden = mode === "disconnected";
+    if (this.#facts.children.length !== Object.keys(facts).length)
+      this.#facts.replaceChildren(...Object.keys(facts).map((name) => html("div", {}, html("dt", {}, name), html("dd", {}))));
+    Object.values(facts).forEach((value, i) => write(this.#facts.children[i].lastChild, value));
+    this.#offer(role === "viewer" ? {} : acts);
+  }
+
+  #offer(acts) {
+    const key = JSON.stringify(acts);
+    if (key === this.#acts) return;
+    this.#acts = key;
+    const made = Object.entries(acts).map(([act, hazard], i) => {
+      const button = html("button", { type: "button", "data-act": act, ...(i === 0 && { class: "main" }) }, NAMES[act]);
+      button.addEventListener("click", () => (hazard ? this.#ask(act, hazard) : this.#give(act)));
+      return button;
+    });
+    this.#buttons.replaceChildren(...made);
+    if (this.#dialog.open) this.#dialog.close();
+  }
+
+  // Ask twice: a tick and a button, each of which says what happens.
+  #ask(act, hazard) {
+    const tick = html("input", { type: "checkbox" });
+    const words = act === "release" ? "I hold the arm by hand." : act === "calibrate" ? "The space is clear, and I have the switch in reach." : "It was calibrated since it was switched on.";
+    const go = html("button", { type: "button", class: "main", disabled: "" }, NAMES[act].replace("…", ""));
+    const back = html("button", { type: "button" }, "Cancel");
+    tick.addEventListener("change", () => (go.disabled = !tick.checked));
+    back.addEventListener("click", () => this.#dialog.close());
+    go.addEventListener("click", () => {
+      this.#dialog.close();
+      this.#give(act, true);
+    });
+    this.#dialog.replaceChildren(html("h1", { id: "hazard-title" }, NAMES[act].replace("…", "")), html("p", {}, hazard), html("label", {}, tick, words), html("div", { class: "acts" }, back, go));
+    // Not modal, so that mouse, finger and keys still reach STOP.
+    this.#dialog.show();
+    back.focus();
+  }
+
+  #give(act, confirmed = false) {
+    this.say({ do: "operate_arm", act, confirmed });
+  }
+}
