@@ -213,7 +213,7 @@ def _shape(schema: dict[str, Any]) -> str:
             items = [_shape(each) for each in schema["prefixItems"]]
             return f"{len(items)} of {items[0]}"
         return f"list of {_shape(schema['items'])}"
-    if schema.get("type") == "object":
+    if schema.get("type") == "object" and "additionalProperties" in schema:
         return f"by name, {_shape(schema['additionalProperties'])}"
     low, high = schema.get("minimum"), schema.get("maximum")
     within = (

@@ -28,13 +28,15 @@ if TYPE_CHECKING:
 
     from starlette.routing import BaseRoute
 
-    from katana450.arm.control.scene_objects import Environment
+    from katana450.arm.control.grip_model import GripModel
+    from katana450.arm.control.scene_objects import Environment, Hand
     from katana450.arm.control.session import Session
     from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
     from katana450.arm.runtime.arm_listener import ArmAddress, Greeting
     from katana450.arm.runtime.tick import TickRecord
+    from katana450.maths.collision.world import CollisionWorld
     from katana450.maths.geometry.arrays import FloatArray
     from katana450.server.service.nodes import Nodes
     from katana450.server.service.recorder import Recorder
@@ -194,11 +196,14 @@ class Extension:
         name: Its name in messages.
         commands: Commands of ``katana450``.
         serve: Its part of ``katana450 serve``, if it has one.
+        grip_model: Returns the model of the forces in the hand of a robot with its collision world;
+            None if the pads of that hand are not known. Called for each session of an arm.
     """
 
     name: str
     commands: tuple[CliCommand, ...] = ()
     serve: ServeExtension | None = None
+    grip_model: Callable[[CollisionWorld, Hand], GripModel | None] | None = None
 
 
 @cache

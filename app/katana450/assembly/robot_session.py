@@ -16,6 +16,7 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.water import water_environment
 from katana450.errors import RobotDescriptionError
+from katana450.extension import extensions
 from katana450.settings import Settings
 
 
@@ -69,6 +70,9 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         notes.append(UNCHECKED)
     else:
         hand, objects = hand_of(robot, world), scene_objects_of(props)
+        for each in extensions():
+            if each.grip_model is not None:
+                hand = replace(hand, grip_model=each.grip_model(world, hand))
         world = world.with_obstacles((table(),))
     session = Session(
         arm,

@@ -16,7 +16,7 @@ from katana450.arm.control.modes import (
     Servoing,
     Tracking,
 )
-from katana450.arm.control.state import CAUSES, GRIPPER_LIMITS, Finding, Reason, State
+from katana450.arm.control.state import CAUSES, GRIPPER_REASONS, Finding, Reason, State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.chain import Chain
@@ -49,7 +49,7 @@ def with_goal(
 
     Without a mode the state is positioning at the goal.
     """
-    kept = tuple(f for f in state.findings if f.reason in GRIPPER_LIMITS)
+    kept = tuple(f for f in state.findings if f.reason in GRIPPER_REASONS)
     pause = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
     # The contact that the arm brakes for stays a finding when a new goal comes.
     met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)

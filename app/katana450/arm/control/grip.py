@@ -1,4 +1,4 @@
-"""Contact of the fingers: an object between both is held, and is let go when they open."""
+"""Contact of the fingers: an object between both is held, until they open or it slips."""
 
 from __future__ import annotations
 
@@ -30,12 +30,13 @@ def gripped(environment: Environment, world: CollisionWorld | None, state: State
     x = state.x_setpoint
     if state.grip is not None:
         opened = RELEASE_SLIDE if hand.slides else RELEASE_TURN
-        if state.gripper_setpoint <= state.grip + opened:
+        if state.gripper_setpoint > state.grip + opened:
+            return _let_go(environment, state)
+        load = None if hand.grip_model is None else hand.grip_model.overload(state)
+        if load is None or state.held is None:
             return state
-        objects = tuple(
-            _released(environment, state, each) if each.held else each for each in state.objects
-        )
-        return replace(state, objects=objects, grip=None)
+        slipped = Finding(Reason.SLIPPED, load, parts=(state.held.name, hand.fingers[0]))
+        return replace(_let_go(environment, state), findings=(slipped, *state.findings))
     if state.gripper_goal >= state.gripper_setpoint:
         return (
             without_finding(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
@@ -56,6 +57,14 @@ def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
         return hand.fingers
     away = [finding.parts for finding in state.findings if finding.reason is Reason.LOPSIDED]
     return tuple(each for parts in away if parts for each in hand.fingers if each not in parts)
+
+
+def _let_go(environment: Environment, state: State) -> State:
+    """Return ``state`` with an empty hand and the held object below it."""
+    objects = tuple(
+        _released(environment, state, each) if each.held else each for each in state.objects
+    )
+    return replace(state, objects=objects, grip=None, squeeze=0.0)
 
 
 def _released(environment: Environment, state: State, held: SceneObject) -> SceneObject:
@@ -91,4 +100,5 @@ def _closed(
         return replace(stopped, findings=(*stopped.findings, lopsided))
     taken = environment.taken(scene_object, x)
     objects = tuple(taken if each is scene_object else each for each in state.objects)
-    return replace(stopped, objects=objects, grip=state.gripper_setpoint)
+    squeeze = state.gripper_setpoint - state.gripper_goal
+    return replace(stopped, objects=objects, grip=state.gripper_setpoint, squeeze=squeeze)

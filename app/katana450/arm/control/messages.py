@@ -111,6 +111,10 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.PITCH_CHANGED: lambda f: f"pitch gives way by {_short(math.degrees(f.amount))}°",
     Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
     Reason.LOPSIDED: _lopsided,
+    Reason.SLIPPED: lambda f: (
+        f"{part((f.parts or ('the object',))[0])} slipped out of the fingers under a load of "
+        f"{_short(f.amount)} N: open the gripper, then grip it with more force"
+    ),
     Reason.NOT_AT_START: lambda f: (
         f"the plan begins at another posture: {axis(f.axis)} is "
         f"{_short(math.degrees(f.amount))}° off, or the arm still moves; go to its start first"
@@ -189,6 +193,7 @@ ABOUT_NOW = (
     Reason.WAITING,
     Reason.CONTACT,
     Reason.LOPSIDED,
+    Reason.SLIPPED,
     Reason.INTERNAL,
 )
 """Reasons whose numbers are present ones. Those of all others belong to the goal."""

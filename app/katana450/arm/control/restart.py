@@ -53,6 +53,7 @@ def restarted(begun: State, kept: State | None) -> State:
         speed=kept.speed,
         objects=kept.objects,
         grip=kept.grip,
+        squeeze=kept.squeeze,
         poured=kept.poured,
         appearance=kept.appearance,
     )

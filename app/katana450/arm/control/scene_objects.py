@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from katana450.arm.control.grip_model import GripModel
 from katana450.arm.control.solid import PLAIN, ObjectAppearance, Solid
 from katana450.errors import InputError, digits_beyond
 from katana450.maths.collision.clearance import STOP
@@ -233,12 +234,14 @@ class Hand:
         fingers: names of the fingers among the parts.
         T_palm_tool: (4, 4) the frame of the default tool in the frame of the palm.
         slides: whether the fingers slide instead of turning.
+        grip_model: the forces in the hand; None if they are not modelled, and objects never slip.
     """
 
     palm: int
     fingers: tuple[str, ...]
     T_palm_tool: FloatArray
     slides: bool = False
+    grip_model: GripModel | None = None
 
 
 class Environment:

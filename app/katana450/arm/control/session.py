@@ -389,10 +389,11 @@ class Session:
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.require_arm().gripper
-        lower = limits.lower if state.grip is None else state.grip
-        goal = min(max(angle, lower), limits.upper)
+        wanted = limits.clamp(angle)
+        # The fingers cannot close on what they hold: what is wanted beyond it squeezes the object.
+        goal = wanted if state.grip is None else max(wanted, state.grip)
         reason = Reason.GRIPPER_SLIDE_LIMIT if limits.slides else Reason.GRIPPER_LIMIT
-        others = tuple(f for f in state.findings if f.reason is not reason)
-        beyond = abs(goal - angle) > tolerances.LIMIT_SLACK
-        held = (Finding(reason, goal),) if beyond else ()
-        return replace(state, gripper_goal=goal, findings=others + held)
+        others = without_finding(state, reason, Reason.SLIPPED).findings
+        beyond = abs(wanted - angle) > tolerances.LIMIT_SLACK
+        held = (Finding(reason, wanted),) if beyond else ()
+        return replace(state, gripper_goal=goal, squeeze=goal - wanted, findings=others + held)

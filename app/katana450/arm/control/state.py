@@ -70,6 +70,7 @@ class Reason(Enum):
     ROLL_CHANGED = "roll changed"
     NOT_AT_START = "not at the start"
     LOPSIDED = "one finger only"
+    SLIPPED = "slipped"
     INTERNAL = "internal error"
     RESTARTED = "restarted"
     WAITING = "waiting"
@@ -100,8 +101,8 @@ CAUSES = (
 )
 """The reasons for which the server itself stops or pauses the arm."""
 
-GRIPPER_LIMITS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT)
-"""The reasons that concern only the fingers."""
+GRIPPER_REASONS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT, Reason.SLIPPED)
+"""The reasons that concern only the fingers, until their next command."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,8 @@ class Finding:
             gap, the leap across it [rad]; for a contact, the remaining distance [m]; for a
             stop, the travel of the tool, or else of any link, until rest [m]; for a plan, the
             distance of the arm from its start [rad]; for silence and lateness, the time [s]; for a
-            tracking error and a measured stop, the angle of a joint [rad].
+            tracking error and a measured stop, the angle of a joint [rad]; for an object that
+            slipped, its load [N].
         axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
         parts: the two links or objects that the finding concerns; None if it concerns none.
         time: for a stop, the time until rest [s].
@@ -214,6 +216,8 @@ class State:
         objects: the objects that stand around or are held.
         grip: the angle of the finger joint at which an object is held [rad]; None with an empty
             hand.
+        squeeze: the angle by which the commanded finger joint lies beyond ``grip``, not negative
+            [rad or m]; 0 with an empty hand.
         poured: the water of the cup; None if there is none.
         appearance: how links and objects are drawn.
         report: the report of the driver; None for an arm that follows its setpoints exactly.
@@ -240,6 +244,7 @@ class State:
     mode: Mode = IDLE
     objects: tuple[SceneObject, ...] = ()
     grip: float | None = None
+    squeeze: float = 0.0
     poured: MotionWithWater | None = None
     appearance: Appearance = ALL_AS_MADE
     report: ArmReport | None = None

@@ -5,6 +5,8 @@ Lengths are in m, angles in rad, times in s.
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 
 from katana450.server.api.arm_answers import Margins, MeasuredArm, Water
@@ -123,6 +125,8 @@ class State(Answer, frozen=True, kw_only=True):
             load; null where its description states no masses.
         margins: Distances to joint limits, singularity and contact.
         touching: Fingers that touch an object that can be held.
+        touch: Forces, pressures and sensors of the gripper, see the documentation of touch; null
+            for a gripper whose pads are not known.
         held: Object that both fingers hold; null with an empty hand.
         branch: Shoulder and elbow.
         priority: Part of a target that is kept when five axes cannot satisfy all of it.
@@ -168,6 +172,7 @@ class State(Answer, frozen=True, kw_only=True):
     holding: Numbers | None
     margins: Margins | None
     touching: list[str]
+    touch: dict[str, Any] | None
     held: str | None
     branch: tuple[str, str] | None
     priority: str | None

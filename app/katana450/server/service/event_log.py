@@ -31,6 +31,7 @@ UNITS = {
     Reason.PITCH_CHANGED: "rad",
     Reason.ROLL_CHANGED: "rad",
     Reason.LOPSIDED: "m",
+    Reason.SLIPPED: "N",
     Reason.NOT_AT_START: "rad",
 }
 """Units of the amounts; the other reasons have no amount."""

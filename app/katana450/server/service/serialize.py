@@ -88,6 +88,8 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
     """Return the part that depends on ``snapshot`` alone; ``state`` fills in the rest."""
     now = snapshot.state
     tool = None if arm.robot.arm is None else _Tool.of(arm.robot.arm, now)
+    hand = arm.environment.hand
+    model = None if hand is None else hand.grip_model
     return answers.State(
         t=now.t,
         sent=now.t,
@@ -105,7 +107,8 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         tool_speed=None if tool is None else tool.speed,
         margins=None if tool is None else margins(arm.margins),
         holding=None if arm.holding is None else arm.holding.tolist(),
-        touching=list(touching(arm.environment.hand, now)),
+        touching=list(touching(hand, now)),
+        touch=None if model is None else model.report(now),
         held=None if now.held is None else now.held.name,
         branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
         priority=None if tool is None else now.priority.value,
