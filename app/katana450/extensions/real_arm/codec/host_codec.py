@@ -1,0 +1,143 @@
+"""The host's side of the protocol: requests to bytes, bytes to replies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from katana450.errors import InputError
+from katana450.extensions.real_arm.codec.crc import crc16, with_crc
+from katana450.extensions.real_arm.codec.replies import ERROR_FLAG, ArmReply, FirmwareError
+from katana450.extensions.real_arm.codec.requests import ArmRequest, ErrorQuery
+
+START = 0x01
+"""First byte of a request in a frame."""
+
+ADDRESS = 24
+"""Address of the arm in every known configuration."""
+
+CRC_BYTES = 2
+
+
+def request_bytes(request: ArmRequest, address: int = ADDRESS) -> bytes:
+    """Return ``request`` as it is sent. Raises InputError for numbers that do not fit."""
+    payload = request.payload
+    if isinstance(request, ErrorQuery):
+        return payload
+    return bytes((START, address, len(payload))) + with_crc(payload)
+
+
+@dataclass(frozen=True)
+class ReplyReceived:
+    """The reply to ``request`` is complete and its checksum is right."""
+
+    request: ArmRequest
+    reply: ArmReply
+
+
+@dataclass(frozen=True)
+class RequestRefused:
+    """The arm refused ``request``. ``ErrorQuery`` fetches the reason."""
+
+    request: ArmRequest
+
+
+@dataclass(frozen=True)
+class OutOfStep:
+    """The bytes are no answer to the request, so later ones have no meaning: connect again.
+
+    Attributes:
+        problem: Sentence for people.
+    """
+
+    problem: str
+
+
+HostEvent = ReplyReceived | RequestRefused | OutOfStep
+
+
+class HostCodec:
+    """Pairs requests with replies on one connection, one at a time.
+
+    After an ``OutOfStep`` the connection cannot be used any more.
+    """
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self._request: ArmRequest | None = None
+        self._is_broken = False
+
+    @property
+    def waits(self) -> bool:
+        """True while a request has no answer."""
+        return self._request is not None
+
+    def send(self, request: ArmRequest) -> bytes:
+        """Return the bytes of ``request``, whose reply is expected next.
+
+        Raises InputError while another request waits, after an ``OutOfStep``, and for numbers that
+        do not fit.
+        """
+        if self._is_broken:
+            raise InputError("The connection to the arm is out of step: connect again.")
+        if self._request is not None:
+            raise InputError(f"{self._request} has no answer yet: send one request at a time.")
+        data = request_bytes(request)
+        self._request = request
+        return data
+
+    def receive(self, data: bytes) -> list[HostEvent]:
+        """Return the events that ``data`` completes: none if more bytes are needed."""
+        if self._is_broken:
+            return []
+        self._buffer += data
+        events: list[HostEvent] = []
+        while self._buffer and (event := self._next()) is not None:
+            events.append(event)
+        return events
+
+    def _next(self) -> HostEvent | None:
+        request = self._request
+        if request is None:
+            return self._out_of_step("no request waits")
+        if self._buffer[:1] == ERROR_FLAG:
+            return self._complete(request, len(ERROR_FLAG))
+        if self._buffer[0] != request.REPLY.HEAD[0]:
+            return self._out_of_step(f"a reply to {type(request).__name__} begins otherwise")
+        if isinstance(request, ErrorQuery):
+            return self._error(request)
+        return self._complete(request, request.REPLY.length())
+
+    def _error(self, request: ErrorQuery) -> HostEvent | None:
+        """Return the error as soon as a prefix of the bytes is one: its length is not fixed."""
+        longest = FirmwareError.LONGEST + CRC_BYTES
+        for length in range(FirmwareError.length() + 1, FirmwareError.LONGEST + 1):
+            if len(self._buffer) < length + CRC_BYTES:
+                return None
+            payload = bytes(self._buffer[:length])
+            ends = payload[-1] == 0 or length >= FirmwareError.LONGEST - 1
+            if ends and self._has_crc(length):
+                return self._complete(request, length)
+        return self._out_of_step(f"the checksum of an error of {longest} bytes is wrong")
+
+    def _complete(self, request: ArmRequest, length: int) -> HostEvent | None:
+        if len(self._buffer) < length + CRC_BYTES:
+            return None
+        payload = bytes(self._buffer[:length])
+        if not self._has_crc(length):
+            return self._out_of_step(f"the checksum of a reply to {type(request).__name__} is wrong")
+        del self._buffer[: length + CRC_BYTES]
+        self._request = None
+        if payload == ERROR_FLAG:
+            return RequestRefused(request)
+        return ReplyReceived(request, request.REPLY.read(payload))
+
+    def _has_crc(self, length: int) -> bool:
+        found = int.from_bytes(self._buffer[length : length + CRC_BYTES], "big")
+        return found == crc16(bytes(self._buffer[:length]))
+
+    def _out_of_step(self, problem: str) -> OutOfStep:
+        shown = bytes(self._buffer[:8]).hex(" ")
+        self._is_broken = True
+        self._request = None
+        self._buffer.clear()
+        return OutOfStep(f"The arm sent bytes that are no answer ({shown} ...): {problem}.")

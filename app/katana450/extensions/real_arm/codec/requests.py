@@ -1,0 +1,365 @@
+"""Requests of the host. Each names the class of its reply."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, ClassVar, NamedTuple, Self
+
+from katana450.errors import InputError
+from katana450.extensions.real_arm.codec import replies
+from katana450.extensions.real_arm.codec.replies import AXES, ArmReply
+from katana450.extensions.real_arm.codec.wire_message import WireMessage
+
+ALL_AXES = 0
+"""Number that stands for all axes in a motor command."""
+
+SET_ENCODER = 128
+"""Added to the axis of a motor command: its encoder is set to the value, without a motion."""
+
+SENSOR_CONTROLLER = 15
+"""Number of the controller with the sensors of the gripper."""
+
+
+class MotorFlag(IntEnum):
+    """Orders to the motor of an axis."""
+
+    OFF = 0
+    CALIBRATE = 4
+    FREEZE = 8
+    MOVE = 24
+    FLUSH = 32
+
+
+@dataclass(frozen=True)
+class ArmRequest(WireMessage):
+    """Base of all requests."""
+
+    REPLY: ClassVar[type[ArmReply]] = ArmReply
+
+    def is_confirmed_by(self, reply: ArmReply) -> bool:
+        """Return False if ``reply`` says that the request failed: it names axis 0."""
+        return getattr(reply, "axis", 1) != 0
+
+
+@dataclass(frozen=True)
+class EchoRequest(ArmRequest):
+    """Request without effect."""
+
+    HEAD = b"Z"
+    REPLY = replies.EchoReply
+
+
+@dataclass(frozen=True)
+class ReadMasterVersion(ArmRequest):
+    """Read the version of the master's firmware."""
+
+    HEAD = b"B"
+    REPLY = replies.MasterVersion
+
+
+@dataclass(frozen=True)
+class ReadArmIdentity(ArmRequest):
+    """Read the text with which the arm identifies itself."""
+
+    HEAD = b"Y"
+    REPLY = replies.ArmIdentity
+
+
+@dataclass(frozen=True)
+class ReadCommandTable(ArmRequest):
+    """Read the list of commands of the firmware."""
+
+    HEAD = b"X"
+    REPLY = replies.CommandTable
+
+
+@dataclass(frozen=True)
+class ReadSlaveVersion(ArmRequest):
+    """Read the version of the firmware of an axis. ``parameter`` is always 32."""
+
+    HEAD = b"V"
+    LAYOUT = struct.Struct(">BB")
+    REPLY = replies.SlaveVersion
+    axis: int
+    parameter: int = 32
+
+
+@dataclass(frozen=True)
+class ReadAxis(ArmRequest):
+    """Read status, position, speed and drive of an axis."""
+
+    HEAD = b"D"
+    LAYOUT = struct.Struct(">B")
+    REPLY = replies.AxisReading
+    axis: int
+
+
+@dataclass(frozen=True)
+class ReadStates(ArmRequest):
+    """Read the status of all axes."""
+
+    HEAD = b"N\x01"
+    LAYOUT = struct.Struct(">x")
+    REPLY = replies.AxisStates
+
+
+@dataclass(frozen=True)
+class ReadPositions(ArmRequest):
+    """Read the positions of all axes."""
+
+    HEAD = b"N\x03"
+    LAYOUT = struct.Struct(">x")
+    REPLY = replies.AxisPositions
+
+
+@dataclass(frozen=True)
+class CommandMotor(ArmRequest):
+    """Order to the motor of one axis or, with axis 0, of all.
+
+    Attributes:
+        axis: 1 to 6, ALL_AXES, or an axis plus SET_ENCODER.
+        flag: A ``MotorFlag``, as a number because real clients may send others.
+        value: Target or position [encoders]; 32000 for a calibration.
+    """
+
+    HEAD = b"C"
+    LAYOUT = struct.Struct(">BBh")
+    REPLY = replies.MotorCommanded
+    axis: int
+    flag: int
+    value: int
+
+    def is_confirmed_by(self, reply: ArmReply) -> bool:
+        """Return False if ``reply`` says that the request failed."""
+        return self.axis == ALL_AXES or super().is_confirmed_by(reply)
+
+
+@dataclass(frozen=True)
+class SetAxisParameter(ArmRequest):
+    """Set a parameter of an axis, or read it for numbers from 244.
+
+    Attributes:
+        axis: 1 to 6.
+        parameter: 3 speed limits, 4 acceleration, 10 current limits [%], 244 read the force, ...
+        p1, p2, p3: Values, 0 without a meaning.
+    """
+
+    HEAD = b"S"
+    LAYOUT = struct.Struct(">5B")
+    REPLY = replies.AxisParameters
+    axis: int
+    parameter: int
+    p1: int
+    p2: int
+    p3: int = 0
+
+
+@dataclass(frozen=True)
+class SetCollisionDetection(ArmRequest):
+    """Switch collision detection on (1) or off (0). ``first`` is 1 for on with a Katana300."""
+
+    HEAD = b"A"
+    LAYOUT = struct.Struct(">BB")
+    REPLY = replies.CollisionDetectionSet
+    enabled: int
+    first: int = 0
+
+    def _numbers(self) -> list[Any]:
+        return [self.first, self.enabled]
+
+    @classmethod
+    def _of(cls, numbers: tuple[Any, ...]) -> Self:
+        return cls(enabled=numbers[1], first=numbers[0])
+
+
+@dataclass(frozen=True)
+class ReadSensors(ArmRequest):
+    """Read the 16 sensors of the gripper."""
+
+    HEAD = b"E"
+    LAYOUT = struct.Struct(">B")
+    REPLY = replies.SensorBytes
+    controller: int = SENSOR_CONTROLLER
+
+    def is_confirmed_by(self, reply: ArmReply) -> bool:
+        """Return False if ``reply`` says that the request failed."""
+        return isinstance(reply, replies.SensorBytes) and reply.controller != 0
+
+
+class AxisSegment(NamedTuple):
+    """One polynomial of one axis: p(t) = p0 + p1/64 t + p2/1024 t^2 + p3/32768 t^3.
+
+    Attributes:
+        ticks: Length T in ticks of 10 ms.
+        target: Position at its end [encoders].
+        p0, p1, p2, p3: Coefficients as sent.
+    """
+
+    ticks: int
+    target: int
+    p0: int
+    p1: int
+    p2: int
+    p3: int
+
+    def at(self, tick: float) -> float:
+        """Return the position [encoders] at ``tick``."""
+        return self.p0 + tick * (self.p1 / 64 + tick * (self.p2 / 1024 + tick * self.p3 / 32768))
+
+    def speed_at(self, tick: float) -> float:
+        """Return the speed [encoders per tick] at ``tick``."""
+        return self.p1 / 64 + tick * (self.p2 / 512 + tick * 3 * self.p3 / 32768)
+
+
+@dataclass(frozen=True)
+class StoreSpline(ArmRequest):
+    """Polynomial of one axis, kept until ``StartSplines``; for a Katana300 or 400."""
+
+    HEAD = b"G"
+    LAYOUT = struct.Struct(">B6h")
+    REPLY = replies.SplineStored
+    axis: int
+    target: int
+    ticks: int
+    p0: int
+    p1: int
+    p2: int
+    p3: int
+
+
+class More(IntEnum):
+    """Position of a packet of polynomials in a motion."""
+
+    START = 0
+    """The motion starts or continues, and further packets follow."""
+    LAST = 1
+    """The motion starts or continues, and this is its end."""
+    STORE = 2
+    """The packet waits for a later one."""
+
+
+@dataclass(frozen=True)
+class StartSplines(ArmRequest):
+    """Start of the polynomials that were stored one by one."""
+
+    HEAD = b"\xc7"
+    LAYOUT = struct.Struct(">BB")
+    REPLY = replies.SplinesStarted
+    more: int
+    exact: int
+
+
+@dataclass(frozen=True)
+class SendSplines(ArmRequest):
+    """Polynomials of all axes, in one packet.
+
+    Attributes:
+        segments: (6,) One for each axis. The firmware ignores that of the gripper unless bit 1 of
+            ``exact`` is set; on real arms it never moved the gripper.
+        more: A value of ``More``.
+        exact: Bit 0: the position is controlled after the motion. Bit 1: axis 6 follows too.
+    """
+
+    HEAD = b"H"
+    LAYOUT = struct.Struct(">36h2B")
+    REPLY = replies.SplinesSent
+    segments: tuple[AxisSegment, ...]
+    more: int
+    exact: int = 1
+
+    def _numbers(self) -> list[Any]:
+        return [*(number for segment in self.segments for number in segment), self.more, self.exact]
+
+    @classmethod
+    def _of(cls, numbers: tuple[Any, ...]) -> Self:
+        width = len(AxisSegment._fields)
+        starts = range(0, AXES * width, width)
+        segments = tuple(AxisSegment(*numbers[i : i + width]) for i in starts)
+        return cls(segments, *numbers[AXES * width :])
+
+
+@dataclass(frozen=True)
+class ReadMotorFlag(ArmRequest):
+    """Read the newest motor command of an axis."""
+
+    HEAD = b"I"
+    LAYOUT = struct.Struct(">B")
+    REPLY = replies.MotorFlagReading
+    axis: int
+
+
+@dataclass(frozen=True)
+class ReadInputs(ArmRequest):
+    """Read the digital inputs."""
+
+    HEAD = b"Tr"
+    LAYOUT = struct.Struct(">3x")
+    REPLY = replies.DigitalBits
+
+
+@dataclass(frozen=True)
+class WriteOutputs(ArmRequest):
+    """Write the digital outputs: output n is bit n."""
+
+    HEAD = b"Tw"
+    LAYOUT = struct.Struct(">B2x")
+    REPLY = replies.DigitalBits
+    bits: int
+
+
+@dataclass(frozen=True)
+class SetLed(ArmRequest):
+    """Set the lamp of the arm. ``color``: letter r or g, or 0 for off."""
+
+    HEAD = b"Tl"
+    LAYOUT = struct.Struct(">B2x")
+    REPLY = replies.DigitalBits
+    color: int
+
+
+@dataclass(frozen=True)
+class ReadRegister(ArmRequest):
+    """Read a Modbus register."""
+
+    HEAD = b"MR"
+    LAYOUT = struct.Struct(">B2x")
+    REPLY = replies.RegisterValue
+    register: int
+
+
+@dataclass(frozen=True)
+class WriteRegister(ArmRequest):
+    """Write a Modbus register."""
+
+    HEAD = b"MW"
+    LAYOUT = struct.Struct(">Bh")
+    REPLY = replies.RegisterValue
+    register: int
+    value: int
+
+
+@dataclass(frozen=True)
+class ErrorQuery(ArmRequest):
+    """Fetch the reason of an error. Sent as four raw bytes without header and checksum."""
+
+    HEAD = b"\x00\x00\x00\xc1"
+    REPLY = replies.FirmwareError
+
+
+REQUESTS: tuple[type[ArmRequest], ...] = (
+    EchoRequest, ReadMasterVersion, ReadArmIdentity, ReadCommandTable, ReadSlaveVersion, ReadAxis,
+    ReadStates, ReadPositions, CommandMotor, SetAxisParameter, SetCollisionDetection, ReadSensors,
+    StoreSpline, StartSplines, SendSplines, ReadMotorFlag, ReadInputs, WriteOutputs, SetLed,
+    ReadRegister, WriteRegister,
+)  # fmt: skip
+"""Requests that are sent in frames: all but ``ErrorQuery``."""
+
+
+def read_request(payload: bytes) -> ArmRequest:
+    """Return the request in the payload of a frame. Raises InputError if there is none."""
+    known = [each for each in REQUESTS if payload.startswith(each.HEAD)]
+    if not known:
+        raise InputError(f"No request begins with {payload[:2].hex(' ') or 'nothing'}.")
+    return known[0].read(payload)
