@@ -118,7 +118,9 @@ def test_wrong_checksum_of_a_request_is_reported_and_the_next_request_is_read() 
     ]
 
 
-@pytest.mark.parametrize("payload", [b"", b"Q", b"N\x07\x00", b"D", b"D\x01\x02", b"T?\x00\x00\x00"])
+@pytest.mark.parametrize(
+    "payload", [b"", b"Q", b"N\x07\x00", b"D", b"D\x01\x02", b"T?\x00\x00\x00"]
+)
 def test_unknown_request_is_reported(payload: bytes) -> None:
     assert firmware_events([frame(payload)]) == [RequestInvalid(payload, INVALID_ARGUMENT)]
 

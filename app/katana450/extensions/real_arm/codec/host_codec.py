@@ -117,14 +117,16 @@ class HostCodec:
             ends = payload[-1] == 0 or length >= FirmwareError.LONGEST - 1
             if ends and self._has_crc(length):
                 return self._complete(request, length)
-        return self._out_of_step(f"the checksum of an error of {longest} bytes is wrong")
+        return self._out_of_step(f"the checksum of an error of {longest} bytes is wrong", longest)
 
     def _complete(self, request: ArmRequest, length: int) -> HostEvent | None:
         if len(self._buffer) < length + CRC_BYTES:
             return None
         payload = bytes(self._buffer[:length])
         if not self._has_crc(length):
-            return self._out_of_step(f"the checksum of a reply to {type(request).__name__} is wrong")
+            return self._out_of_step(
+                f"the checksum of a reply to {type(request).__name__} is wrong"
+            )
         del self._buffer[: length + CRC_BYTES]
         self._request = None
         if payload == ERROR_FLAG:
@@ -135,8 +137,8 @@ class HostCodec:
         found = int.from_bytes(self._buffer[length : length + CRC_BYTES], "big")
         return found == crc16(bytes(self._buffer[:length]))
 
-    def _out_of_step(self, problem: str) -> OutOfStep:
-        shown = bytes(self._buffer[:8]).hex(" ")
+    def _out_of_step(self, problem: str, length: int = 1) -> OutOfStep:
+        shown = bytes(self._buffer[: min(length, 8)]).hex(" ")
         self._is_broken = True
         self._request = None
         self._buffer.clear()

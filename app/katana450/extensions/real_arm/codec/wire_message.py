@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Self
 
@@ -55,7 +56,8 @@ class WireMessage:
 
     @classmethod
     def _of(cls, numbers: tuple[Any, ...]) -> Self:
-        single = len(fields(cls))
-        if len(numbers) == single:
-            return cls(*numbers)
-        return cls(*numbers[: single - 1], numbers[single - 1 :])
+        create: Callable[..., Self] = cls
+        count = len(fields(cls))
+        if len(numbers) == count:
+            return create(*numbers)
+        return create(*numbers[: count - 1], numbers[count - 1 :])
