@@ -1,0 +1,159 @@
+"""Segments follow the setpoints within half an encoder, join exactly, and fit into 16 bits."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from katana450.extensions.real_arm.codec.requests import More, SendSplines
+from katana450.extensions.real_arm.encoders import EncoderMap
+from katana450.extensions.real_arm.splines import (
+    SEGMENT_TICKS,
+    TICK,
+    SplineSegment,
+    SplineStream,
+    joined,
+)
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT
+from katana450.maths.geometry.arrays import FloatArray
+from tests.conftest import LONG
+
+EXAMPLES = 500 if LONG else 40
+MAP = EncoderMap(DEFAULT_VARIANT)
+START = np.array([1000, -12000, -15000, 15000, 9000, 20000])
+TICKS = np.arange(SEGMENT_TICKS + 1)
+
+
+def ticks_from(first: int, end: int) -> FloatArray:
+    return np.arange(first, end, dtype=np.float64) * TICK
+
+
+def cut(setpoints: FloatArray, times: FloatArray) -> list[SplineSegment]:
+    """Return the segments of setpoints (k, 6) [encoders]."""
+    stream = SplineStream(START, MAP.speed)
+    segments = []
+    for t, point in zip(times, setpoints, strict=True):
+        stream.add(float(t), point)
+        while (segment := stream.cut()) is not None:
+            segments.append(segment)
+    return segments
+
+
+def positions(segments: list[SplineSegment]) -> FloatArray:
+    """Return the positions at each tick, (8 n + 1, 6)."""
+    rows = [segment.at(tick) for segment in segments for tick in TICKS[:-1]]
+    return np.array([*rows, segments[-1].at(SEGMENT_TICKS)])
+
+
+def assert_joined(segments: list[SplineSegment]) -> None:
+    for before, after in itertools.pairwise(segments):
+        for a, b in zip(before.axes(), after.axes(), strict=True):
+            # Equal as numbers, not nearly.
+            assert a.at(SEGMENT_TICKS) == b.at(0) == a.target == b.p0
+            assert a.speed_at(SEGMENT_TICKS) == b.speed_at(0)
+    for segment in segments:
+        packet = SendSplines(segment.axes(), More.START)
+        assert SendSplines.read(packet.payload) == packet
+
+
+def circle(period: float) -> tuple[FloatArray, FloatArray]:
+    """Return setpoints on the clock of the ticks that begin and end at rest, and their times."""
+    times = ticks_from(0, int(period / TICK) + 60)
+    s = np.clip(times / period, 0.0, 1.0)
+    phase = 2.0 * np.pi * (s - np.sin(2.0 * np.pi * s) / (2.0 * np.pi))
+    amplitude = np.array([2500.0, 4200.0, 1800.0, 3100.0, 900.0, 0.0])
+    shift = np.arange(6)
+    points = START + amplitude * (np.sin(phase[:, None] + shift) - np.sin(shift))
+    return np.asarray(points, np.float64), times
+
+
+def test_circle_is_followed_within_half_an_encoder() -> None:
+    setpoints, times = circle(3.0)
+    segments = cut(setpoints, times)
+    assert_joined(segments)
+    found = positions(segments)
+    # The stream begins one tick before the first setpoint, at the start.
+    plan = np.vstack([START, setpoints])[: len(found)]
+    joints = slice(0, None, SEGMENT_TICKS)
+    assert np.abs(found[joints] - plan[joints]).max() <= 0.5
+    assert np.abs(found - plan).max() < 0.6
+    assert segments[-1].end.is_at_rest
+
+
+def test_error_does_not_accumulate() -> None:
+    times = ticks_from(1, 20_000 if LONG else 4_000)
+    drift = np.minimum(0.013 * np.arange(1, len(times) + 1), 1e4)
+    setpoints = START + drift[:, None] * np.array([1, -1, 0.5, 0.3, -0.7, 0])
+    found = positions(cut(setpoints, times))
+    plan = np.vstack([START, setpoints])[: len(found)]
+    assert np.abs(found[16:] - plan[16:]).max() < 0.6
+
+
+def test_setpoint_beyond_the_speed_is_reached_at_the_maximum_speed() -> None:
+    times = ticks_from(1, 200)
+    setpoints = np.tile(START + np.array([3000, 3000, 3000, -3000, -3000, 0]), (len(times), 1))
+    segments = cut(setpoints, times)
+    assert_joined(segments)
+    speeds = np.abs(np.diff(positions(segments), axis=0)).max(axis=0)
+    assert (speeds <= 1.3 * MAP.speed).all()
+    assert (segments[-1].end.position == setpoints[-1]).all()
+
+
+def test_late_and_irregular_setpoints_are_followed() -> None:
+    rng = np.random.default_rng(1)
+    times = np.cumsum(rng.uniform(0.008, 0.014, 300))
+    setpoints = START + 3000 * np.sin(times)[:, None] * np.array([1, 1, 0.4, 1, 1, 0])
+    segments = cut(setpoints, times)
+    assert_joined(segments)
+    grid = times[0] - TICK + np.arange(len(segments) * SEGMENT_TICKS + 1) * TICK
+    plan = START + 3000 * np.sin(grid)[:, None] * np.array([1, 1, 0.4, 1, 1, 0])
+    assert np.abs(positions(segments) - plan)[16:].max() < 1.0
+
+
+def test_motion_after_a_rest_begins_with_its_first_setpoint() -> None:
+    stream = SplineStream(START, MAP.speed)
+    times = [0.01, 0.09, 0.17, 0.25, *(0.25 + TICK * np.arange(1, 30))]
+    ends = []
+    for t in times:
+        travel = max(t - 0.25, 0.0) ** 2 * 20_000
+        stream.add(t, START + np.array([travel, 0, 0, 0, 0, 0]))
+        while (segment := stream.cut()) is not None:
+            ends.append(segment.end.position[0] - START[0])
+    assert ends[:3] == [0, 0, 0]
+    assert np.abs(ends[3] - (0.32 - 0.25) ** 2 * 20_000) <= 1.0
+
+
+Encoders = st.lists(st.integers(-32768, 32767), min_size=6, max_size=6)
+Speeds = st.lists(st.integers(-180, 180), min_size=6, max_size=6)
+
+
+@settings(max_examples=EXAMPLES)
+@given(Encoders, Speeds, Encoders, Speeds)
+def test_no_coefficient_overflows(
+    position: list[int], speed: list[int], target: list[int], final: list[int]
+) -> None:
+    limited = np.clip(position, MAP.lower, MAP.upper)
+    stream = SplineStream(limited.astype(int), MAP.speed)
+    begin = joined(stream.joint, limited, np.array(speed, float))
+    segments = [begin]
+    for _ in range(5):
+        goal = np.clip(target, MAP.lower, MAP.upper)
+        segments.append(joined(segments[-1].end, goal, np.array(final, float)))
+    for segment in segments:
+        ends = segment.end.position
+        if (np.abs(ends) < 32768).all():
+            assert SendSplines(segment.axes(), More.START).payload
+
+
+def test_still_setpoints_end_at_rest() -> None:
+    stream = SplineStream(START, MAP.speed)
+    assert stream.cut() is None
+    for tick in range(1, 50):
+        stream.add(tick * TICK, START + min(tick, 20) * np.array([5, 0, 0, 0, 0, 0]))
+        stream.cut()
+    assert stream.joint.is_at_rest
+    assert stream.still_for() > 0.25
+    assert (stream.joint.position == START + np.array([100, 0, 0, 0, 0, 0])).all()
