@@ -33,6 +33,7 @@ KINDS = {
     "tests/docs": BROWSER,
     "tests/examples": BROWSER,
     "tests/library/test_run.py": BROWSER,
+    "tests/real_arm/test_driver.py": SERVERS[1],
     "tests/recording/test_episodes_on_a_server.py": SERVERS[1],
     "tests/recording/test_recorder.py": SERVERS[0],
     "tests/recording/test_run_again_on_a_server.py": SERVERS[0],

@@ -20,9 +20,9 @@ Piece = bytes | float | None
 class SmallFirmware:
     """Serves one connection at a time on a port of its own. ``requests``: all that arrived."""
 
-    def __init__(self, answer: Callable[[ArmRequest], Sequence[Piece]]) -> None:
+    def __init__(self, answer: Callable[[ArmRequest], Sequence[Piece]], port: int = 0) -> None:
         self._answer = answer
-        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener = socket.create_server(("127.0.0.1", port))
         self.port: int = self._listener.getsockname()[1]
         self.requests: list[ArmRequest] = []
         self.connections = 0

@@ -1,0 +1,138 @@
+"""Motion of arm and gripper from setpoints: what to send next, and where both should be."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from katana450.extensions.real_arm.codec.axis_status import AT_REST
+from katana450.extensions.real_arm.codec.requests import (
+    ArmRequest,
+    CommandMotor,
+    MotorFlag,
+    SendSplines,
+)
+from katana450.extensions.real_arm.driver.finger_motion import FingerMotion
+from katana450.extensions.real_arm.driver.readings import ArmReadings
+from katana450.extensions.real_arm.driver.spline_motion import SplineMotion
+from katana450.extensions.real_arm.encoders import EncoderMap
+from katana450.extensions.real_arm.variants import Variant
+from katana450.maths.geometry.arrays import FloatArray
+
+FINGER = 5
+"""Place of the fingers among the six axes."""
+
+SMALLEST_STEP = 1.0
+"""[encoders] Change of the setpoint that begins a motion."""
+
+LARGEST_STEP = np.radians(2.0)
+"""[rad] Distance of the first setpoint of a motion from the arm above which none begins."""
+
+SETTLE_TIMEOUT = 2.0
+"""[s] Time after a motion in which all axes must hold."""
+
+MOVING_SPEED = 200.0
+"""[encoders/s] Speed of any axis above which the arm moves without an order."""
+
+
+class ArmMotion:
+    """Motions of the arm, one after another, and targets of the gripper."""
+
+    def __init__(self, variant: Variant, encoders: EncoderMap, arm: ArmReadings) -> None:
+        """Create it for the arm that ``arm`` measures."""
+        self._variant, self._encoders, self._arm = variant, encoders, arm
+        self._motions: deque[SplineMotion] = deque()
+        self._finger = FingerMotion(FINGER + 1, variant.axes[FINGER].speed)
+        self._finger_freed = self._ended_at = -np.inf
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes of the arm without its gripper, from 1."""
+        return self._variant.driven[:FINGER]
+
+    def clear(self) -> None:
+        """Drop all motions and targets, so that only a later setpoint moves anything."""
+        self._motions.clear()
+        self._finger = FingerMotion(FINGER + 1, self._variant.axes[FINGER].speed)
+
+    def moves(self, now: float) -> bool:
+        """Return whether anything moves at ``now`` [s], or is about to."""
+        fast = float(np.abs(self._arm.speeds).max()) > MOVING_SPEED
+        return bool(self._motions) or fast or self.finger_moves(now)
+
+    def finger_moves(self, now: float) -> bool:
+        """Return whether the fingers move at ``now`` [s]."""
+        return self._finger.moves(now, float(self._arm.speeds[FINGER]))
+
+    def ignore(self, encoders: FloatArray) -> None:
+        """Take the setpoint (6,) [encoders] of a stopped arm: its fingers keep their order."""
+        self._finger.ignore(encoders[FINGER])
+
+    def follow(self, encoders: FloatArray, t: float) -> str:
+        """Take the setpoint (6,) [encoders] of time ``t`` [s].
+
+        Returns a sentence if it cannot be followed, otherwise an empty text.
+        """
+        self._finger.add(encoders[FINGER])
+        if not self._motions or not self._motions[-1].takes_setpoints:
+            start = self._motions[-1].target if self._motions else self._arm.held
+            away = np.abs(encoders - start)[:FINGER]
+            if away.max() < SMALLEST_STEP:
+                return ""
+            if (away * np.abs(self._encoders.scale[:FINGER])).max() > LARGEST_STEP:
+                return "The setpoint is not where the arm is, so no motion began."
+            self._motions.append(SplineMotion(start, self._encoders.speed))
+        motion = self._motions[-1]
+        motion.add(t, np.array([*encoders[:FINGER], motion.target[FINGER]]))
+        return ""
+
+    def next_request(self, now: float) -> ArmRequest | None:
+        """Return the order to send at ``now`` [s], or None."""
+        packet = self._motions[0].next_packet(now) if self._motions else None
+        if packet is not None or not self._variant.has_gripper:
+            return packet
+        if FINGER + 1 in self._arm.collided and self._arm.states_t > self._finger_freed:
+            # An object between the fingers is no collision of the arm: they hold it.
+            self._finger_freed = now
+            position = int(self._arm.positions[FINGER])
+            return CommandMotor(FINGER + 1, MotorFlag.FREEZE, position)
+        return self._finger.next_order(now)
+
+    def sent(self, request: ArmRequest, t: float) -> None:
+        """Note that the arm confirmed ``request``, an order of this motion, at ``t`` [s]."""
+        if isinstance(request, SendSplines):
+            self._motions[0].sent(request, t)
+        elif isinstance(request, CommandMotor):
+            if request.flag == MotorFlag.MOVE:
+                self._finger.sent(request, int(self._arm.positions[FINGER]), t)
+            self._arm.held = np.array([*self._arm.held[:FINGER], request.value])
+
+    def settle(self, now: float) -> str:
+        """End a motion that the arm has played, by the newest states.
+
+        Returns a sentence if something is wrong with it, otherwise an empty text.
+        """
+        if not self._motions or not self._motions[0].has_ended(self._arm.states_t):
+            self._ended_at = now
+            return ""
+        motion = self._motions[0]
+        if motion.is_late:
+            return "The setpoints came too late, so the arm was braked."
+        unsettled = set(self.axes) - set(self._arm.axes_in(*AT_REST))
+        if not unsettled:
+            self._arm.held = np.array([*motion.target[:FINGER], self._arm.held[FINGER]])
+            self._motions.popleft()
+        elif now - self._ended_at > SETTLE_TIMEOUT:
+            return f"The arm did not end its motion. {self._arm.words(min(unsettled))}"
+        return ""
+
+    def expected_at(self, t: float) -> FloatArray:
+        """Return where arm and fingers should be at ``t`` [s], (6,) [encoders]."""
+        place = self._arm.held.astype(float)
+        if self._motions:
+            place[:FINGER] = self._motions[0].position_at(t)[:FINGER]
+        finger = self._finger.position_at(t)
+        if finger is not None:
+            place[FINGER] = finger
+        return place

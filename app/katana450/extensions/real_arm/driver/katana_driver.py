@@ -1,0 +1,276 @@
+"""The driver of a Katana450: a thread of its own exchanges requests with the arm."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmMode
+from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.drivers.driver import DriverAnswer
+from katana450.errors import InputError, KatanaError
+from katana450.extensions.real_arm.codec import requests
+from katana450.extensions.real_arm.codec.replies import ArmReply
+from katana450.extensions.real_arm.codec.requests import ArmRequest
+from katana450.extensions.real_arm.driver.machine import ArmMachine
+from katana450.extensions.real_arm.link.arm_link import ArmLink
+from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from katana450.extensions.real_arm.link.transport import ArmRefusalError, LinkLostError
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, Variant
+from katana450.maths.geometry.arrays import FloatArray
+
+IDLE_TIME = 0.005
+"""[s] Longest sleep of the thread, if nothing wakes it, while an arm is connected."""
+
+UNCONNECTED_TIME = 0.1
+"""[s] The same without a connection."""
+
+SHORTEST_RETRY, LONGEST_RETRY = 0.1, 2.0
+"""[s] Time between two attempts to connect. It doubles with each failed one."""
+
+MAX_SILENCE = 0.5
+"""[s] Age of the newest answer of the thread above which the arm counts as lost."""
+
+END_TIMEOUT = 1.5
+"""[s] Maximum time in which a moving arm is stopped at the end."""
+
+MAX_SETPOINTS = 1000
+"""Setpoints that wait for a thread that hangs, at most."""
+
+SAFE_REQUESTS = (
+    requests.EchoRequest,
+    requests.ReadInputs,
+    requests.WriteOutputs,
+    requests.SetLed,
+    requests.ReadRegister,
+    requests.WriteRegister,
+)
+"""Requests that others may ask for: none of them moves the arm."""
+
+log = logging.getLogger(__name__)
+
+
+class _Setpoint(NamedTuple):
+    joints: FloatArray
+    t: float
+    stopped: bool
+
+
+class KatanaDriver:
+    """A Katana450 behind the protocol of drivers."""
+
+    silence_profile = SilenceProfile.REAL_ARM
+
+    def __init__(
+        self,
+        url: ArmUrl,
+        bounds: FloatArray,
+        joints: FloatArray,
+        variant: Variant = DEFAULT_VARIANT,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        """Create the driver without a connection.
+
+        Args:
+            url: Address of the arm.
+            bounds: (2, 6) lower and upper limits of the joints and the finger joint [rad].
+            joints: (6,) values of them that are reported before the first measurement [rad].
+            variant: The arm.
+            clock: Clock of the control loop.
+        """
+        self._url = url
+        self._clock = clock
+        self._machine = ArmMachine(variant, bounds, joints)
+        self._link: ArmLink | None = None
+        self._retry, self._retry_at = SHORTEST_RETRY, -np.inf
+        self._setpoints: deque[_Setpoint] = deque(maxlen=MAX_SETPOINTS)
+        self._acts: deque[ArmAct] = deque()
+        self._asked: deque[tuple[ArmRequest, Future[ArmReply]]] = deque()
+        self._wake = threading.Event()
+        self._ending = threading.Event()
+        self._was_stopped = True
+        self._end: float | None = None
+        self._answer = self._machine.answer()
+        self._answered_at = clock()
+        self._version = self._machine.version
+        self._thread = threading.Thread(target=self._run, name="katana450", daemon=True)
+
+    def start(self, t: float) -> DriverAnswer:  # noqa: ARG002
+        """Start the thread, which waits for the act to connect, and return where the arm is."""
+        self._thread.start()
+        return self._answer
+
+    def send(self, q: FloatArray, gripper: float, t: float, stopped: bool = False) -> DriverAnswer:
+        """Give a setpoint to the thread, and return the newest measurement, both at once.
+
+        q: (5,) [rad]. gripper: the finger joint [rad]. t: now [s]. stopped: whether the arm is to
+        be frozen and to stay so. Raises InputError for a setpoint that is not finite.
+        """
+        joints = np.array([*q, gripper])
+        if not np.isfinite(joints).all():
+            raise InputError(f"The setpoint must be finite, not {q}, {gripper}.")
+        self._setpoints.append(_Setpoint(joints, t, stopped))
+        if stopped and not self._was_stopped:
+            self._wake.set()
+        self._was_stopped = stopped
+        answer, report = self._answer, self._answer.report
+        silence = t - self._answered_at
+        if silence > MAX_SILENCE and report is not None and report.mode.follows:
+            note = f"The driver has not heard from the arm for {silence:.1f} s."
+            lost = replace(report, mode=ArmMode.LOST, note=note)
+            return replace(answer, report=lost)
+        return answer
+
+    def perform(self, act: ArmAct, t: float) -> None:  # noqa: ARG002
+        """Give ``act`` to the thread, at once."""
+        self._acts.append(act)
+        self._wake.set()
+
+    def ask(self, request: ArmRequest) -> Future[ArmReply]:
+        """Return the coming reply to a request about inputs, outputs, the lamp or a register.
+
+        The future raises ArmRefusalError and LinkLostError. Raises InputError for other requests.
+        """
+        if not isinstance(request, SAFE_REQUESTS):
+            raise InputError(f"{type(request).__name__} is reserved for the driver itself.")
+        future: Future[ArmReply] = Future()
+        self._asked.append((request, future))
+        return future
+
+    def stop(self) -> None:
+        """Stop an arm that moves, and disconnect. Its motors keep holding it."""
+        self._ending.set()
+        self._wake.set()
+        if self._thread.is_alive():
+            self._thread.join(END_TIMEOUT + MAX_SILENCE)
+
+    def _run(self) -> None:
+        while not self._has_ended():
+            try:
+                self._turn()
+            except Exception as error:
+                log.exception("The driver of the arm met an error.")
+                self._lose(f"The driver met an internal error: {error}.")
+            self._publish()
+        self._close()
+
+    def _has_ended(self) -> bool:
+        """Return True at the end, when the arm stands or has had its time to stop."""
+        if not self._ending.is_set():
+            return False
+        now = self._clock()
+        if self._end is None:
+            self._end = now + END_TIMEOUT
+            self._machine.freeze(now)
+        return now > self._end or self._link is None or not self._machine.moves
+
+    def _turn(self) -> None:
+        """Take what was given, and perform at most one exchange."""
+        self._take()
+        machine, now = self._machine, self._clock()
+        if not machine.wants_link:
+            self._close()
+            self._sleep(UNCONNECTED_TIME)
+        elif self._link is None:
+            self._connect(now)
+        elif (request := machine.urgent(now)) is not None:
+            self._exchange(request)
+        elif self._asked:
+            self._exchange_asked()
+        elif (request := machine.poll(now)) is not None:
+            self._exchange(request)
+        else:
+            self._sleep()
+
+    def _take(self) -> None:
+        while self._setpoints:
+            joints, t, stopped = self._setpoints.popleft()
+            if self._end is None:
+                self._machine.steer(joints, t, stopped=stopped)
+        while self._acts:
+            act = self._acts.popleft()
+            self._machine.perform(act)
+            if act is ArmAct.CONNECT:
+                self._retry, self._retry_at = SHORTEST_RETRY, -np.inf
+
+    def _sleep(self, longest: float = IDLE_TIME) -> None:
+        self._wake.wait(longest)
+        self._wake.clear()
+
+    def _connect(self, now: float) -> None:
+        if now < self._retry_at:
+            self._sleep()
+            return
+        try:
+            self._link = ArmLink(self._url.open(), self._clock)
+        except KatanaError as error:
+            self._lose(str(error))
+        else:
+            self._machine.connected(str(self._url))
+
+    def _exchange(self, request: ArmRequest) -> None:
+        assert self._link is not None
+        sent = self._clock()
+        try:
+            reply = self._link.exchange(request)
+        except ArmRefusalError as refusal:
+            self._machine.refused(request, refusal.error, self._clock())
+        except LinkLostError as error:
+            self._lose(str(error))
+        else:
+            self._retry = SHORTEST_RETRY
+            self._machine.replied(request, reply, sent, self._clock())
+
+    def _exchange_asked(self) -> None:
+        assert self._link is not None
+        request, future = self._asked.popleft()
+        try:
+            future.set_result(self._link.exchange(request))
+        except KatanaError as error:
+            future.set_exception(error)
+            if isinstance(error, LinkLostError):
+                self._lose(str(error))
+
+    def _lose(self, problem: str) -> None:
+        """Drop the connection, and connect again after a while."""
+        self._close()
+        self._machine.lost(problem)
+        self._retry_at = self._clock() + self._retry
+        self._retry = min(2.0 * self._retry, LONGEST_RETRY)
+
+    def _close(self) -> None:
+        if self._link is not None:
+            self._link.close()
+            self._link = None
+        while self._asked:
+            _, future = self._asked.popleft()
+            future.set_exception(LinkLostError("There is no connection to the arm."))
+
+    def _publish(self) -> None:
+        """Let the control loop have what has changed."""
+        self._answered_at = self._clock()
+        version = self._machine.version
+        if version != self._version:
+            self._version = version
+            answer = self._machine.answer()
+            self._log(answer)
+            self._answer = answer
+
+    def _log(self, answer: DriverAnswer) -> None:
+        before, after = self._answer.report, answer.report
+        assert before is not None
+        assert after is not None
+        if after.mode is not before.mode:
+            bad = after.mode in (ArmMode.LOST, ArmMode.FAULT, ArmMode.COLLIDED)
+            log.log(
+                logging.WARNING if bad else logging.INFO, "%s. %s", after.mode.value, after.note
+            )

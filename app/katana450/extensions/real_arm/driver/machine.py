@@ -1,0 +1,316 @@
+"""The state machine of the driver: events and time in, requests and the report out.
+
+It knows no connection, clock or thread: the caller performs the exchanges and names the times.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmMode, ArmReport, MeasuredStop
+from katana450.arm.drivers.driver import DriverAnswer
+from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.codec.replies import ArmReply, AxisStates, FirmwareError
+from katana450.extensions.real_arm.codec.requests import (
+    ArmRequest,
+    CommandMotor,
+    ReadPositions,
+    ReadSensors,
+    ReadStates,
+    SendSplines,
+)
+from katana450.extensions.real_arm.driver.arm_motion import FINGER, ArmMotion
+from katana450.extensions.real_arm.driver.procedures import (
+    Procedure,
+    ProcedureEnd,
+    calibrate,
+    halt,
+    hold,
+    identify,
+    release,
+)
+from katana450.extensions.real_arm.driver.readings import ArmReadings
+from katana450.extensions.real_arm.encoders import EncoderMap
+from katana450.extensions.real_arm.link.transport import ArmRefusalError
+from katana450.extensions.real_arm.variants import Variant
+from katana450.maths.geometry.arrays import FloatArray, frozen
+
+POLLS = ((ReadPositions(), 0.05), (ReadStates(), 0.1), (ReadSensors(), 0.25))
+"""Measurements, and the time between two of each [s] if the arm answers fast enough."""
+
+NOISE = np.radians(0.5)
+"""[rad] Distance beyond a limit that calibration and play leave possible."""
+
+MAX_REFUSALS = 3
+"""Measurements that may be refused one after another."""
+
+FIRST_NOTE = "No connection. Connect to the arm to read it."
+
+
+class ArmMachine:
+    """State machine of one arm.
+
+    Attributes:
+        mode: Mode of the arm.
+        note: Sentence for people about the mode.
+        arm: Newest measurements.
+    """
+
+    def __init__(self, variant: Variant, bounds: FloatArray, joints: FloatArray) -> None:
+        """Create it without a connection.
+
+        Args:
+            variant: The arm.
+            bounds: (2, 6) lower and upper limits of the joints and the finger joint [rad].
+            joints: (6,) values of them that are reported before the first measurement [rad].
+        """
+        self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
+        self.arm = ArmReadings()
+        self._variant, self._encoders = variant, EncoderMap(variant)
+        self._bounds = bounds
+        self._joints = frozen(joints)
+        self._motion = ArmMotion(variant, self._encoders, self.arm)
+        self._acts: deque[ArmAct] = deque()
+        self._procedure: Procedure | None = None
+        self._step: ArmRequest | None = None
+        self._resume_at = -np.inf
+        self._stopped = True
+        self._stop_asked: float | None = None
+        self._polled = [-np.inf] * len(POLLS)
+        self._refusals = 0
+        self._has_sensors = variant.has_gripper
+        self._round_trip = 0.0
+        self._measured_stop: MeasuredStop | None = None
+        self._was_connected = False
+
+    @property
+    def wants_link(self) -> bool:
+        """True if there is to be a connection."""
+        return self.mode is not ArmMode.DISCONNECTED
+
+    @property
+    def moves(self) -> bool:
+        """True while a motion is in progress, or a stop waits or is performed."""
+        return self.mode is ArmMode.MOVING or self._stop_asked is not None
+
+    @property
+    def version(self) -> tuple[object, ...]:
+        """Value that differs if the answer may differ."""
+        arm = self.arm
+        return self.mode, self.note, arm.t, arm.states_t, arm.sensors, self._measured_stop
+
+    # Events.
+
+    def connected(self, address: str) -> None:
+        """Begin to identify the arm at ``address`` on a new connection."""
+        again = " again" if self._was_connected else ""
+        self.mode, self.note = ArmMode.CONNECTED, f"Connected{again} to {address}."
+        self._clear()
+        self._was_connected = True
+        self._has_sensors = self._variant.has_gripper
+        self._procedure = identify(self.arm, self._variant, self.note)
+        self._resume_at = -np.inf
+
+    def lost(self, problem: str) -> None:
+        """Note that the connection is lost, or that an attempt to connect failed."""
+        if self.mode is not ArmMode.DISCONNECTED:
+            self.mode = ArmMode.LOST
+            danger = " The arm may still move." if self._was_connected else ""
+            self.note = f"{problem}{danger} Trying to connect again."
+        self._clear()
+
+    def perform(self, act: ArmAct) -> None:
+        """Begin ``act`` as soon as possible; drop one that is impossible in the present mode."""
+        if act not in self.mode.acts:
+            return
+        if act is ArmAct.CONNECT:
+            self.mode, self.note = ArmMode.LOST, "Connecting to the arm."
+        elif act is ArmAct.DISCONNECT:
+            self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
+            self._was_connected = False
+            self._clear()
+        else:
+            self._acts.append(act)
+
+    def steer(self, joints: FloatArray, t: float, *, stopped: bool) -> None:
+        """Take a setpoint (6,) [rad] of time ``t`` [s], or the order to stop the arm."""
+        encoders = np.clip(
+            self._encoders.encoders(joints), self._encoders.lower, self._encoders.upper
+        )
+        if stopped:
+            if not self._stopped:
+                self._stop_asked = t
+            self._motion.ignore(encoders)
+        elif self.mode.follows and self._procedure is None:
+            problem = self._motion.follow(encoders, t)
+            if problem:
+                self._halt(t, problem)
+        self._stopped = stopped
+
+    def freeze(self, now: float) -> None:
+        """Stop an arm that moves, as at the end of the program."""
+        self._stopped, self._stop_asked = True, now
+
+    def replied(self, request: ArmRequest, reply: ArmReply, sent: float, now: float) -> None:
+        """Take the reply to ``request``, which was sent at ``sent`` [s] and came at ``now`` [s]."""
+        middle = 0.5 * (sent + now)
+        self._round_trip = now - sent
+        self.arm.note(reply, middle)
+        self._refusals = 0
+        if self._procedure is not None:
+            self._advance(now)
+        elif isinstance(request, SendSplines | CommandMotor):
+            self._motion.sent(request, middle)
+            self.mode = ArmMode.MOVING
+        elif isinstance(reply, AxisStates):
+            self._supervise(now)
+
+    def refused(self, request: ArmRequest, error: FirmwareError, now: float) -> None:
+        """Take the refusal of ``request``."""
+        self.arm.newest_reply = now
+        if self._procedure is not None:
+            self._advance(now, ArmRefusalError(error))
+        elif isinstance(request, ReadSensors):
+            self._has_sensors = False
+        elif isinstance(request, SendSplines | CommandMotor):
+            self._halt(now, error.sentence)
+        else:
+            self._refusals += 1
+            if self._refusals > MAX_REFUSALS and self.mode.follows:
+                self._halt(now, error.sentence)
+
+    # Requests.
+
+    def urgent(self, now: float) -> ArmRequest | None:
+        """Return the request that cannot wait at ``now`` [s], or None."""
+        if self._procedure is None:
+            self._begin(now)
+        if self._procedure is not None:
+            if self._step is None and now >= self._resume_at:
+                self._advance(now)
+            step, self._step = self._step, None
+            return step
+        if not self.mode.follows or self._stopped:
+            return None
+        return self._motion.next_request(now)
+
+    def poll(self, now: float) -> ArmRequest | None:
+        """Return the measurement that is due most at ``now`` [s], or None."""
+        if self._procedure is not None:
+            return None
+        count = len(POLLS) if self._has_sensors else len(POLLS) - 1
+        overdue = [(now - self._polled[i]) / POLLS[i][1] for i in range(count)]
+        most = int(np.argmax(overdue))
+        if overdue[most] < 1.0:
+            return None
+        self._polled[most] = now
+        return POLLS[most][0]
+
+    def answer(self) -> DriverAnswer:
+        """Return what the driver reports."""
+        t = self.arm.t
+        q = self._joints
+        speeds = np.zeros(len(q))
+        if np.isfinite(t):
+            q = self._within(self._encoders.joints(self.arm.positions))
+            speeds = self.arm.speeds * self._encoders.scale
+        expected = q
+        if self.mode.follows:
+            expected = self._within(self._encoders.joints(self._motion.expected_at(t)))
+        report = ArmReport(
+            self.mode,
+            t if np.isfinite(t) else 0.0,
+            expected,
+            frozen(speeds),
+            self.note,
+            self._round_trip,
+            tuple(map(float, self.arm.sensors)),
+            self._measured_stop,
+        )
+        return DriverAnswer(frozen(q[:FINGER]), float(q[FINGER]), report)
+
+    def _within(self, q: FloatArray) -> FloatArray:
+        """Return ``q`` (6,) with joints that are beyond their limits by noise at the limits."""
+        limited = np.clip(q, *self._bounds)
+        return frozen(np.where(np.abs(limited - q) < NOISE, limited, q))
+
+    # Transitions.
+
+    def _clear(self) -> None:
+        """Drop all that was to be sent: nothing of it may happen on another connection."""
+        if self._procedure is not None:
+            self._procedure.close()
+        self._procedure = self._step = self._stop_asked = None
+        self._motion.clear()
+        self._acts.clear()
+        self._polled = [-np.inf] * len(POLLS)
+
+    def _begin(self, now: float) -> None:
+        """Begin the stop or the act that waits."""
+        if self._stop_asked is not None:
+            asked, self._stop_asked = self._stop_asked, None
+            if self.mode.follows and self._motion.moves(now):
+                self._halt(asked)
+            return
+        while self._acts and self._procedure is None:
+            act = self._acts.popleft()
+            if act not in self.mode.acts:
+                continue
+            self._measured_stop = None
+            match act:
+                case ArmAct.CALIBRATE:
+                    self.mode, self.note = ArmMode.CALIBRATING, "The arm moves to its stops."
+                    self._start(calibrate(self.arm, self._variant), now)
+                case ArmAct.RELEASE:
+                    self._start(release(self.arm, self._variant), now)
+                case _:
+                    self._start(hold(self.arm, self._variant), now)
+
+    def _start(self, procedure: Procedure, now: float) -> None:
+        self._procedure, self._step, self._resume_at = procedure, None, now
+
+    def _halt(self, asked: float, cause: str = "") -> None:
+        """Begin to stop the arm, which counts as moving until it rests."""
+        self.mode = ArmMode.MOVING
+        if cause:
+            self.note = cause
+        axes = self._variant.driven
+        if not self._motion.finger_moves(asked):
+            # Fingers at rest keep their order, and so what they hold.
+            axes = self._motion.axes
+        self._start(halt(self.arm, axes, self._encoders, asked, cause), asked)
+
+    def _advance(self, now: float, error: ArmRefusalError | None = None) -> None:
+        """Continue the procedure up to its next request or pause, or end it."""
+        assert self._procedure is not None
+        try:
+            step = next(self._procedure) if error is None else self._procedure.throw(error)
+        except StopIteration as done:
+            self._finish(done.value)
+        except ArmRefusalError as refusal:
+            self._finish(ProcedureEnd(ArmMode.FAULT, str(refusal)))
+        else:
+            self._step = step if isinstance(step, ArmRequest) else None
+            self._resume_at = now if isinstance(step, ArmRequest) else now + step
+
+    def _finish(self, end: ProcedureEnd) -> None:
+        self._procedure = self._step = None
+        self._motion.clear()
+        self.mode, self.note = end.mode, end.note
+        if end.measured_stop is not None:
+            self._measured_stop = end.measured_stop
+
+    def _supervise(self, now: float) -> None:
+        """Compare the newest states with the mode."""
+        if not self.mode.follows:
+            return
+        bad = self.arm.axes_in(AxisStatus.COLLIDED, AxisStatus.OFF, AxisStatus.DATA_INVALID)
+        wrong = [axis for axis in self._motion.axes if axis in bad]
+        problem = self.arm.words(wrong[0]) if wrong else self._motion.settle(now)
+        if problem:
+            self._halt(now, problem)
+        else:
+            self.mode = ArmMode.MOVING if self._motion.moves(now) else ArmMode.HOLDING

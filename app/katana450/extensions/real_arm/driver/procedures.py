@@ -1,0 +1,253 @@
+"""Sequences of requests: each is a generator that yields requests and pauses, and ends in a mode.
+
+A reply is in ``ArmReadings`` when its generator continues. A refusal is raised in it as
+ArmRefusalError. Nothing here knows a connection, a clock or a thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from katana450.arm.control.arm_report import ArmMode, MeasuredStop
+from katana450.extensions.real_arm.codec.axis_status import AT_REST, IN_MOTION, AxisStatus
+from katana450.extensions.real_arm.codec.replies import AXES
+from katana450.extensions.real_arm.codec.requests import (
+    ALL_AXES,
+    ArmRequest,
+    CommandMotor,
+    MotorFlag,
+    ReadArmIdentity,
+    ReadAxis,
+    ReadMasterVersion,
+    ReadPositions,
+    ReadSlaveVersion,
+    ReadStates,
+    SetAxisParameter,
+    SetCollisionDetection,
+)
+from katana450.extensions.real_arm.driver.readings import ArmReadings, collision_sentence
+from katana450.extensions.real_arm.encoders import EncoderMap
+from katana450.extensions.real_arm.link.transport import ArmRefusalError
+from katana450.extensions.real_arm.variants import MAX_SPEED, Variant
+
+CALIBRATION_VALUE = 32_000
+"""Value that the order to calibrate carries."""
+
+CALIBRATION_TIMEOUT = 120.0
+"""[s] Maximum time of a calibration, which takes about 30 s."""
+
+CALIBRATION_PAUSE = 0.1
+"""[s] Time between two questions during a calibration."""
+
+SPEED_LIMIT, ACCELERATION_LIMIT = 3, 4
+"""Parameters of an axis."""
+
+FINGER_ACCELERATION = 2
+"""[encoders per tick^2] The higher of the two accelerations that the firmware knows."""
+
+READY_TRIES, READY_PAUSE = 10, 0.1
+"""Questions whether the motors hold the arm, and the time between two of them [s]."""
+
+FRESH = 0.1
+"""[s] Age of positions up to which an axis is frozen at them."""
+
+STILL = 2
+"""[encoders] Maximum difference between two positions of an arm at rest."""
+
+REST_PAUSE = 0.02
+"""[s] Time between two positions of an arm that comes to rest."""
+
+REST_TIMEOUT = 3.0
+"""[s] Time after which an arm that still moves does not obey."""
+
+
+@dataclass(frozen=True)
+class ProcedureEnd:
+    """End of a procedure.
+
+    Attributes:
+        mode: Mode of the arm after it.
+        note: Sentence for people; empty if there is nothing to say.
+        measured_stop: The stop that the procedure performed, if it did.
+    """
+
+    mode: ArmMode
+    note: str = ""
+    measured_stop: MeasuredStop | None = None
+
+
+Procedure = Generator[ArmRequest | float, None, ProcedureEnd]
+"""Yields requests, and pauses [s]."""
+
+_Part = Generator[ArmRequest | float, None, None]
+
+
+def identify(arm: ArmReadings, variant: Variant, found: str) -> Procedure:
+    """Read what the arm is and where it is. An arm that moves is stopped.
+
+    found: Sentence with which the note begins.
+    """
+    yield ReadMasterVersion()
+    yield ReadArmIdentity()
+    for axis in variant.driven:
+        yield ReadSlaveVersion(axis)
+    yield ReadPositions()
+    yield ReadStates()
+    arm.held = arm.positions
+    moving = arm.axes_in(*IN_MOTION)
+    if moving:
+        yield from _flush()
+        yield from _freeze(arm, moving)
+        found += " The arm moved and was stopped."
+    if arm.axes_in(AxisStatus.CALIBRATING):
+        found += " The arm is calibrating: wait until it has ended."
+    if arm.collided:
+        found += f" {collision_sentence(arm.collided)}"
+    return ProcedureEnd(
+        ArmMode.UNCALIBRATED,
+        f"{found} Firmware {arm.version}. If the arm was calibrated since it was switched on, "
+        "engage it; otherwise calibrate it.",
+    )
+
+
+def hold(arm: ArmReadings, variant: Variant) -> Procedure:
+    """Let the motors hold the arm where it is, also after a collision or an error."""
+    yield from _flush()
+    yield ReadPositions()
+    yield from _freeze(arm, variant.driven)
+    return (yield from _ready(arm, variant))
+
+
+def calibrate(arm: ArmReadings, variant: Variant) -> Procedure:
+    """Let the arm move to its stops and find its encoders, without detection of collisions."""
+    yield SetCollisionDetection(0)
+    try:
+        yield from _flush()
+        yield CommandMotor(ALL_AXES, MotorFlag.CALIBRATE, CALIBRATION_VALUE)
+    except ArmRefusalError:
+        yield SetCollisionDetection(1)
+        raise
+    return (yield from _calibrated(arm, variant))
+
+
+def _calibrated(arm: ArmReadings, variant: Variant) -> Procedure:
+    """Wait for the end of a calibration. Only single axes are asked for, as is known to work."""
+    begun = arm.newest_reply
+    while arm.newest_reply - begun < CALIBRATION_TIMEOUT:
+        yield CALIBRATION_PAUSE
+        for axis in reversed(variant.driven):
+            # The first axis is known to answer meanwhile, and ends last.
+            with suppress(*(ArmRefusalError,) * (axis != 1)):
+                yield ReadAxis(axis)
+        if not arm.axes_in(AxisStatus.CALIBRATING):
+            yield ReadPositions()
+            arm.held = arm.positions
+            return (yield from _ready(arm, variant))
+    return ProcedureEnd(ArmMode.FAULT, "The calibration did not end. Switch the arm off.")
+
+
+def release(arm: ArmReadings, variant: Variant) -> Procedure:
+    """Switch all motors off."""
+    yield from _flush()
+    yield ReadPositions()
+    for axis in variant.driven:
+        yield CommandMotor(axis, MotorFlag.OFF, int(arm.positions[axis - 1]))
+    yield ReadStates()
+    return ProcedureEnd(ArmMode.UNCALIBRATED, "Motors off: the arm is not held.")
+
+
+def halt(
+    arm: ArmReadings, axes: tuple[int, ...], encoders: EncoderMap, begun: float, cause: str = ""
+) -> Procedure:
+    """Stop the arm as fast as its protocol allows, and measure the stop.
+
+    The buffer of polynomials is emptied, then each axis is frozen where it is, the fastest first.
+    Refusals do not end this before each axis was tried.
+
+    Args:
+        arm: Readings.
+        axes: Axes to freeze, from 1.
+        encoders: Conversion to joints.
+        begun: Time of the request to stop [s].
+        cause: Sentence on the fault that the stop follows; empty for a request of a person.
+    """
+    origin = arm.position_at(begun)
+    refusal = ""
+    try:
+        yield from _flush()
+    except ArmRefusalError as error:
+        refusal = str(error)
+    if cause:
+        with suppress(ArmRefusalError):
+            yield ReadStates()
+    yield ReadPositions()
+    speeds = np.abs(arm.speeds * encoders.scale)
+    order = sorted(axes, key=lambda axis: -speeds[axis - 1])
+    for axis in order:
+        # To freeze an axis clears its collision, which is the act of a person.
+        if axis not in arm.collided:
+            try:
+                yield from _freeze(arm, (axis,))
+            except ArmRefusalError as error:
+                refusal = refusal or str(error)
+    resting = yield from _rest(arm, begun)
+    yield ReadStates()
+    moved = np.abs((arm.positions - origin) * encoders.scale)[: AXES - 1]
+    stop = None if resting is None else MeasuredStop(resting - begun, float(moved.max()))
+    collided = tuple(axis for axis in arm.collided if axis < AXES)
+    if collided:
+        return ProcedureEnd(ArmMode.COLLIDED, collision_sentence(collided), stop)
+    if resting is None:
+        refusal = "The arm still moves after it was frozen. Use its switch."
+    if cause or refusal:
+        return ProcedureEnd(ArmMode.FAULT, refusal if resting is None else cause or refusal, stop)
+    return ProcedureEnd(ArmMode.HOLDING, "", stop)
+
+
+def _rest(arm: ArmReadings, begun: float) -> Generator[ArmRequest | float, None, float | None]:
+    """Return the time at which the arm was first seen at rest [s]; None if it continues to move."""
+    while arm.t - begun < REST_TIMEOUT:
+        seen, before = arm.t, arm.positions
+        yield REST_PAUSE
+        yield ReadPositions()
+        if np.abs(arm.positions - before).max() <= STILL:
+            return seen
+    return None
+
+
+def _flush() -> _Part:
+    yield CommandMotor(ALL_AXES, MotorFlag.FLUSH, 0)
+
+
+def _freeze(arm: ArmReadings, axes: Iterable[int]) -> _Part:
+    """Freeze each axis where it was measured, which is measured again if it takes long."""
+    for axis in axes:
+        if arm.newest_reply - arm.t > FRESH:
+            yield ReadPositions()
+        position = int(arm.positions[axis - 1])
+        yield CommandMotor(axis, MotorFlag.FREEZE, position)
+        held = arm.held.copy()
+        held[axis - 1] = position
+        arm.held = held
+
+
+def _ready(arm: ArmReadings, variant: Variant) -> Procedure:
+    """Switch collision detection on, and check that all axes hold."""
+    yield SetCollisionDetection(1)
+    if variant.has_gripper:
+        finger = len(variant.axes)
+        with suppress(ArmRefusalError):
+            yield SetAxisParameter(finger, SPEED_LIMIT, MAX_SPEED, MAX_SPEED)
+            yield SetAxisParameter(finger, ACCELERATION_LIMIT, FINGER_ACCELERATION, 0)
+    for _ in range(READY_TRIES):
+        yield ReadStates()
+        wrong = [axis for axis in variant.driven if axis not in arm.axes_in(*AT_REST)]
+        if not wrong:
+            return ProcedureEnd(ArmMode.HOLDING)
+        yield READY_PAUSE
+    words = " ".join(arm.words(axis) for axis in wrong)
+    return ProcedureEnd(ArmMode.FAULT, f"The motors do not hold the arm. {words}")

@@ -1,0 +1,132 @@
+"""One motion of the arm: setpoints in, packets of polynomials out, and where the arm should be."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from katana450.extensions.real_arm.codec.requests import More, SendSplines
+from katana450.extensions.real_arm.splines import (
+    SEGMENT_TICKS,
+    SEGMENT_TIME,
+    TICK,
+    SplineSegment,
+    SplineStream,
+    joined,
+)
+from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+AHEAD = 4
+"""Segments that wait in the arm when the motion starts, and at most later."""
+
+LINGER = 0.4
+"""[s] Time of rest after which a motion ends. A new one must wait until the arm has ended it."""
+
+LATEST = 0.6 * SEGMENT_TIME
+"""[s] Motion left in the arm below which a segment without a successor is braked."""
+
+KEPT_TIME = 2.0
+"""[s] Past of the motion that is kept for late measurements."""
+
+
+class SplineMotion:
+    """A motion from rest to rest.
+
+    Attributes:
+        is_late: Whether the setpoints came too late, so that the motion was ended by a brake.
+    """
+
+    def __init__(self, start: IntArray, speed: FloatArray) -> None:
+        """Create a motion from rest at ``start`` (6,) [encoders].
+
+        speed: (6,) maximum of each axis [encoders per tick].
+        """
+        self._stream = SplineStream(start, speed)
+        self._ready: deque[tuple[SplineSegment, bool]] = deque()
+        self._sent: deque[SplineSegment] = deque()
+        self._dropped = 0
+        self._started: float | None = None
+        self._is_closed = False
+        self._has_sent_last = False
+        self._start = start.astype(float)
+        self.is_late = False
+
+    @property
+    def takes_setpoints(self) -> bool:
+        """True until the motion has its last segment."""
+        return not self._is_closed
+
+    @property
+    def target(self) -> IntArray:
+        """End of the newest segment, (6,) [encoders]."""
+        return self._stream.joint.position
+
+    def add(self, t: float, encoders: FloatArray) -> None:
+        """Add the setpoint (6,) [encoders] at ``t`` [s]."""
+        if self._is_closed:
+            return
+        self._stream.add(t, encoders)
+        while not self._is_closed and (segment := self._stream.cut()) is not None:
+            is_still = segment.start.is_at_rest and not segment.travel.any()
+            self._is_closed = is_still and self._stream.still_for() >= LINGER
+            self._ready.append((segment, self._is_closed))
+
+    def next_packet(self, now: float) -> SendSplines | None:
+        """Return the packet to send at ``now`` [s], or None. ``sent`` must follow."""
+        if not self._ready:
+            self._brake(now)
+        if not self._ready or (self._started is not None and self._left(now) > self._room):
+            return None
+        segment, is_last = self._ready[0]
+        if is_last:
+            more = More.LAST
+        elif self._started is None and len(self._sent) < AHEAD - 1:
+            more = More.STORE
+        else:
+            more = More.START
+        return SendSplines(segment.axes(), more)
+
+    def sent(self, packet: SendSplines, t: float) -> None:
+        """Note that the arm confirmed ``packet``, the one that was returned last, at ``t`` [s]."""
+        segment, self._has_sent_last = self._ready.popleft()
+        self._sent.append(segment)
+        if self._started is None and packet.more != More.STORE:
+            self._started = t
+        while self._started is not None and len(self._sent) > KEPT_TIME / SEGMENT_TIME:
+            self._sent.popleft()
+            self._dropped += 1
+
+    def position_at(self, t: float) -> FloatArray:
+        """Return the positions (6,) [encoders] where the arm should be at ``t`` [s]."""
+        tick = 0.0 if self._started is None else (t - self._started) / TICK
+        if tick <= 0.0 or not self._sent:
+            return self._start
+        index, rest = divmod(tick, SEGMENT_TICKS)
+        place = max(int(index) - self._dropped, 0)
+        if place >= len(self._sent):
+            return self._sent[-1].end.position.astype(float)
+        return self._sent[place].at(rest)
+
+    def has_ended(self, now: float) -> bool:
+        """Return whether the arm has played the whole motion at ``now`` [s]."""
+        return self._started is not None and self._has_sent_last and self._left(now) < 0.0
+
+    @property
+    def _room(self) -> float:
+        return (AHEAD - 1) * SEGMENT_TIME
+
+    def _left(self, now: float) -> float:
+        """Return the time of motion that waits in the arm [s]."""
+        assert self._started is not None
+        return (self._dropped + len(self._sent)) * SEGMENT_TIME - (now - self._started)
+
+    def _brake(self, now: float) -> None:
+        """End a motion whose setpoints are late by a segment to rest, before the arm runs dry."""
+        if self._started is None or self._has_sent_last or self._left(now) > LATEST:
+            return
+        joint = self._sent[-1].end
+        self.is_late = not joint.is_at_rest
+        rest = joint.position + joint.speed / (2 * 64) * SEGMENT_TICKS
+        self._ready.append((joined(joint, rest, np.zeros(len(rest))), True))
+        self._is_closed = True

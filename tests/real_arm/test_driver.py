@@ -1,0 +1,263 @@
+"""The driver with its thread and a real connection: prompt calls, faults, no repeated motion."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmMode, ArmReport
+from katana450.arm.drivers.driver import Driver, DriverAnswer
+from katana450.errors import InputError
+from katana450.extensions.real_arm.codec import replies, requests
+from katana450.extensions.real_arm.codec.firmware_codec import refusal_bytes, reply_bytes
+from katana450.extensions.real_arm.codec.replies import FirmwareError
+from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
+from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from katana450.extensions.real_arm.link.transport import LinkLostError
+from katana450.maths.geometry.arrays import FloatArray
+from tests.real_arm.paper_arm import ENDS, HOME, JOINTS, PaperArm
+from tests.real_arm.small_firmware import Piece, SmallFirmware
+
+Setpoint = Callable[[float], FloatArray]
+
+
+class Loop:
+    """A control loop at 100 Hz in a thread of its own, which measures the calls of the driver."""
+
+    def __init__(self, driver: Driver) -> None:
+        self.driver = driver
+        self.setpoint: Setpoint = lambda _: JOINTS
+        self.stopped = True
+        self.answers: list[tuple[float, DriverAnswer]] = []
+        self.longest = 0.0
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        driver.start(time.perf_counter())
+        self._thread.start()
+
+    def _run(self) -> None:
+        due = time.perf_counter()
+        while not self._ending.is_set():
+            t = time.perf_counter()
+            joints = self.setpoint(t)
+            answer = self.driver.send(joints[:5], float(joints[5]), t, self.stopped)
+            self.longest = max(self.longest, time.perf_counter() - t)
+            self.answers.append((t, answer))
+            due = max(due + 0.01, time.perf_counter())
+            time.sleep(max(due - time.perf_counter(), 0.0))
+
+    @property
+    def report(self) -> ArmReport:
+        report = self.answers[-1][1].report
+        assert report is not None
+        return report
+
+    def act(self, act: ArmAct, mode: ArmMode, seconds: float = 3.0) -> None:
+        self.driver.perform(act, time.perf_counter())
+        self.wait(mode, seconds)
+
+    def wait(self, mode: ArmMode, seconds: float = 3.0) -> float:
+        """Return the time until ``mode`` is reported [s]."""
+        begun = time.perf_counter()
+        while time.perf_counter() - begun < seconds:
+            if self.answers and self.report.mode is mode:
+                return time.perf_counter() - begun
+            time.sleep(0.002)
+        raise AssertionError(f"{self.report.mode} instead of {mode}: {self.report.note}")
+
+    def engage(self) -> None:
+        self.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
+        self.act(ArmAct.ENGAGE, ArmMode.HOLDING)
+        self.stopped = False
+
+    def end(self) -> None:
+        self._ending.set()
+        self._thread.join()
+        self.driver.stop()
+
+
+class PaperServer:
+    """The arm on paper behind a port. ``faults`` are the pieces of the next replies instead."""
+
+    def __init__(self) -> None:
+        self.arm = PaperArm()
+        self.delay = 0.0
+        self.faults: list[Sequence[Piece]] = []
+        self._refused: FirmwareError | None = None
+
+    def answer(self, request: requests.ArmRequest) -> Sequence[Piece]:
+        if isinstance(request, requests.ErrorQuery) and self._refused is not None:
+            return (reply_bytes(self._refused),)
+        reply = self.arm.answer(request, time.perf_counter())
+        if self.faults:
+            return self.faults.pop(0)
+        if isinstance(reply, FirmwareError):
+            self._refused = reply
+            return (refusal_bytes(),)
+        return (self.delay, reply_bytes(reply)) if self.delay else (reply_bytes(reply),)
+
+
+@contextmanager
+def served() -> Iterator[tuple[PaperServer, SmallFirmware, Loop]]:
+    paper = PaperServer()
+    with SmallFirmware(paper.answer) as firmware:
+        loop = Loop(KatanaDriver(ArmUrl("127.0.0.1", firmware.port), ENDS, JOINTS))
+        try:
+            yield paper, firmware, loop
+        finally:
+            loop.end()
+
+
+def swing(t0: float) -> Setpoint:
+    """Return a setpoint that begins at rest and does not end."""
+    directions = np.array([0.4, -0.3, 0.2, 0.4, 0.4, 0.0])
+    return lambda t: JOINTS + directions * (1.0 - np.cos(max(t - t0, 0.0)))
+
+
+def orders(arm: PaperArm) -> list[requests.ArmRequest]:
+    """Return all requests that move the arm, in their order."""
+    return [
+        request
+        for _, request in arm.requests
+        if isinstance(request, requests.SendSplines)
+        or (isinstance(request, requests.CommandMotor) and request.flag in (4, 24, 0))
+    ]
+
+
+def test_motion_is_followed_over_a_connection() -> None:
+    with served() as (paper, _, loop):
+        loop.engage()
+        loop.setpoint = swing(time.perf_counter())
+        time.sleep(1.5)
+        assert loop.report.mode is ArmMode.MOVING
+        loop.stopped = True
+        loop.wait(ArmMode.HOLDING)
+        stop = loop.report.measured_stop
+        assert stop is not None
+        assert stop.time < 0.3
+        moved = [
+            np.abs(answer.q - answer.report.expected[:5]).max()
+            for _, answer in loop.answers
+            if answer.report is not None and answer.report.mode.follows
+        ]
+        assert max(moved[:-60]) < 0.03
+        assert not paper.arm.starved
+        assert 0.0 < loop.report.round_trip < 0.1
+
+
+@pytest.mark.parametrize("fault", ["silence", "reset", "garbage", "half"])
+def test_loss_is_reported_in_half_a_second_and_nothing_is_repeated(fault: str) -> None:
+    pieces: dict[str, Sequence[Piece]] = {
+        "silence": (1.0,), "reset": (None,), "garbage": (b"\x6e" * 20,), "half": (b"\x6e\x01",),
+    }  # fmt: skip
+    with served() as (paper, firmware, loop):
+        loop.engage()
+        loop.setpoint = swing(time.perf_counter())
+        time.sleep(1.0)
+        paper.faults = [pieces[fault]]
+        assert loop.wait(ArmMode.LOST) < 0.5
+        assert "Trying to connect again" in loop.report.note
+        sent = orders(paper.arm)
+        loop.wait(ArmMode.UNCALIBRATED)
+        assert "Connected again" in loop.report.note
+        time.sleep(0.5)
+        assert orders(paper.arm) == sent
+        assert firmware.connections >= 2
+        loop.stopped = True
+        held = loop.answers[-1][1]
+        loop.setpoint = lambda _: np.array([*held.q, held.gripper])
+        time.sleep(0.05)
+        loop.act(ArmAct.ENGAGE, ArmMode.HOLDING)
+        assert orders(paper.arm) == sent
+
+
+def test_arm_that_hangs_never_delays_the_loop() -> None:
+    with served() as (paper, _, loop):
+        loop.engage()
+        loop.setpoint = swing(time.perf_counter())
+        time.sleep(0.3)
+        paper.faults = [(5.0,)]
+        loop.longest = 0.0
+        loop.wait(ArmMode.LOST)
+        time.sleep(0.5)
+        # The arm's port does not accept another connection meanwhile.
+        assert loop.report.mode is ArmMode.LOST
+        assert loop.longest < 0.03
+
+
+def test_thread_that_hangs_is_reported_by_send() -> None:
+    with served() as (_, _, loop):
+        loop.engage()
+        driver = loop.driver
+        assert isinstance(driver, KatanaDriver)
+        future = driver.ask(requests.ReadInputs())
+        # A callback runs in the thread of the driver.
+        future.add_done_callback(lambda _: time.sleep(1.2))
+        assert 0.4 < loop.wait(ArmMode.LOST) < 0.9
+        assert "has not heard" in loop.report.note
+        loop.wait(ArmMode.HOLDING)
+
+
+def test_no_arm_at_the_address_is_reported_and_tried_again() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    loop = Loop(KatanaDriver(ArmUrl("127.0.0.1", port), ENDS, JOINTS))
+    try:
+        assert loop.report.mode is ArmMode.DISCONNECTED
+        loop.act(ArmAct.CONNECT, ArmMode.LOST)
+        time.sleep(0.1)
+        assert f"no connection to an arm at 127.0.0.1, port {port}" in loop.report.note
+        paper = PaperServer()
+        with SmallFirmware(paper.answer, port):
+            loop.wait(ArmMode.UNCALIBRATED)
+            loop.act(ArmAct.DISCONNECT, ArmMode.DISCONNECTED)
+    finally:
+        loop.end()
+
+
+def test_end_of_the_program_stops_a_moving_arm() -> None:
+    with served() as (paper, _, loop):
+        loop.engage()
+        loop.setpoint = swing(time.perf_counter())
+        time.sleep(1.0)
+        assert loop.report.mode is ArmMode.MOVING
+        loop.driver.stop()
+        flags = [r.flag for _, r in paper.arm.requests if isinstance(r, requests.CommandMotor)]
+        assert flags[-6:] == [32, 8, 8, 8, 8, 8]
+
+
+def test_inputs_and_outputs_are_asked_for_beside_the_motion() -> None:
+    with served() as (_, _, loop):
+        driver = loop.driver
+        assert isinstance(driver, KatanaDriver)
+        loop.engage()
+        assert driver.ask(requests.ReadInputs()).result(1.0) == replies.DigitalBits(1)
+        assert driver.ask(requests.WriteOutputs(6)).result(1.0) == replies.DigitalBits(1)
+        with pytest.raises(InputError, match="reserved for the driver"):
+            driver.ask(requests.CommandMotor(1, 24, 0))
+        loop.stopped = True
+        loop.act(ArmAct.DISCONNECT, ArmMode.DISCONNECTED)
+        with pytest.raises(LinkLostError):
+            driver.ask(requests.ReadInputs()).result(1.0)
+
+
+def test_setpoint_that_is_not_finite_is_refused() -> None:
+    driver = KatanaDriver(ArmUrl("127.0.0.1", 1), ENDS, JOINTS)
+    with pytest.raises(InputError, match="must be finite"):
+        driver.send(np.full(5, np.nan), 0.0, 0.0)
+    driver.stop()
+
+
+def test_measured_joints_are_those_of_the_arm() -> None:
+    with served() as (paper, _, loop):
+        loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
+        time.sleep(0.2)
+        assert np.abs(loop.answers[-1][1].q - JOINTS[:5]).max() < 1e-9
+        assert (paper.arm.place == HOME).all()
