@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import socket
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
 from katana450.arm.control.arm_commands import ArmAct
-from katana450.arm.control.arm_report import ArmMode, ArmReport
-from katana450.arm.drivers.driver import Driver, DriverAnswer
+from katana450.arm.control.arm_report import ArmMode
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import replies, requests
 from katana450.extensions.real_arm.codec.firmware_codec import refusal_bytes, reply_bytes
@@ -21,66 +19,9 @@ from katana450.extensions.real_arm.codec.replies import FirmwareError
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from katana450.extensions.real_arm.link.transport import LinkLostError
-from katana450.maths.geometry.arrays import FloatArray
+from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.paper_arm import ENDS, HOME, JOINTS, PaperArm
 from tests.real_arm.small_firmware import Piece, SmallFirmware
-
-Setpoint = Callable[[float], FloatArray]
-
-
-class Loop:
-    """A control loop at 100 Hz in a thread of its own, which measures the calls of the driver."""
-
-    def __init__(self, driver: Driver) -> None:
-        self.driver = driver
-        self.setpoint: Setpoint = lambda _: JOINTS
-        self.stopped = True
-        self.answers: list[tuple[float, DriverAnswer]] = []
-        self.longest = 0.0
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        driver.start(time.perf_counter())
-        self._thread.start()
-
-    def _run(self) -> None:
-        due = time.perf_counter()
-        while not self._ending.is_set():
-            t = time.perf_counter()
-            joints = self.setpoint(t)
-            answer = self.driver.send(joints[:5], float(joints[5]), t, self.stopped)
-            self.longest = max(self.longest, time.perf_counter() - t)
-            self.answers.append((t, answer))
-            due = max(due + 0.01, time.perf_counter())
-            time.sleep(max(due - time.perf_counter(), 0.0))
-
-    @property
-    def report(self) -> ArmReport:
-        report = self.answers[-1][1].report
-        assert report is not None
-        return report
-
-    def act(self, act: ArmAct, mode: ArmMode, seconds: float = 3.0) -> None:
-        self.driver.perform(act, time.perf_counter())
-        self.wait(mode, seconds)
-
-    def wait(self, mode: ArmMode, seconds: float = 3.0) -> float:
-        """Return the time until ``mode`` is reported [s]."""
-        begun = time.perf_counter()
-        while time.perf_counter() - begun < seconds:
-            if self.answers and self.report.mode is mode:
-                return time.perf_counter() - begun
-            time.sleep(0.002)
-        raise AssertionError(f"{self.report.mode} instead of {mode}: {self.report.note}")
-
-    def engage(self) -> None:
-        self.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
-        self.act(ArmAct.ENGAGE, ArmMode.HOLDING)
-        self.stopped = False
-
-    def end(self) -> None:
-        self._ending.set()
-        self._thread.join()
-        self.driver.stop()
 
 
 class PaperServer:
@@ -105,20 +46,14 @@ class PaperServer:
 
 
 @contextmanager
-def served() -> Iterator[tuple[PaperServer, SmallFirmware, Loop]]:
+def served() -> Iterator[tuple[PaperServer, SmallFirmware, SmallLoop]]:
     paper = PaperServer()
     with SmallFirmware(paper.answer) as firmware:
-        loop = Loop(KatanaDriver(ArmUrl("127.0.0.1", firmware.port), ENDS, JOINTS))
+        loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", firmware.port), ENDS, JOINTS))
         try:
             yield paper, firmware, loop
         finally:
             loop.end()
-
-
-def swing(t0: float) -> Setpoint:
-    """Return a setpoint that begins at rest and does not end."""
-    directions = np.array([0.4, -0.3, 0.2, 0.4, 0.4, 0.0])
-    return lambda t: JOINTS + directions * (1.0 - np.cos(max(t - t0, 0.0)))
 
 
 def orders(arm: PaperArm) -> list[requests.ArmRequest]:
@@ -134,7 +69,8 @@ def orders(arm: PaperArm) -> list[requests.ArmRequest]:
 def test_motion_is_followed_over_a_connection() -> None:
     with served() as (paper, _, loop):
         loop.engage()
-        loop.setpoint = swing(time.perf_counter())
+        begun = time.perf_counter()
+        loop.setpoint = swing(JOINTS, begun)
         time.sleep(1.5)
         assert loop.report.mode is ArmMode.MOVING
         loop.stopped = True
@@ -142,12 +78,10 @@ def test_motion_is_followed_over_a_connection() -> None:
         stop = loop.report.measured_stop
         assert stop is not None
         assert stop.time < 0.3
-        moved = [
-            np.abs(answer.q - answer.report.expected[:5]).max()
-            for _, answer in loop.answers
-            if answer.report is not None and answer.report.mode.follows
+        errors = [
+            np.abs(q - report.expected[:5]).max() for _, report, q in loop.reports_since(begun)
         ]
-        assert max(moved[:-60]) < 0.03
+        assert max(errors[:100]) < 0.03
         assert not paper.arm.starved
         assert 0.0 < loop.report.round_trip < 0.1
 
@@ -159,7 +93,7 @@ def test_loss_is_reported_in_half_a_second_and_nothing_is_repeated(fault: str) -
     }  # fmt: skip
     with served() as (paper, firmware, loop):
         loop.engage()
-        loop.setpoint = swing(time.perf_counter())
+        loop.setpoint = swing(JOINTS, time.perf_counter())
         time.sleep(1.0)
         paper.faults = [pieces[fault]]
         assert loop.wait(ArmMode.LOST) < 0.5
@@ -171,23 +105,21 @@ def test_loss_is_reported_in_half_a_second_and_nothing_is_repeated(fault: str) -
         assert orders(paper.arm) == sent
         assert firmware.connections >= 2
         loop.stopped = True
-        held = loop.answers[-1][1]
-        loop.setpoint = lambda _: np.array([*held.q, held.gripper])
-        time.sleep(0.05)
-        loop.act(ArmAct.ENGAGE, ArmMode.HOLDING)
+        loop.engage()
+        time.sleep(0.1)
         assert orders(paper.arm) == sent
 
 
 def test_arm_that_hangs_never_delays_the_loop() -> None:
     with served() as (paper, _, loop):
         loop.engage()
-        loop.setpoint = swing(time.perf_counter())
+        loop.setpoint = swing(JOINTS, time.perf_counter())
         time.sleep(0.3)
         paper.faults = [(5.0,)]
         loop.longest = 0.0
         loop.wait(ArmMode.LOST)
         time.sleep(0.5)
-        # The arm's port does not accept another connection meanwhile.
+        # The system accepts another connection meanwhile, but no arm answers there.
         assert loop.report.mode is ArmMode.LOST
         assert loop.longest < 0.03
 
@@ -208,7 +140,7 @@ def test_thread_that_hangs_is_reported_by_send() -> None:
 def test_no_arm_at_the_address_is_reported_and_tried_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-    loop = Loop(KatanaDriver(ArmUrl("127.0.0.1", port), ENDS, JOINTS))
+    loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", port), ENDS, JOINTS))
     try:
         assert loop.report.mode is ArmMode.DISCONNECTED
         loop.act(ArmAct.CONNECT, ArmMode.LOST)
@@ -225,7 +157,7 @@ def test_no_arm_at_the_address_is_reported_and_tried_again() -> None:
 def test_end_of_the_program_stops_a_moving_arm() -> None:
     with served() as (paper, _, loop):
         loop.engage()
-        loop.setpoint = swing(time.perf_counter())
+        loop.setpoint = swing(JOINTS, time.perf_counter())
         time.sleep(1.0)
         assert loop.report.mode is ArmMode.MOVING
         loop.driver.stop()

@@ -87,17 +87,23 @@ class ArmMotion:
         motion.add(t, np.array([*encoders[:FINGER], motion.target[FINGER]]))
         return ""
 
-    def next_request(self, now: float) -> ArmRequest | None:
-        """Return the order to send at ``now`` [s], or None."""
-        packet = self._motions[0].next_packet(now) if self._motions else None
-        if packet is not None or not self._variant.has_gripper:
-            return packet
+    def next_packet(self, now: float) -> SendSplines | None:
+        """Return the polynomials to send at ``now`` [s], or None."""
+        return self._motions[0].next_packet(now) if self._motions else None
+
+    def can_wait(self, now: float) -> bool:
+        """Return whether the arm has polynomials for a while at ``now`` [s], or needs none."""
+        return not self._motions or self._motions[0].can_wait(now)
+
+    def finger_order(self) -> CommandMotor | None:
+        """Return the order to the gripper that waits, or None."""
+        if not self._variant.has_gripper:
+            return None
         if FINGER + 1 in self._arm.collided and self._arm.states_t > self._finger_freed:
             # An object between the fingers is no collision of the arm: they hold it.
-            self._finger_freed = now
             position = int(self._arm.positions[FINGER])
             return CommandMotor(FINGER + 1, MotorFlag.FREEZE, position)
-        return self._finger.next_order(now)
+        return self._finger.next_order()
 
     def sent(self, request: ArmRequest, t: float) -> None:
         """Note that the arm confirmed ``request``, an order of this motion, at ``t`` [s]."""
@@ -106,6 +112,8 @@ class ArmMotion:
         elif isinstance(request, CommandMotor):
             if request.flag == MotorFlag.MOVE:
                 self._finger.sent(request, int(self._arm.positions[FINGER]), t)
+            else:
+                self._finger_freed = t
             self._arm.held = np.array([*self._arm.held[:FINGER], request.value])
 
     def settle(self, now: float) -> str:

@@ -8,9 +8,6 @@ import numpy as np
 
 from katana450.extensions.real_arm.codec.requests import CommandMotor, MotorFlag
 
-INTERVAL = 0.1
-"""[s] Shortest time between two targets."""
-
 SMALLEST_STEP = 4
 """[encoders] Change of the setpoint that is worth a target."""
 
@@ -45,11 +42,11 @@ class FingerMotion:
             self.ignore(setpoint)
         self._setpoint = setpoint
 
-    def next_order(self, now: float) -> CommandMotor | None:
-        """Return the order to send at ``now`` [s], or None. ``sent`` must follow."""
+    def next_order(self) -> CommandMotor | None:
+        """Return the order that the setpoint requires, or None. ``sent`` must follow."""
         if self._setpoint is None or self._given is None:
             return None
-        if abs(self._setpoint - self._given) < SMALLEST_STEP or now - self._ordered_at < INTERVAL:
+        if abs(self._setpoint - self._given) < SMALLEST_STEP:
             return None
         return CommandMotor(self._axis, MotorFlag.MOVE, round(self._setpoint))
 

@@ -22,6 +22,7 @@ from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.replies import ArmReply
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 from katana450.extensions.real_arm.driver.machine import ArmMachine
+from katana450.extensions.real_arm.encoders import EncoderMap
 from katana450.extensions.real_arm.link.arm_link import ArmLink
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from katana450.extensions.real_arm.link.transport import ArmRefusalError, LinkLostError
@@ -45,6 +46,8 @@ END_TIMEOUT = 1.5
 
 MAX_SETPOINTS = 1000
 """Setpoints that wait for a thread that hangs, at most."""
+
+JOINTS = 5
 
 SAFE_REQUESTS = (
     requests.EchoRequest,
@@ -86,7 +89,10 @@ class KatanaDriver:
             joints: (6,) values of them that are reported before the first measurement [rad].
             variant: The arm.
             clock: Clock of the control loop.
+
+        Raises ConfigurationError if the limits of the joints are not those of the arm.
         """
+        EncoderMap(variant).check_limits(*bounds[:, :JOINTS])
         self._url = url
         self._clock = clock
         self._machine = ArmMachine(variant, bounds, joints)

@@ -38,8 +38,15 @@ from katana450.extensions.real_arm.link.transport import ArmRefusalError
 from katana450.extensions.real_arm.variants import Variant
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
-POLLS = ((ReadPositions(), 0.05), (ReadStates(), 0.1), (ReadSensors(), 0.25))
+POLLS = ((ReadPositions(), 0.04), (ReadStates(), 0.1), (ReadSensors(), 0.25))
 """Measurements, and the time between two of each [s] if the arm answers fast enough."""
+
+OLD = 0.2
+"""[s] Age of positions from which on they are measured before polynomials are sent. The session
+stops an arm whose measurement is older than 0.5 s."""
+
+FINGER_PERIOD = 0.1
+"""[s] The same for targets of the gripper."""
 
 NOISE = np.radians(0.5)
 """[rad] Distance beyond a limit that calibration and play leave possible."""
@@ -79,7 +86,7 @@ class ArmMachine:
         self._resume_at = -np.inf
         self._stopped = True
         self._stop_asked: float | None = None
-        self._polled = [-np.inf] * len(POLLS)
+        self._polled: dict[type[ArmRequest], float] = {}
         self._refusals = 0
         self._has_sensors = variant.has_gripper
         self._round_trip = 0.0
@@ -107,11 +114,10 @@ class ArmMachine:
     def connected(self, address: str) -> None:
         """Begin to identify the arm at ``address`` on a new connection."""
         again = " again" if self._was_connected else ""
-        self.mode, self.note = ArmMode.CONNECTED, f"Connected{again} to {address}."
         self._clear()
-        self._was_connected = True
         self._has_sensors = self._variant.has_gripper
-        self._procedure = identify(self.arm, self._variant, self.note)
+        found = f"Connected{again} to {address}."
+        self._procedure = identify(self.arm, self._variant, found)
         self._resume_at = -np.inf
 
     def lost(self, problem: str) -> None:
@@ -160,6 +166,7 @@ class ArmMachine:
         self._round_trip = now - sent
         self.arm.note(reply, middle)
         self._refusals = 0
+        self._note_answer()
         if self._procedure is not None:
             self._advance(now)
         elif isinstance(request, SendSplines | CommandMotor):
@@ -171,6 +178,7 @@ class ArmMachine:
     def refused(self, request: ArmRequest, error: FirmwareError, now: float) -> None:
         """Take the refusal of ``request``."""
         self.arm.newest_reply = now
+        self._note_answer()
         if self._procedure is not None:
             self._advance(now, ArmRefusalError(error))
         elif isinstance(request, ReadSensors):
@@ -181,6 +189,12 @@ class ArmMachine:
             self._refusals += 1
             if self._refusals > MAX_REFUSALS and self.mode.follows:
                 self._halt(now, error.sentence)
+
+    def _note_answer(self) -> None:
+        if self.mode is ArmMode.LOST:
+            # Only a reply proves that there is an arm: systems accept connections in its place.
+            self.mode, self.note = ArmMode.CONNECTED, "Reading the arm."
+            self._was_connected = True
 
     # Requests.
 
@@ -193,21 +207,34 @@ class ArmMachine:
                 self._advance(now)
             step, self._step = self._step, None
             return step
-        if not self.mode.follows or self._stopped:
+        if not self._may_move:
             return None
-        return self._motion.next_request(now)
+        if now - self.arm.t > OLD and self._motion.can_wait(now):
+            return ReadPositions()
+        return self._motion.next_packet(now)
+
+    @property
+    def _may_move(self) -> bool:
+        return self.mode.follows and not self._stopped
 
     def poll(self, now: float) -> ArmRequest | None:
-        """Return the measurement that is due most at ``now`` [s], or None."""
+        """Return the measurement or target of the gripper that is due most at ``now`` [s], or None.
+
+        With slow replies each still gets its part of the time that the polynomials leave.
+        """
         if self._procedure is not None:
             return None
-        count = len(POLLS) if self._has_sensors else len(POLLS) - 1
-        overdue = [(now - self._polled[i]) / POLLS[i][1] for i in range(count)]
+        due = list(POLLS if self._has_sensors else POLLS[:-1])
+        order = self._motion.finger_order() if self._may_move else None
+        if order is not None:
+            due.append((order, FINGER_PERIOD))
+        overdue = [(now - self._polled.get(type(each), -np.inf)) / time for each, time in due]
         most = int(np.argmax(overdue))
         if overdue[most] < 1.0:
             return None
-        self._polled[most] = now
-        return POLLS[most][0]
+        request = due[most][0]
+        self._polled[type(request)] = now
+        return request
 
     def answer(self) -> DriverAnswer:
         """Return what the driver reports."""
@@ -246,7 +273,7 @@ class ArmMachine:
         self._procedure = self._step = self._stop_asked = None
         self._motion.clear()
         self._acts.clear()
-        self._polled = [-np.inf] * len(POLLS)
+        self._polled.clear()
 
     def _begin(self, now: float) -> None:
         """Begin the stop or the act that waits."""

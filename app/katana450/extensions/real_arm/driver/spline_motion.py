@@ -26,6 +26,9 @@ LINGER = 0.4
 LATEST = 0.6 * SEGMENT_TIME
 """[s] Motion left in the arm below which a segment without a successor is braked."""
 
+RESERVE = 1.5 * SEGMENT_TIME
+"""[s] Motion left in the arm above which another request may come before its next segment."""
+
 KEPT_TIME = 2.0
 """[s] Past of the motion that is kept for late measurements."""
 
@@ -107,6 +110,10 @@ class SplineMotion:
         if place >= len(self._sent):
             return self._sent[-1].end.position.astype(float)
         return self._sent[place].at(rest)
+
+    def can_wait(self, now: float) -> bool:
+        """Return whether what waits in the arm at ``now`` [s] leaves time for an exchange."""
+        return self._started is None or self._left(now) > RESERVE
 
     def has_ended(self, now: float) -> bool:
         """Return whether the arm has played the whole motion at ``now`` [s]."""
