@@ -62,6 +62,7 @@ BUILT_IN = (
     "phone",
     "recording",
     "kinematics",
+    "real_arm",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 

@@ -1,0 +1,1 @@
+"""The commands ``katana450 emulate`` and ``katana450 arm``."""

@@ -1,0 +1,52 @@
+"""``katana450 emulate``: an emulated arm behind a TCP port."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from argparse import Namespace
+
+from katana450.arm.robot.loader import load
+from katana450.assembly.output import say
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.faults import FaultScript, read_fault_script
+from katana450.extensions.real_arm.emulator.posture import loads_of_robot
+from katana450.extensions.real_arm.emulator.server import EmulatorServer
+from katana450.extensions.real_arm.plant.profile import profile_named
+from katana450.platform_support import raise_priority, stop_signals
+
+LONGEST_WAIT = 3600.0
+"""[s] Some systems deliver no signal during a wait without end."""
+
+
+def emulate(options: Namespace) -> int:
+    """Run ``katana450 emulate`` until Ctrl-C and return the exit status. Raises KatanaError."""
+    ending = threading.Event()
+    for number in stop_signals():
+        signal.signal(number, lambda *_: ending.set())
+    script = FaultScript() if options.faults is None else read_fault_script(options.faults)
+    robot = load()
+    arm = EmulatedArm(
+        profile_named(options.plant),
+        loads_of_robot(robot),
+        calibrated=options.calibrated,
+        calibration_scale=options.calibration_scale,
+        object_width=script.object_mm if options.object is None else options.object,
+    )
+    raise_priority()
+    emulator = EmulatorServer(arm, options.host, options.port, script)
+    emulator.start()
+    say(f"Emulated arm: tcp://{options.host}:{emulator.port} (Ctrl-C stops)")
+    try:
+        if options.view is not None:
+            from katana450.extensions.real_arm.emulator.window import ArmWindow
+
+            window = ArmWindow(emulator, robot, options.host, options.view)
+            say(f"The arm behind the wire: {window.url}")
+        while not ending.wait(LONGEST_WAIT):
+            pass
+        if options.view is not None:
+            window.close()
+    finally:
+        emulator.stop()
+    return 0

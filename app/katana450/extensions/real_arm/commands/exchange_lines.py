@@ -1,0 +1,126 @@
+"""``katana450 arm log``: the exchanges with an arm in words."""
+
+from __future__ import annotations
+
+import time
+from argparse import Namespace
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+
+from katana450.assembly.log_lines import printable
+from katana450.errors import InputError
+from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec, RequestReceived
+from katana450.extensions.real_arm.codec.host_codec import (
+    HostCodec,
+    OutOfStep,
+    ReplyReceived,
+    RequestRefused,
+)
+from katana450.extensions.real_arm.codec.replies import FirmwareError
+from katana450.extensions.real_arm.codec.wire_message import WireMessage
+from katana450.extensions.real_arm.link import logged
+
+EVERY = 0.2
+"""[s] Interval at which further lines are looked for."""
+
+
+class ExchangeDecoder:
+    """Finds requests and replies in the lines of one log."""
+
+    def __init__(self) -> None:
+        self._firmware, self._host = FirmwareCodec(), HostCodec()
+        self._sent_at = 0.0
+
+    def words(self, line: str) -> list[str]:
+        """Return a line of text for each message that ``line`` completes."""
+        parts = line.split(maxsplit=2)
+        try:
+            at, mark = float(parts[0]), parts[1]
+            data = bytes.fromhex(parts[2]) if len(parts) > 2 else b""
+        except (IndexError, ValueError):
+            return [f"This is no line of a log: {printable(line.strip())}"]
+        shown = time.strftime("%H:%M:%S", time.localtime(at)) + f"{at % 1.0:.3f}"[1:]
+        match mark:
+            case logged.CONNECTED:
+                self._firmware, self._host = FirmwareCodec(), HostCodec()
+                found = ["connected"]
+            case logged.SENT:
+                self._sent_at = at
+                found = self._requests(data)
+            case logged.RECEIVED:
+                found = self._replies(data, at - self._sent_at)
+            case _:
+                found = [f"unknown mark {mark}"]
+        return [f"{shown} {printable(each)}" for each in found]
+
+    def _requests(self, data: bytes) -> list[str]:
+        found = []
+        for event in self._firmware.receive(data):
+            if isinstance(event, RequestReceived):
+                self._host = HostCodec()
+                self._host.send(event.request)
+                found.append(f"> {message_words(event.request)}")
+            else:
+                found.append(f"> invalid request {data.hex(' ')}")
+        return found
+
+    def _replies(self, data: bytes, took: float) -> list[str]:
+        if not data:
+            return [f"< nothing for {took:.3f} s"]
+        found = []
+        for event in self._host.receive(data):
+            match event:
+                case ReplyReceived(reply=FirmwareError() as error):
+                    words = error.sentence
+                case ReplyReceived(reply=reply):
+                    words = message_words(reply)
+                case RequestRefused():
+                    words = "refused"
+                case OutOfStep(problem=problem):
+                    words = problem
+            found.append(f"< {words}  [{1e3 * took:.1f} ms]")
+        return found
+
+
+def message_words(message: WireMessage) -> str:
+    """Return the class of a message and its fields."""
+    values = ((field.name, getattr(message, field.name)) for field in fields(message))
+    shown = ", ".join(f"{name} {_shown(value)}" for name, value in values)
+    return f"{type(message).__name__} {shown}".rstrip()
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bytes):
+        return value.decode("ascii", "replace").strip() if value.isascii() else value.hex(" ")
+    if isinstance(value, tuple):
+        return " ".join(map(_shown, value)) if not hasattr(value, "_fields") else str(tuple(value))
+    return str(value)
+
+
+def show_log(options: Namespace) -> int:
+    """Run ``katana450 arm log`` and return the exit status. Raises InputError."""
+    decoder = ExchangeDecoder()
+    for line in _lines(options.file, follow=options.follow):
+        for words in decoder.words(line):
+            print(words, flush=options.follow)
+    return 0
+
+
+def _lines(path: Path, *, follow: bool) -> Iterator[str]:
+    try:
+        with path.open(encoding="ascii", errors="replace") as file:
+            begun = ""
+            while True:
+                part = file.readline()
+                if part.endswith("\n"):
+                    yield begun + part
+                    begun = ""
+                elif not follow:
+                    return
+                else:
+                    # The rest of a line that is being written follows.
+                    begun += part
+                    time.sleep(EVERY)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from error

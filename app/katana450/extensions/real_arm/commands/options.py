@@ -1,0 +1,179 @@
+"""Options of ``katana450 emulate`` and ``katana450 arm``; reading them loads nothing heavy."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from katana450.extensions.real_arm.plant.profile import KATANA450, PROFILES
+
+PORT = 5566
+"""TCP port of an arm."""
+
+STOP_BUTTON = (
+    "No program is a safety device: a hardware stop button that cuts the power of the arm stays "
+    "necessary, within reach of the person beside it."
+)
+
+ADDRESS_HELP = "address of the arm: tcp://HOST, tcp://HOST:PORT or serial:///dev/ttyUSB0"
+
+TRIALS = ("bad-crc", "pipelining", "second-client")
+"""Trials of the probe that move nothing but can disturb the connection."""
+
+MAX_REPEATS = 10_000
+
+WIDEST_OBJECT = 120.0
+"""[mm] Gap of the open gripper."""
+
+
+def add_emulate_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``katana450 emulate`` to ``parser``."""
+    parser.description = (
+        "Emulate the firmware of a Katana450 behind a TCP port, with simulated motors. It begins "
+        "as an arm after power-up: not calibrated, with its motors off."
+    )
+    parser.add_argument(
+        "--port", type=_port, default=PORT, help="0 for any free port (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address of this machine on which it listens (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--faults", type=Path, metavar="FILE", help="script of faults (docs/arm-emulator.md)"
+    )
+    parser.add_argument(
+        "--view",
+        type=_port,
+        metavar="PORT",
+        help="serve a page there that shows the emulated arm where it really is",
+    )
+    parser.add_argument(
+        "--object",
+        type=_width,
+        metavar="MM",
+        help="width of an object between the fingers, in place of that in the script of faults",
+    )
+    parser.add_argument(
+        "--calibrated", action="store_true", help="begin calibrated and holding, for tests"
+    )
+    parser.add_argument(
+        "--calibration-scale",
+        type=_scale,
+        default=1.0,
+        metavar="N",
+        help="calibrate N times as fast, for tests (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--plant",
+        choices=sorted(PROFILES),
+        default=KATANA450.name,
+        help="how the motors follow (default: %(default)s)",
+    )
+
+
+def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
+    """Add the subcommands probe, calibrate, release and log of ``katana450 arm`` to ``parser``."""
+    parser.description = STOP_BUTTON
+    acts = parser.add_subparsers(
+        dest="act", required=True, metavar="probe | calibrate | release | log"
+    )
+    probe = acts.add_parser(
+        "probe",
+        help="ask an arm all that can be learned without a motion, and write a report",
+        description=f"Only reads: nothing moves. {STOP_BUTTON}",
+    )
+    probe.add_argument(
+        "--repeat",
+        type=_repeats,
+        default=50,
+        help="number of times that each reading is repeated for its reply time (default: "
+        "%(default)s)",
+    )
+    probe.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="report as JSON; the same in words is written beside it (default: named by the time)",
+    )
+    probe.add_argument(
+        "--try",
+        dest="trials",
+        choices=TRIALS,
+        nargs="+",
+        default=[],
+        help="also send a request with a wrong checksum, two requests at once, or connect twice: "
+        "nothing moves, but the arm may need to be switched off afterwards",
+    )
+    calibrate = acts.add_parser(
+        "calibrate",
+        help="let an arm search its mechanical stops: it moves by itself",
+        description=f"The arm moves by itself for about 30 s. {STOP_BUTTON}",
+    )
+    release = acts.add_parser(
+        "release",
+        help="switch the motors off: the arm falls",
+        description=f"Motors off means the arm falls. {STOP_BUTTON}",
+    )
+    for act in (probe, calibrate, release):
+        act.add_argument("url", metavar="URL", help=ADDRESS_HELP)
+    for act in (calibrate, release):
+        act.add_argument(
+            "--yes-i-hold-the-arm",
+            dest="confirmed",
+            action="store_true",
+            help="confirm both questions; counts only where nobody can be asked",
+        )
+    log = acts.add_parser("log", help="show the exchanges that `serve --arm-log FILE` has written")
+    log.add_argument("file", type=Path, metavar="FILE", help="file of the exchanges")
+    log.add_argument(
+        "--follow", action="store_true", help="wait for further exchanges until Ctrl-C"
+    )
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``katana450 serve`` to ``parser``."""
+    driven = parser.add_mutually_exclusive_group()
+    driven.add_argument(
+        "--arm",
+        metavar="URL",
+        help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON}",
+    )
+    driven.add_argument(
+        "--plant",
+        choices=sorted(PROFILES),
+        help="simulate an arm with inertia, delay, friction, droop and backlash (default: an ideal "
+        "arm)",
+    )
+    parser.add_argument(
+        "--arm-log", type=Path, metavar="FILE", help="write all exchanges with the real arm there"
+    )
+
+
+def _repeats(text: str) -> int:
+    repeats = int(text)
+    if not 1 <= repeats <= MAX_REPEATS:
+        raise argparse.ArgumentTypeError(f"a number is 1 to {MAX_REPEATS}, not {text}")
+    return repeats
+
+
+def _port(text: str) -> int:
+    port = int(text)
+    if not 0 <= port <= 65535:
+        raise argparse.ArgumentTypeError(f"a port is 0 to 65535, not {text}")
+    return port
+
+
+def _width(text: str) -> float:
+    width = float(text)
+    if not 1.0 <= width <= WIDEST_OBJECT:
+        raise argparse.ArgumentTypeError(f"a width is 1 to {WIDEST_OBJECT:g} mm, not {text}")
+    return width
+
+
+def _scale(text: str) -> float:
+    scale = float(text)
+    if not 1.0 <= scale <= 100.0:
+        raise argparse.ArgumentTypeError(f"a scale is 1 to 100, not {text}")
+    return scale

@@ -1,0 +1,238 @@
+"""The emulated arm: six axes in motion, its gripper and its digital lines, without I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.emulator.axis import AxisMode, EmulatedAxis
+from katana450.extensions.real_arm.emulator.calibration import CalibrationRun
+from katana450.extensions.real_arm.emulator.motors import (
+    CALIBRATED_AT,
+    CALIBRATION_ORDER,
+    MOTORS,
+    POWER_UP_POSTURE,
+)
+from katana450.extensions.real_arm.emulator.sensors import encoder_at_gap, sensor_values
+from katana450.extensions.real_arm.plant.axis import STEP
+from katana450.extensions.real_arm.plant.profile import KATANA450, PlantProfile
+
+GRIPPER = 5
+"""Number of the axis of the gripper, from 0."""
+
+NO_INPUT = 0xFD
+"""Digital inputs after power-up. With 0xFF, no active input, clients of the maker report a failure.
+"""
+
+LOAD_INTERVAL = 8
+"""Steps after which the weights on the axes are computed again: 20 ms."""
+
+ROUNDING = 1e-6
+"""Fraction of a step that rounding may take from the time."""
+
+Loads = Callable[[Sequence[float]], Sequence[float]]
+"""Weights (6,) on the axes, from -1 to 1, at the counts (6,) of the calibrated arm. It is positive
+if the motor must push towards larger counts."""
+
+
+def no_loads(_counts: Sequence[float]) -> Sequence[float]:
+    """Return the weights of an arm that weighs nothing."""
+    return (0.0,) * len(MOTORS)
+
+
+class EmulatedArm:
+    """An arm that begins uncalibrated, with its motors off, on a support.
+
+    Attributes:
+        axes: (6,) the axes; the last is that of the gripper.
+        time: simulated time since the start [s].
+        detects_collisions: whether a blocked axis stops the arm.
+        collided: axis that stopped the arm, from 1; 0 for none.
+        inputs, outputs: digital lines as bytes; an input is 0 while it is active.
+        is_powered: False while the power is off.
+    """
+
+    def __init__(
+        self,
+        profile: PlantProfile = KATANA450,
+        loads: Loads = no_loads,
+        *,
+        calibrated: bool = False,
+        calibration_scale: float = 1.0,
+        object_width: float | None = None,
+    ) -> None:
+        """Create an arm at rest.
+
+        Args:
+            profile: numbers of its plant.
+            loads: weights on its axes.
+            calibrated: whether it begins as after a calibration, in that posture, holding.
+            calibration_scale: simulated seconds in a second during a calibration.
+            object_width: width of an object between the fingers [mm]; None without one.
+        """
+        at = [motor.sign * CALIBRATED_AT for motor in MOTORS]
+        places = at if calibrated else POWER_UP_POSTURE
+        self.axes = tuple(
+            EmulatedAxis(facts, profile, place) for facts, place in zip(MOTORS, places, strict=True)
+        )
+        self.time = 0.0
+        self.detects_collisions = True
+        self.collided = 0
+        self.inputs, self.outputs = NO_INPUT, 0
+        self.is_powered = True
+        self.object_width = object_width
+        self._scale = calibration_scale
+        self._loads = loads
+        self._weights: Sequence[float] = (0.0,) * len(self.axes)
+        self._calibration: CalibrationRun | None = None
+        self._done = 0
+        self._steps = 0
+        self._rests = False
+        self._stops: dict[int, tuple[float, float]] = {}
+        self.axes[GRIPPER].plant.contact = encoder_at_gap(object_width or 0.0)
+        for axis in self.axes:
+            axis.is_supported = True
+            if calibrated:
+                axis.offset, axis.is_calibrated = 0, True
+                axis.freeze()
+
+    @property
+    def is_calibrated(self) -> bool:
+        """True once each axis is calibrated."""
+        return all(axis.is_calibrated for axis in self.axes)
+
+    @property
+    def is_calibrating(self) -> bool:
+        """True while the axes search their stops."""
+        return self._calibration is not None
+
+    @property
+    def counts(self) -> tuple[float, ...]:
+        """Where the links are, (6,) in counts of the calibrated arm."""
+        return tuple(axis.plant.output for axis in self.axes)
+
+    @property
+    def sensors(self) -> tuple[int, ...]:
+        """Bytes (16,) of the sensors of the gripper."""
+        plant = self.axes[GRIPPER].plant
+        return sensor_values(plant.position, self.object_width, plant.squeeze)
+
+    def step(self, dt: float) -> None:
+        """Simulate the next ``dt`` [s] in steps of fixed length; what is left follows later."""
+        self.time += dt
+        due = int(self.time / STEP + ROUNDING) - self._done
+        self._done += due
+        for _ in range(due):
+            # An arm at rest stays at rest until it is touched.
+            if self._rests:
+                return
+            for _ in range(self._steps_at_once()):
+                self._step()
+
+    def touch(self) -> None:
+        """Simulate again from now on: something may move."""
+        self._rests = False
+        for axis in self.axes:
+            axis.touch()
+
+    def calibrate(self, axis: int) -> None:
+        """Begin to calibrate ``axis``, from 1, or all with 0."""
+        order = (axis,) if axis else CALIBRATION_ORDER
+        self._calibration = CalibrationRun([self.axes[each - 1] for each in order])
+        self.collided = 0
+        self.touch()
+
+    def freeze(self, axis: int) -> None:
+        """Brake and hold ``axis``, from 1, or all with 0. It ends a calibration."""
+        self.end_calibration()
+        for each in self.chosen(axis):
+            each.freeze()
+        if all(each.status != AxisStatus.COLLIDED for each in self.axes):
+            self.collided = 0
+        self.touch()
+
+    def end_calibration(self) -> None:
+        """Stop a calibration and hold all axes."""
+        if self._calibration is not None:
+            self._calibration = None
+            for each in self.axes:
+                if each.mode is AxisMode.CALIBRATE:
+                    each.freeze()
+
+    def chosen(self, axis: int) -> tuple[EmulatedAxis, ...]:
+        """Return the axis with the number ``axis``, from 1, or all for 0."""
+        return self.axes if axis == 0 else (self.axes[axis - 1],)
+
+    def block(self, axis: int) -> None:
+        """Let ``axis``, from 1, stick where it is."""
+        at = self.axes[axis - 1].plant.position
+        self._set_stops(axis, at, at)
+
+    def obstruct(self, axis: int, encoder: float) -> None:
+        """Put an obstacle in the way of ``axis``, from 1, at ``encoder`` [counts]."""
+        plant = self.axes[axis - 1].plant
+        if encoder > plant.position:
+            self._set_stops(axis, plant.lower, encoder)
+        else:
+            self._set_stops(axis, encoder, plant.upper)
+
+    def release(self, axis: int) -> None:
+        """Take away what blocks or obstructs ``axis``, from 1."""
+        if axis in self._stops:
+            plant = self.axes[axis - 1].plant
+            plant.lower, plant.upper = self._stops.pop(axis)
+            self.touch()
+
+    def switch_off(self) -> None:
+        """Cut the power: the motors are off and the arm falls."""
+        self._calibration = None
+        self.is_powered = False
+        for axis in self.axes:
+            axis.turn_off()
+            axis.is_supported = False
+        self.touch()
+
+    def switch_on(self) -> None:
+        """Give power again, as a restart of the firmware: uncalibrated, with the motors off."""
+        for axis in self.axes:
+            axis.power_up()
+        self.is_powered, self.detects_collisions = True, True
+        self.collided, self.outputs = 0, 0
+        self.touch()
+
+    def _set_stops(self, axis: int, lower: float, upper: float) -> None:
+        plant = self.axes[axis - 1].plant
+        self._stops.setdefault(axis, (plant.lower, plant.upper))
+        plant.lower, plant.upper = lower, upper
+        self.touch()
+
+    def _steps_at_once(self) -> int:
+        return max(round(self._scale), 1) if self._calibration is not None else 1
+
+    def _step(self) -> None:
+        if self._steps % LOAD_INTERVAL == 0:
+            self._weights = self._loads(self.counts)
+        self._steps += 1
+        if self._calibration is not None:
+            self._calibration.step()
+            if self._calibration.is_done:
+                self._calibration = None
+        changed = False
+        for axis, load in zip(self.axes, self._weights, strict=True):
+            changed |= axis.step(load)
+        if self.detects_collisions and self._calibration is None:
+            self._find_collision()
+        self._rests = not changed and self._calibration is None
+
+    def _find_collision(self) -> None:
+        for number, axis in enumerate(self.axes):
+            if not axis.has_collided():
+                continue
+            axis.collide()
+            if number == GRIPPER:
+                # A gripper that closes on an object stops alone.
+                continue
+            self.collided = self.collided or number + 1
+            for other in self.axes:
+                if other.mode in (AxisMode.TARGET, AxisMode.SPLINE):
+                    other.collide()

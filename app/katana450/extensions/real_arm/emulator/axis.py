@@ -1,0 +1,218 @@
+"""One emulated axis: a motor with encoder, its orders, and the state that it reports."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.codec.requests import MotorFlag
+from katana450.extensions.real_arm.emulator.motors import MAX_ACCELERATION, MotorFacts
+from katana450.extensions.real_arm.emulator.spline_buffer import TICK, SplineBuffer
+from katana450.extensions.real_arm.emulator.target_move import TargetMove
+from katana450.extensions.real_arm.plant.axis import STEP, PlantAxis
+from katana450.extensions.real_arm.plant.profile import PlantProfile
+
+SPEED_LIMIT, ACCELERATION_LIMIT, COLLISION_LIMIT, SPLINE_COLLISION_LIMIT, FORCE = 3, 4, 5, 6, 244
+"""Numbers of parameters of an axis."""
+
+READ_BACK = 256
+"""Parameter ``READ_BACK - n`` reads parameter n; inferred, not seen."""
+
+PRESSING_TIME = 0.15
+"""[s] Time at the whole current of the motor that counts as a collision. Assumed."""
+
+SOFTNESS = 100.0
+"""[counts] Depth to which the whole effort of a finger squeezes an object. Assumed."""
+
+PWM_MAX = 127
+"""Drive at the whole effort, as the larger limits of the configuration."""
+
+
+class AxisMode(Enum):
+    """What an axis does."""
+
+    OFF = "off"
+    BRAKE = "brake"
+    HOLD = "hold"
+    TARGET = "target"
+    SPLINE = "spline"
+    CALIBRATE = "calibrate"
+
+
+class EmulatedAxis:
+    """An axis. Its own counts are those of the calibrated arm; ``offset`` leads to what it reports.
+
+    Attributes:
+        facts: numbers of its motor.
+        plant: its motion.
+        offset: what the encoder reports minus the true counts.
+        is_calibrated: whether the offset was set by a calibration.
+        is_supported: whether something holds the axis up while its motor is off.
+        mode: what it does.
+        flag: newest motor command.
+        status: status byte that it reports, apart from ``SPLINE_BUFFER_FULL``.
+        splines: its polynomials.
+        setpoint: where it should be [counts].
+    """
+
+    def __init__(self, facts: MotorFacts, profile: PlantProfile, position: float) -> None:
+        """Create an axis at ``position`` [counts] as after power-up."""
+        self.facts = facts
+        self.plant = PlantAxis(
+            profile,
+            position,
+            facts.stops,
+            facts.axis.speed / TICK,
+            MAX_ACCELERATION / facts.halving,
+            facts.counts_per_radian,
+            SOFTNESS,
+        )
+        self.splines = SplineBuffer()
+        self._move = TargetMove(position, 0.0, position)
+        self.mode, self.status, self.flag = AxisMode.OFF, AxisStatus.OFF, 0
+        # The weight under which nothing changes any more, until the axis is touched.
+        self._still_under: float | None = None
+        self.setpoint, self._speed, self._pressed = position, 0.0, 0.0
+        self.power_up()
+
+    def power_up(self) -> None:
+        """Begin as after power-up: motor off, encoder at zero, parameters as configured."""
+        limits = self.facts
+        self.parameters = {
+            SPEED_LIMIT: (limits.speed, limits.speed, 0),
+            ACCELERATION_LIMIT: (1, 0, 0),
+            COLLISION_LIMIT: (*divmod(limits.collision_limit, 256), 0),
+            SPLINE_COLLISION_LIMIT: (*divmod(limits.collision_limit, 256), 0),
+        }
+        self.offset = -round(self.plant.position)
+        self.is_calibrated = self.is_supported = False
+        self.turn_off()
+        self.flag = 0
+
+    @property
+    def position(self) -> int:
+        """What the encoder reports, a signed number of 16 bits."""
+        return (round(self.plant.position) + self.offset + 0x8000) % 0x10000 - 0x8000
+
+    @property
+    def reported_status(self) -> int:
+        """Status byte."""
+        if self.mode is AxisMode.SPLINE and self.splines.is_full:
+            return AxisStatus.SPLINE_BUFFER_FULL
+        return self.status
+
+    @property
+    def pwm(self) -> int:
+        """Drive of the motor as a byte: the size of its effort."""
+        return round(abs(self.plant.effort) * PWM_MAX)
+
+    def turn_off(self) -> None:
+        """Switch the current off. The weight moves the axis then."""
+        self._enter(AxisMode.OFF, AxisStatus.OFF, MotorFlag.OFF)
+
+    def freeze(self) -> None:
+        """Brake, and hold where the axis comes to rest."""
+        self._enter(AxisMode.BRAKE, AxisStatus.FIXED, MotorFlag.FREEZE)
+
+    def collide(self) -> None:
+        """Brake and hold as after a collision."""
+        self._enter(AxisMode.BRAKE, AxisStatus.COLLIDED, self.flag)
+
+    def move_to(self, reading: int) -> None:
+        """Move to the encoder value ``reading``."""
+        start = self._move if self.mode is AxisMode.TARGET else None
+        position = self.setpoint if start or self.mode is AxisMode.HOLD else self.plant.position
+        speed = start.speed if start else 0.0
+        self._enter(AxisMode.TARGET, AxisStatus.MOVING_TO_TARGET, MotorFlag.MOVE)
+        self._move = TargetMove(position, speed, reading - self.offset)
+
+    def start_splines(self, more: int) -> None:
+        """Execute the stored polynomials."""
+        self.splines.start(more)
+        if self.splines.is_running and self.mode is not AxisMode.SPLINE:
+            self.mode, self.status = AxisMode.SPLINE, AxisStatus.MOVING
+            self.touch()
+            self._pressed = 0.0
+
+    def begin_calibration(self) -> None:
+        """Let ``calibrate`` lead the axis from now on."""
+        self._enter(AxisMode.CALIBRATE, AxisStatus.CALIBRATING, MotorFlag.CALIBRATE)
+
+    def lead(self, setpoint: float, speed: float) -> None:
+        """Set the setpoint [counts] and its speed [counts/s] during a calibration."""
+        self.setpoint, self._speed = setpoint, speed
+        self.touch()
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Limits of speed [counts/s] and acceleration [counts/s^2] as the host has set them."""
+        forward, reverse, _ = self.parameters[SPEED_LIMIT]
+        upwards = self._move.target >= self._move.position
+        speed = (forward if upwards else reverse) / TICK
+        acceleration = max(self.parameters[ACCELERATION_LIMIT][0], 1) / TICK**2
+        return max(speed, 100.0) / self.facts.halving, acceleration / self.facts.halving
+
+    def step(self, load: float) -> bool:
+        """Take a step of the plant under the weight ``load``; return whether anything changed."""
+        if self._still_under == load:
+            return False
+        changed = self._moved(load)
+        self._still_under = None if changed else load
+        return changed
+
+    def touch(self) -> None:
+        """Simulate again, because something round the axis changed."""
+        self._still_under = None
+
+    def _moved(self, load: float) -> bool:
+        plant = self.plant
+        match self.mode:
+            case AxisMode.OFF:
+                return plant.coast(0.0 if self.is_supported else load)
+            case AxisMode.BRAKE:
+                before = plant.speed
+                plant.brake(load)
+                self.setpoint, self._speed = plant.position, 0.0
+                if plant.speed * before <= 0.0 or plant.squeeze > 0.0:
+                    # What it squeezes would push it back if it only braked.
+                    self.mode = AxisMode.HOLD
+                return True
+            case AxisMode.TARGET:
+                self._move.advance(STEP, *self.limits)
+                self.setpoint, self._speed = self._move.position, self._move.speed
+                if self._move.is_done:
+                    self.mode, self.status = AxisMode.HOLD, AxisStatus.FIXED
+            case AxisMode.SPLINE:
+                self.splines.advance(STEP)
+                self.setpoint = self.splines.position - self.offset
+                self._speed = self.splines.speed
+                if not self.splines.is_running:
+                    self.mode, self.status = AxisMode.HOLD, AxisStatus.SPLINES_DONE
+        changed = plant.follow(self.setpoint, self._speed, load)
+        return changed or self.mode is not AxisMode.HOLD
+
+    def has_collided(self) -> bool:
+        """Return whether deviation and current mean a collision. Called once each step."""
+        watched = (AxisMode.HOLD, AxisMode.TARGET, AxisMode.SPLINE)
+        if self.mode not in watched or self.status == AxisStatus.COLLIDED:
+            return False
+        presses = abs(self.plant.effort) >= 1.0
+        self._pressed = self._pressed + STEP if presses else 0.0
+        in_spline = self.mode is AxisMode.SPLINE
+        high, low, _ = self.parameters[SPLINE_COLLISION_LIMIT if in_spline else COLLISION_LIMIT]
+        deviation = abs(self.setpoint - self.plant.position)
+        return deviation > (256 * high + low) or self._pressed > PRESSING_TIME
+
+    def parameter(self, number: int) -> tuple[int, int, int]:
+        """Return the bytes with which the axis answers that parameter ``number`` is read."""
+        if number == FORCE:
+            return 0, round(self.plant.effort * PWM_MAX) % 256, 0
+        return self.parameters.get(READ_BACK - number, (0, 0, 0))
+
+    def _enter(self, mode: AxisMode, status: AxisStatus, flag: int) -> None:
+        self.mode, self.status, self.flag = mode, status, flag
+        self.touch()
+        self.splines.clear()
+        self.setpoint, self._speed, self._pressed = self.plant.position, 0.0, 0.0
+        if mode is not AxisMode.OFF:
+            self.is_supported = False

@@ -1,0 +1,260 @@
+"""The firmware of the emulated arm: requests are executed and answered, without input or output."""
+
+from __future__ import annotations
+
+from katana450.extensions.real_arm.codec import replies
+from katana450.extensions.real_arm.codec import requests as req
+from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.codec.error_codes import (
+    COLLISION_ERROR,
+    CRC_ERROR,
+    INVALID_ARGUMENT,
+)
+from katana450.extensions.real_arm.codec.firmware_codec import (
+    FirmwareEvent,
+    RequestInvalid,
+    refusal_bytes,
+    reply_bytes,
+)
+from katana450.extensions.real_arm.emulator.arm import GRIPPER, EmulatedArm
+from katana450.extensions.real_arm.emulator.axis import READ_BACK, AxisMode, EmulatedAxis
+from katana450.extensions.real_arm.emulator.spline_buffer import TICK
+
+VERSION = (2, 1)
+"""Version of the master's firmware; clients of the maker accept 2 and 3 for this arm."""
+
+IDENTITY = b"Katana450 6M180 emulator".ljust(81)
+
+STATE_MISMATCH, NOT_OPERATIONAL, SPLINE_FAILED = -3, -7, -9
+"""Codes of errors."""
+
+COLLISION_AXIS = 30
+"""Axis field of the error after a collision, as seen on a real arm; its text names the axis."""
+
+READ_FROM = 244
+"""Smallest number of a parameter that is read."""
+
+EXACT_GRIPPER = 2
+"""Bit of ``exact`` with which axis 6 follows its polynomial."""
+
+NO_ERROR = replies.FirmwareError(0, -1, 0, "")
+
+TABLE_ENTRIES = 30
+"""Entries of the table of commands."""
+
+
+class RequestError(Exception):
+    """A request is refused, with the number of the error, the axis and the words."""
+
+    def __init__(self, code: int, axis: int, text: str) -> None:
+        super().__init__(text)
+        self.code, self.axis, self.text = code, axis, text
+
+
+class Firmware:
+    """Answers requests for an arm.
+
+    Attributes:
+        arm: the arm.
+        requests: number of requests that were answered, also by a refusal.
+    """
+
+    def __init__(self, arm: EmulatedArm) -> None:
+        self.arm = arm
+        self.requests = 0
+        self._error = NO_ERROR
+        self._registers: dict[int, int] = {}
+
+    def handle(self, event: FirmwareEvent) -> bytes:
+        """Execute what was received and return the bytes of the answer."""
+        self.requests += 1
+        if isinstance(event, RequestInvalid):
+            crc_is_wrong = event.code == CRC_ERROR
+            text = "CRC error" if crc_is_wrong else "unknown command or wrong length"
+            return self._refuse(event.payload, RequestError(event.code, 0, text))
+        try:
+            return reply_bytes(self.answer(event.request))
+        except RequestError as refusal:
+            return self._refuse(event.request.payload, refusal)
+
+    def answer(self, request: req.ArmRequest) -> replies.ArmReply:
+        """Execute ``request`` and return its reply. Raises RequestError."""
+        arm = self.arm
+        match request:
+            case req.ErrorQuery():
+                return self._error
+            case req.ReadAxis(axis):
+                return self._reading(axis)
+            case req.ReadStates():
+                return replies.AxisStates(tuple(axis.reported_status for axis in arm.axes))
+            case req.ReadPositions():
+                return replies.AxisPositions(tuple(axis.position for axis in arm.axes))
+            case req.SendSplines() | req.StoreSpline() | req.StartSplines():
+                return self._splines(request)
+            case req.CommandMotor():
+                return self._command(request)
+            case req.SetAxisParameter():
+                return self._parameter(request)
+            case req.SetCollisionDetection(enabled, first):
+                arm.detects_collisions = bool(enabled or first)
+                return replies.CollisionDetectionSet()
+            case req.ReadSensors(controller):
+                return replies.SensorBytes(controller, arm.sensors)
+            case req.ReadMotorFlag(axis):
+                return replies.MotorFlagReading(axis, self._axis(axis).flag)
+            case _:
+                return self._facts(request)
+
+    def _facts(self, request: req.ArmRequest) -> replies.ArmReply:
+        """Answer the requests that concern no motion."""
+        arm = self.arm
+        match request:
+            case req.EchoRequest():
+                return replies.EchoReply()
+            case req.ReadMasterVersion():
+                return replies.MasterVersion(*VERSION)
+            case req.ReadArmIdentity():
+                return replies.ArmIdentity(IDENTITY)
+            case req.ReadCommandTable():
+                return replies.CommandTable(_command_table())
+            case req.ReadSlaveVersion(axis, parameter):
+                self._axis(axis)
+                return replies.SlaveVersion(axis, parameter, 2, 1, 0, 0, 0)
+            case req.ReadInputs():
+                return replies.DigitalBits(arm.inputs)
+            case req.WriteOutputs(bits):
+                arm.outputs = bits
+                return replies.DigitalBits(bits)
+            case req.SetLed(color):
+                return replies.DigitalBits(color)
+            case req.ReadRegister(register):
+                value = self._registers.get(register, 0) & 0xFFFF
+                return replies.RegisterValue(value & 0xFF, value >> 8)
+            case req.WriteRegister(register, value):
+                self._registers[register] = value
+                return replies.RegisterValue(value & 0xFF, value >> 8 & 0xFF)
+        raise RequestError(INVALID_ARGUMENT, 0, "unknown command")
+
+    def _refuse(self, payload: bytes, refusal: RequestError) -> bytes:
+        command = payload[0] if payload else 0
+        self._error = replies.FirmwareError(command, refusal.code, refusal.axis, refusal.text)
+        return refusal_bytes()
+
+    def _axis(self, number: int) -> EmulatedAxis:
+        if not 1 <= number <= len(self.arm.axes):
+            raise RequestError(INVALID_ARGUMENT, 0, f"there is no axis {number}")
+        return self.arm.axes[number - 1]
+
+    def _reading(self, number: int) -> replies.AxisReading:
+        axis = self._axis(number)
+        # As on real arms: the sign is that of falling counts, axis 3 reads double, 5 inverted.
+        factor = {3: -2.0, 5: 1.0}.get(number, -1.0)
+        velocity = round(factor * axis.plant.speed * TICK)
+        return replies.AxisReading(number, axis.reported_status, axis.position, velocity, axis.pwm)
+
+    def _check_ready(self, axis: int) -> None:
+        """Raise RequestError unless the arm accepts a motion of ``axis``; 0 stands for all."""
+        arm = self.arm
+        if arm.is_calibrating:
+            raise RequestError(STATE_MISMATCH, axis, "calibration is running")
+        if not all(each.is_calibrated for each in arm.chosen(axis)):
+            raise RequestError(STATE_MISMATCH, axis, "axis is not calibrated")
+        if arm.collided:
+            text = f"StopperThread: collision on axis: {arm.collided}"
+            raise RequestError(COLLISION_ERROR, COLLISION_AXIS, text)
+
+    def _command(self, request: req.CommandMotor) -> replies.MotorCommanded:
+        arm, number, flag = self.arm, request.axis, request.flag
+        if number >= req.SET_ENCODER:
+            axis = self._axis(number - req.SET_ENCODER)
+            axis.offset = request.value - round(axis.plant.position)
+            return replies.MotorCommanded(number, flag)
+        if number != req.ALL_AXES:
+            self._axis(number)
+        match flag:
+            case req.MotorFlag.OFF:
+                arm.end_calibration()
+                for axis in arm.chosen(number):
+                    axis.turn_off()
+            case req.MotorFlag.CALIBRATE:
+                if not arm.is_calibrating:
+                    arm.calibrate(number)
+            case req.MotorFlag.FREEZE:
+                arm.freeze(number)
+            case req.MotorFlag.MOVE:
+                self._check_ready(number)
+                for axis in arm.chosen(number):
+                    axis.move_to(request.value)
+            case req.MotorFlag.FLUSH:
+                for axis in arm.chosen(number):
+                    axis.splines.flush()
+            case _:
+                raise RequestError(INVALID_ARGUMENT, number, f"unknown motor command {flag}")
+        arm.touch()
+        return replies.MotorCommanded(number, flag)
+
+    def _parameter(self, request: req.SetAxisParameter) -> replies.AxisParameters:
+        axis, number = self._axis(request.axis), request.parameter
+        values = (request.p1, request.p2, request.p3)
+        if number >= READ_FROM:
+            values = axis.parameter(number)
+        elif 0 < number < READ_BACK - READ_FROM:
+            axis.parameters[number] = values
+        else:
+            raise RequestError(INVALID_ARGUMENT, request.axis, f"unknown parameter {number}")
+        return replies.AxisParameters(request.axis, number, *values)
+
+    def _splines(
+        self, request: req.SendSplines | req.StoreSpline | req.StartSplines
+    ) -> replies.ArmReply:
+        arm = self.arm
+        if isinstance(request, req.StoreSpline):
+            self._store(request.axis, _segment_of(request), req.More.STORE)
+            return replies.SplineStored()
+        if request.more not in (req.More.START, req.More.LAST, req.More.STORE):
+            raise RequestError(INVALID_ARGUMENT, 0, f"more must be 0, 1 or 2, not {request.more}")
+        if isinstance(request, req.StartSplines):
+            self._start([axis for axis in arm.axes if len(axis.splines)], request.more)
+            return replies.SplinesStarted()
+        followed = len(arm.axes) if request.exact & EXACT_GRIPPER else GRIPPER
+        # All axes have room, or none gets anything.
+        for number in range(1, followed + 1):
+            self._check_room(number)
+        for number, segment in enumerate(request.segments[:followed], 1):
+            self._store(number, segment, request.more)
+        if request.more != req.More.STORE:
+            self._start(arm.axes[:followed], request.more)
+        return replies.SplinesSent()
+
+    def _check_room(self, number: int) -> EmulatedAxis:
+        self._check_ready(number)
+        axis = self._axis(number)
+        if axis.mode is AxisMode.OFF or axis.status == AxisStatus.COLLIDED:
+            raise RequestError(NOT_OPERATIONAL, number, "axis does not hold")
+        if axis.splines.is_full:
+            raise RequestError(SPLINE_FAILED, number, "move buffer error")
+        return axis
+
+    def _store(self, number: int, segment: req.AxisSegment, more: int) -> None:
+        if segment.ticks < 0:
+            raise RequestError(INVALID_ARGUMENT, number, "time is negative")
+        self._check_room(number).splines.store(segment, more)
+
+    def _start(self, axes: list[EmulatedAxis] | tuple[EmulatedAxis, ...], more: int) -> None:
+        for axis in axes:
+            axis.start_splines(more)
+        self.arm.touch()
+
+
+def _segment_of(request: req.StoreSpline) -> req.AxisSegment:
+    return req.AxisSegment(
+        request.ticks, request.target, request.p0, request.p1, request.p2, request.p3
+    )
+
+
+def _command_table() -> bytes:
+    """Return the table of commands. The meaning of its middle bytes is not known."""
+    entries = bytearray()
+    for index, each in enumerate(req.REQUESTS[:TABLE_ENTRIES]):
+        entries += bytes((index, each.HEAD[0], 0, 0, 0, each.REPLY.HEAD[0]))
+    return bytes(entries).ljust(6 * TABLE_ENTRIES, b"\0")

@@ -1,0 +1,184 @@
+"""The emulated arm behind a TCP port, in real time."""
+
+from __future__ import annotations
+
+import select
+import socket
+import struct
+import threading
+import time
+from contextlib import suppress
+
+from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.faults import (
+    FaultSchedule,
+    FaultScript,
+    HalfReply,
+    Reset,
+    Silence,
+    WrongCrc,
+)
+from katana450.extensions.real_arm.emulator.firmware import Firmware
+from katana450.server.web.listen import listen
+
+IDLE = 0.01
+"""[s] Interval at which the arm moves while nothing is received."""
+
+LONGEST_STEP = 5.0
+"""[s] Time that is simulated at once at most, after this process was held up."""
+
+LONGEST_SCALED_STEP = 0.03
+"""[s] The same during a calibration, which may be many times as fast: a busy machine would catch up
+with ever more steps. It then calibrates more slowly instead."""
+
+RECEIVED_BYTES = 4096
+
+
+class EmulatorServer:
+    """Serves one client at a time; the others wait for their turn, as far as the system lets them.
+
+    A reply is sent by one write. The arm keeps moving when the connection is lost.
+
+    Attributes:
+        arm: the arm; see ``lock``.
+        lock: to be held by other threads while they use the arm.
+        port: port on which it listens.
+    """
+
+    def __init__(
+        self, arm: EmulatedArm, host: str, port: int, faults: FaultScript | None = None
+    ) -> None:
+        """Open the port; 0 for any free one. Raises ConfigurationError if it is taken."""
+        self.arm = arm
+        self.lock = threading.Lock()
+        self._firmware = Firmware(arm)
+        self._faults = FaultSchedule(faults or FaultScript(), arm)
+        self._listening = listen(host, port)
+        self._listening.setblocking(False)
+        self.port: int = self._listening.getsockname()[1]
+        self._client: socket.socket | None = None
+        self._codec = FirmwareCodec()
+        self._ending = threading.Event()
+        self._dropping = threading.Event()
+        self._now = time.monotonic()
+        self._thread = threading.Thread(target=self.run, name="emulator", daemon=True)
+
+    def start(self) -> None:
+        """Serve in a thread of its own."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End ``run``, wait for it, and close the port."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def drop_client(self) -> None:
+        """Reset the connection to the client, if there is one, within a turn of ``run``."""
+        self._dropping.set()
+
+    def run(self) -> None:
+        """Serve until ``stop``."""
+        self._now = time.monotonic()
+        try:
+            while not self._ending.is_set():
+                self._turn()
+        finally:
+            self._drop()
+            self._listening.close()
+
+    def _turn(self) -> None:
+        client = self._client
+        waited = self._listening if client is None else client
+        readable, _, _ = select.select([waited], [], [], IDLE)
+        with self.lock:
+            self._advance()
+            if self._dropping.is_set():
+                self._dropping.clear()
+                self._reset()
+            if readable and client is self._client:
+                if client is None:
+                    self._accept()
+                else:
+                    self._receive(client)
+
+    def _advance(self) -> None:
+        """Move the arm to the present time."""
+        now = time.monotonic()
+        longest = LONGEST_SCALED_STEP if self.arm.is_calibrating else LONGEST_STEP
+        self.arm.step(min(now - self._now, longest))
+        self._now = now
+        self._faults.follow(self._firmware.requests)
+        if not self.arm.is_powered:
+            self._drop()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            client, _ = self._listening.accept()
+            if not self.arm.is_powered:
+                client.close()
+                return
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._client, self._codec = client, FirmwareCodec()
+
+    def _receive(self, client: socket.socket) -> None:
+        try:
+            data = client.recv(RECEIVED_BYTES)
+        except OSError:
+            data = b""
+        if not data:
+            self._drop()
+            return
+        for event in self._codec.receive(data):
+            reply = self._firmware.handle(event)
+            if not self._send(client, reply):
+                return
+
+    def _send(self, client: socket.socket, reply: bytes) -> bool:
+        """Send ``reply`` as the faults let it pass; return False if the connection has ended."""
+        self._faults.follow(self._firmware.requests)
+        faults = self._faults.next_reply()
+        self._wait(faults.delay)
+        match faults.damage:
+            case Reset():
+                self._reset()
+            case Silence():
+                return True
+            case HalfReply():
+                reply = reply[: len(reply) // 2]
+            case WrongCrc():
+                reply = reply[:-1] + bytes((reply[-1] ^ 0xFF,))
+        if self._client is not client:
+            return False
+        try:
+            client.sendall(reply)
+        except OSError:
+            self._drop()
+            return False
+        return True
+
+    def _wait(self, delay: float) -> None:
+        """Move the arm for ``delay`` [s] before a reply is sent."""
+        end = time.monotonic() + delay
+        while (left := end - time.monotonic()) > 0.0 and not self._ending.is_set():
+            # Others may look at the arm meanwhile.
+            self.lock.release()
+            try:
+                time.sleep(min(left, IDLE))
+            finally:
+                self.lock.acquire()
+            self._advance()
+
+    def _reset(self) -> None:
+        """Close the connection so that the client sees a reset."""
+        if self._client is not None:
+            with suppress(OSError):
+                linger = struct.pack("ii", 1, 0)
+                self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+        self._drop()
+
+    def _drop(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None

@@ -1,0 +1,139 @@
+"""An emulated arm for tests: in this process by simulated time, or as a process behind a port."""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.codec.firmware_codec import RequestReceived
+from katana450.extensions.real_arm.codec.replies import FirmwareError
+from katana450.extensions.real_arm.codec.requests import (
+    ArmRequest,
+    AxisSegment,
+    CommandMotor,
+    ErrorQuery,
+    ReadPositions,
+    ReadStates,
+    SendSplines,
+)
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.firmware import Firmware
+from katana450.extensions.real_arm.link.arm_link import ArmLink
+from katana450.extensions.real_arm.link.tcp import TcpTransport
+
+ROOT = Path(__file__).resolve().parents[2]
+
+TIMEOUT = 20.0
+"""[s] for anything that a process does."""
+
+
+class Bench:
+    """An arm with its firmware, driven by simulated time."""
+
+    def __init__(self, arm: EmulatedArm) -> None:
+        self.arm = arm
+        self.firmware = Firmware(arm)
+
+    def ask(self, request: ArmRequest) -> Any:
+        return self.firmware.answer(request)
+
+    def refused(self, request: ArmRequest) -> FirmwareError:
+        """Return the error for which ``request`` is refused."""
+        self.firmware.handle(RequestReceived(request, 24))
+        error = self.firmware.answer(ErrorQuery())
+        assert isinstance(error, FirmwareError)
+        assert error.command == request.payload[0], "the request was not refused"
+        return error
+
+    @property
+    def states(self) -> tuple[int, ...]:
+        states: tuple[int, ...] = self.ask(ReadStates()).states
+        return states
+
+    @property
+    def positions(self) -> tuple[int, ...]:
+        positions: tuple[int, ...] = self.ask(ReadPositions()).positions
+        return positions
+
+    def wait(self, seconds: float, *, step: float = 0.01) -> None:
+        for _ in range(round(seconds / step)):
+            self.arm.step(step)
+
+    def wait_until(self, states: Collection[int], timeout: float) -> float:
+        """Wait until each axis reports one of ``states``; return the simulated time it took."""
+        start = self.arm.time
+        while not set(self.states) <= set(states):
+            assert self.arm.time < start + timeout, self.states
+            self.arm.step(0.01)
+        return self.arm.time - start
+
+    def move(self, axis: int, target: int) -> None:
+        self.ask(CommandMotor(axis, 24, target))
+
+    def splines(self, axis: int, segments: list[AxisSegment], *, last: bool = True) -> None:
+        """Send ``segments`` of one axis; the others stay where they are."""
+        positions = self.positions
+        for number, segment in enumerate(segments):
+            still = [AxisSegment(segment.ticks, each, each, 0, 0, 0) for each in positions]
+            still[axis - 1] = segment
+            more = 1 if last and number == len(segments) - 1 else 2 if not last else 0
+            self.ask(SendSplines(tuple(still), more))
+
+
+def at_rest(arm: EmulatedArm) -> bool:
+    return all(axis.plant.speed == 0.0 for axis in arm.axes)
+
+
+@contextmanager
+def emulator(*options: str) -> Iterator[int]:
+    """Run ``katana450 emulate`` and return its port."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "katana450", "emulate", "--port", "0", *options],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        found = re.search(r"tcp://127\.0\.0\.1:(\d+)", line)
+        assert found, line
+        yield int(found[1])
+    finally:
+        process.terminate()
+        output, _ = process.communicate(timeout=TIMEOUT)
+        assert process.returncode == 0, output
+
+
+@contextmanager
+def linked(port: int) -> Iterator[ArmLink]:
+    """Connect to an arm behind a port."""
+    link = ArmLink(TcpTransport("127.0.0.1", port))
+    try:
+        yield link
+    finally:
+        link.close()
+
+
+@contextmanager
+def raw(port: int) -> Iterator[socket.socket]:
+    """Connect to an arm behind a port, byte for byte."""
+    with socket.create_connection(("127.0.0.1", port), TIMEOUT) as client:
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        yield client
+
+
+def exchanged(client: socket.socket, text: str) -> str:
+    """Send bytes and return what one read finds, both as hexadecimals."""
+    client.sendall(bytes.fromhex(text))
+    return client.recv(4096).hex(" ").upper()
+
+
+HOLDS = {AxisStatus.FIXED, AxisStatus.SPLINES_DONE}

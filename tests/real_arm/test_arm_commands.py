@@ -1,0 +1,167 @@
+"""The commands ``katana450 arm`` and ``katana450 emulate`` against an emulated arm."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from katana450.extensions.real_arm.codec import requests as req
+from katana450.extensions.real_arm.commands.exchange_lines import ExchangeDecoder
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.server import EmulatorServer
+from katana450.extensions.real_arm.link.arm_link import ArmLink
+from katana450.extensions.real_arm.link.logged import ExchangeLog, LoggedTransport
+from katana450.extensions.real_arm.link.tcp import TcpTransport
+from tests.real_arm.emulated import ROOT, TIMEOUT
+
+
+@pytest.fixture
+def server() -> Iterator[EmulatorServer]:
+    server = EmulatorServer(EmulatedArm(calibration_scale=50.0), "127.0.0.1", 0)
+    server.start()
+    yield server
+    server.stop()
+
+
+def katana450(*options: str, text: str = "") -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "katana450", *options],
+        input=text,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=TIMEOUT,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def test_probe_writes_what_the_arm_tells(server: EmulatorServer, tmp_path: Path) -> None:
+    out = tmp_path / "probe.json"
+    url = f"tcp://127.0.0.1:{server.port}"
+    trials = ("bad-crc", "pipelining", "second-client")
+    done = katana450("arm", "probe", url, "--repeat", "3", "--out", str(out), "--try", *trials)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(out.read_text())
+    readings = report["readings"]
+    assert readings["master firmware"]["fields"] == {"version": 2, "revision": 1}
+    assert readings["states"]["fields"]["states"] == [0] * 6
+    assert readings["positions"]["reply"] == "6e" + " 00" * 12
+    assert len(readings["sensors"]["fields"]["values"]) == 16
+    times = readings["states"]["times_ms"]
+    assert 0.0 < times["min"] <= times["median"] <= times["p95"] <= times["max"] < 1000.0
+    assert report["trials"]["bad-crc"]["reply"] == "c0 50 00"
+    assert report["trials"]["pipelining"]["reply"].startswith("62 02 01")
+    assert "does not answer" in report["trials"]["second-client"]["second"]
+    text = out.with_suffix(".txt").read_text()
+    assert "State of axis 1: 0 (its motor is off)" in text
+    assert "the depth of the buffer of polynomials" in text
+    assert "second client" in text
+    assert {axis.flag for axis in server.arm.axes} == {0}, "no motor was ordered anything"
+
+
+def test_probe_without_an_arm_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
+    out = tmp_path / "probe.json"
+    done = katana450("arm", "probe", "tcp://127.0.0.1:9", "--out", str(out))
+    assert done.returncode == 1
+    assert "no connection" in done.stderr
+    assert "lost" in json.loads(out.read_text())
+
+
+def test_nothing_is_done_without_a_confirmation(server: EmulatorServer) -> None:
+    url = f"tcp://127.0.0.1:{server.port}"
+    for act in ("calibrate", "release"):
+        done = katana450("arm", act, url)
+        assert done.returncode == 1
+        assert "--yes-i-hold-the-arm" in done.stderr
+    assert {axis.flag for axis in server.arm.axes} == {0}
+
+
+def test_calibrate_and_release_do_what_they_say(server: EmulatorServer) -> None:
+    url = f"tcp://127.0.0.1:{server.port}"
+    done = katana450("arm", "calibrate", url, "--yes-i-hold-the-arm")
+    assert done.returncode == 0, done.stderr
+    assert "hardware stop button" in done.stdout
+    assert "Calibrated. Encoders: 30" in done.stdout
+    assert server.arm.is_calibrated
+    done = katana450("arm", "release", url, "--yes-i-hold-the-arm")
+    assert done.returncode == 0, done.stderr
+    assert "not held" in done.stdout
+    assert {axis.flag for axis in server.arm.axes} == {0}
+
+
+def test_log_shows_the_exchanges_in_words(server: EmulatorServer, tmp_path: Path) -> None:
+    file = tmp_path / "exchanges.log"
+    log = ExchangeLog(file)
+    link = ArmLink(LoggedTransport(TcpTransport("127.0.0.1", server.port), log))
+    link.exchange(req.ReadMasterVersion())
+    with pytest.raises(Exception, match="not calibrated"):
+        link.exchange(req.CommandMotor(2, req.MotorFlag.MOVE, 100))
+    link.close()
+    log.close()
+    done = katana450("arm", "log", str(file))
+    assert done.returncode == 0, done.stderr
+    lines = [line[13:] for line in done.stdout.splitlines()]
+    assert lines[0] == "connected"
+    assert lines[1] == "> ReadMasterVersion"
+    assert lines[2].startswith("< MasterVersion version 2, revision 1  [")
+    assert lines[3] == "> CommandMotor axis 2, flag 24, value 100"
+    assert lines[4].startswith("< refused")
+    assert lines[5] == "> ErrorQuery"
+    assert "axis is not calibrated" in lines[6]
+
+
+def test_log_is_followed_line_by_line(tmp_path: Path) -> None:
+    file = tmp_path / "exchanges.log"
+    file.write_text("1.5 =\n")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "katana450", "arm", "log", str(file), "--follow"],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+    assert process.stdout is not None
+    try:
+        assert process.stdout.readline().endswith("connected\n")
+        with file.open("a") as log:
+            log.write("2.5 > 01 18 01 5A")
+            log.flush()
+            time.sleep(0.3)
+            log.write(" 3B 80\n")
+        killer = threading.Timer(TIMEOUT, process.kill)
+        killer.start()
+        assert process.stdout.readline().endswith("> EchoRequest\n")
+        killer.cancel()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_line_that_is_none_of_a_log_is_reported() -> None:
+    decoder = ExchangeDecoder()
+    assert decoder.words("nonsense\n") == ["This is no line of a log: nonsense"]
+    assert "nothing for" in decoder.words("1.0 <\n")[0]
+
+
+def test_missing_log_is_reported(tmp_path: Path) -> None:
+    done = katana450("arm", "log", str(tmp_path / "none"))
+    assert done.returncode == 1
+    assert "cannot be read" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--port", "70000"), ("--object", "500"), ("--calibration-scale", "0"), ("--plant", "rubber")],
+)
+def test_wrong_options_of_the_emulator_are_refused(options: tuple[str, str]) -> None:
+    done = katana450("emulate", *options)
+    assert done.returncode == 2
+    assert options[1] in done.stderr
