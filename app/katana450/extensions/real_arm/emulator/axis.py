@@ -29,7 +29,7 @@ PWM_MAX = 127
 
 
 class AxisMode(Enum):
-    """What an axis does."""
+    """Activity of an axis."""
 
     OFF = "off"
     BRAKE = "brake"
@@ -91,7 +91,7 @@ class EmulatedAxis:
 
     @property
     def position(self) -> int:
-        """What the encoder reports, a signed number of 16 bits."""
+        """Count that the encoder reports, a signed number of 16 bits."""
         return (round(self.plant.position) + self.offset + 0x8000) % 0x10000 - 0x8000
 
     @property

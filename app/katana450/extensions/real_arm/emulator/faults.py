@@ -138,7 +138,7 @@ class _Scheduled:
 
 @dataclass(frozen=True)
 class ReplyFaults:
-    """How the next reply is sent.
+    """Way in which the next reply is sent.
 
     Attributes:
         delay: time after which it is sent [s].

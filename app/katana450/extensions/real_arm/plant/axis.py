@@ -112,7 +112,7 @@ class PlantAxis:
         return self._push(drive, load, self._droop)
 
     def brake(self, load: float) -> bool:
-        """Take a step with the motor braking to rest, wherever that is; see ``follow``."""
+        """Take a step with the motor braking to rest, at any place. See ``follow``."""
         return self._push(-self._damping * self.speed, load, 0.0)
 
     def coast(self, load: float) -> bool:

@@ -11,7 +11,7 @@ from katana450.errors import InputError
 
 @dataclass(frozen=True)
 class PlantProfile:
-    """How the axes of a simulated arm follow their setpoints.
+    """Numbers by which the axes of a simulated arm follow their setpoints.
 
     Lengths of sliding joints take the place of angles, in m instead of rad.
 
