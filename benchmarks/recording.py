@@ -21,7 +21,7 @@ from katana450.client import connect
 from katana450.client.client import Client
 from katana450.client.files import RefusedError
 from katana450.server.api import answers, requests
-from tests.browser.server import RECORDING_APP, SIMULATION_APP, AppServer
+from tests.browser.server import RECORDING_APP, AppServer
 
 ENDS = ((-0.8, -1.2, 1.5, 0.1, 0.0), (0.8, -1.2, 1.5, 0.1, 0.0))
 
@@ -47,7 +47,9 @@ class Costs(NamedTuple):
 
 def measured(folder: Path | None, seconds: float) -> Costs:
     """Return the costs while an arm swings for ``seconds``; ``folder``: that of its recording."""
-    command = SIMULATION_APP if folder is None else (*RECORDING_APP, "--record", str(folder))
+    # Otherwise alike: the planning of a server at rest would count as a cost of recording.
+    kind = ("--no-record",) if folder is None else ("--record", str(folder))
+    command = (*RECORDING_APP, "--no-idle-planning", *kind)
     with AppServer(command) as server, connect(server.url, "Driver") as arm:
         swing(arm, WARM_UP)
         pids = [server.arm] if folder is None else [server.arm, server.child("katana450 rec")]

@@ -26,7 +26,10 @@ else:
 PROMPT = -10
 """Niceness of a time-critical process, where the system allows it."""
 
-NORMAL_CLASS, HIGH_CLASS = 0x20, 0x80
+BACKGROUND = 5
+"""Niceness added to a process that can wait."""
+
+NORMAL_CLASS, HIGH_CLASS, BELOW_NORMAL_CLASS = 0x20, 0x80, 0x4000
 """Priority classes of Windows."""
 
 TIMER_MS = 1
@@ -49,6 +52,14 @@ def reset_priority() -> None:
         _set_priority_class(NORMAL_CLASS)
     else:
         os.setpriority(os.PRIO_PROCESS, 0, 0)
+
+
+def lower_priority() -> None:
+    """Give this process a lower priority than it has."""
+    if sys.platform == "win32":
+        _set_priority_class(BELOW_NORMAL_CLASS)
+    else:
+        os.nice(BACKGROUND)
 
 
 def name_process(name: str) -> None:

@@ -148,10 +148,12 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, tuple[Any, ...]]
 def test_priorities_on_windows(windows: list[tuple[str, tuple[Any, ...]]]) -> None:
     platform_support.raise_priority()
     platform_support.reset_priority()
+    platform_support.lower_priority()
     assert windows == [
         ("SetPriorityClass", (-1, platform_support.HIGH_CLASS)),
         ("timeBeginPeriod", (1,)),
         ("SetPriorityClass", (-1, platform_support.NORMAL_CLASS)),
+        ("SetPriorityClass", (-1, platform_support.BELOW_NORMAL_CLASS)),
     ]
 
 

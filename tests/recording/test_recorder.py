@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import random
 import signal
@@ -32,6 +33,7 @@ from katana450.extensions.recording.live.route import recording_routes
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, STATE
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
@@ -82,6 +84,10 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
     server: AppServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert str(folder) in server.output
+    if sys.platform != "win32":
+        niceness = [os.getpriority(os.PRIO_PROCESS, pid) for pid in _pids(server)]
+        # That of the arm, and that of the process that records.
+        assert niceness[0] < niceness[1]
     with katana450.connect(server.url, name="test") as client:
         for posture in POSTURES:
             state = client.joints(posture)
@@ -111,6 +117,12 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
     assert "Stop" in names
     assert path.stat().st_mode & 0o077 == 0
     capsys.readouterr()
+
+
+def _pids(server: AppServer) -> tuple[int, int]:
+    """Return the ids of the arm's process and of the one that records."""
+    waited_for(partial(_other_child, server, 0), "the process that records")
+    return server.arm, server.child(RECORDER)
 
 
 @pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])
@@ -252,7 +264,7 @@ def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyP
             break
         gap = lost_records(message)
         if gap is None:
-            received.append(deserializer.loaded(message))
+            received += deserializer.loaded(message)
         else:
             before_gap = before_gap or len(received)
             lost += gap[0]
@@ -263,6 +275,51 @@ def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyP
     same = [a.state.objects is b.state.objects for a, b in pairwise(received[:before_gap])]
     were = [a.state.objects is b.state.objects for a, b in pairwise(taken[:before_gap])]
     assert same == were
+
+
+def test_ticks_are_sent_in_batches_and_the_last_ones_soon() -> None:
+    ours, theirs = Pipe()
+    end, records = RecordEnd(), list[TickRecord]()
+    run(2 * record_end.BATCH + 3, 9, records.append)
+    for each in records[:-3]:
+        end.put(each)
+    end.attach(ours)
+    deserializer = RecordDeserializer()
+    batches = [deserializer.loaded(theirs.recv_bytes()) for _ in range(2)]
+    assert list(map(len, batches)) == [record_end.BATCH] * 2
+    # After a motion nothing comes that fills the batch.
+    for each in records[-3:]:
+        end.put(each)
+    received = [each for batch in batches for each in batch]
+    while len(received) < len(records):
+        assert theirs.poll(4 * record_end.COLLECTING), "the last ticks were not sent"
+        received += deserializer.loaded(theirs.recv_bytes())
+    assert [each.t for each in received] == [each.t for each in records]
+    end.close()
+
+
+def test_batches_are_written_as_single_ticks_are(folder: Path) -> None:
+    records: list[TickRecord] = []
+    run(200, 9, records.append)
+    written, places = [], list[FloatArray]()
+    for name in ("alone", "together"):
+        kept = Ring(folder / name, header())
+        for start in range(0, len(records), record_end.BATCH):
+            batch = records[start : start + record_end.BATCH]
+            if name == "together":
+                kept.put_all(batch)
+            else:
+                for each in batch:
+                    kept.put(each)
+        kept.close()
+        (path,) = recordings_in(folder / name)
+        with RecordingFile.open(path) as file:
+            written.append([each[:3] for each in file.messages(COMMANDS, EVENTS, STATE)])
+            states = [json.loads(each.data) for each in file.messages(STATE)]
+        places.append(np.array([each["position"] for each in states]))
+    assert written[0] == written[1]
+    assert len(places[0]) > 100
+    assert np.abs(places[0] - places[1]).max() < 2e-6
 
 
 def test_findings_are_events(folder: Path) -> None:

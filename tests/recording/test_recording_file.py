@@ -12,13 +12,18 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.recording.codec import json_text
+from katana450.extensions.recording.files import message_writer
 from katana450.extensions.recording.files.checking import verify_recording
 from katana450.extensions.recording.files.fingerprint import RELEVANT, differences, fingerprint
+from katana450.extensions.recording.files.header import METADATA
+from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.table import columns, state_at
@@ -75,6 +80,51 @@ def test_stock_reader_finds_every_message_valid_by_its_schema(
     assert counts[COMMANDS] == len(records)
     assert counts[EVENTS] == len(records) // 100
     assert {"foxglove.JointStates", "foxglove.FrameTransforms"} <= set(checks)
+
+
+def test_index_is_that_of_the_mcap_library(tmp_path: Path, file: RecordingFile) -> None:
+    """Write the same messages by the library's writer, and compare what readers get."""
+    copy = tmp_path / "copy.mcap"
+    with copy.open("wb") as out:
+        writer = Writer(out, chunk_size=2000)
+        writer.start("katana450")
+        channels = {}
+        for topic in TOPICS:
+            schema = writer.register_schema(
+                topic.schema_name, "jsonschema", json_text(topic.schema)
+            )
+            channels[topic.name] = writer.register_channel(topic.name, "json", schema)
+        writer.add_metadata(METADATA, dict(file.metadata))
+        for each in file.attachments():
+            writer.add_attachment(0, 0, each.name, each.media_type, each.data)
+        ours = tmp_path / "ours.mcap"
+        with ours.open("wb") as target, pytest.MonkeyPatch.context() as patch:
+            patch.setattr(message_writer, "CHUNK_BYTES", 2000)
+            mine = MessageWriter(target, file.metadata, list(file.attachments()))
+            for message in file.messages(*file.counts()):
+                mine.add(message.topic, message.number, message.log_time, message.data)
+                at = message.log_time
+                writer.add_message(channels[message.topic], at, message.data, at, message.number)
+            mine.finish()
+        writer.finish()
+    found = []
+    for made in (ours, copy):
+        with made.open("rb") as opened:
+            summary = make_reader(opened, validate_crcs=True).get_summary()
+        assert summary is not None
+        for chunk in summary.chunk_indexes:
+            # Places in the file differ by the length of the name of the library.
+            chunk.chunk_start_offset = 0
+            first = min(chunk.message_index_offsets.values())
+            offsets = chunk.message_index_offsets.items()
+            chunk.message_index_offsets = {key: at - first for key, at in offsets}
+        for attached in summary.attachment_indexes:
+            attached.offset = 0
+        for metadata in summary.metadata_indexes:
+            metadata.offset = 0
+        found.append(vars(summary))
+    assert found[0] == found[1]
+    assert len(found[0]["chunk_indexes"]) > 10
 
 
 def test_all_topics_have_channels(file: RecordingFile) -> None:

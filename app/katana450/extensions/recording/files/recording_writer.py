@@ -6,18 +6,16 @@ once a second. What was synced before a crash can be recovered.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
-from mcap.writer import CompressionType, Writer
-
 from katana450.arm.control.state import State
 from katana450.arm.runtime.tick import TickRecord
-from katana450.cli.version import version
 from katana450.extensions.recording.codec import Codec, json_text
 from katana450.extensions.recording.digest import Digester
-from katana450.extensions.recording.files.header import METADATA, RecordingHeader
+from katana450.extensions.recording.files.header import RecordingHeader
+from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.form_error import FormError
 from katana450.extensions.recording.pseudonyms import Pseudonyms
 from katana450.extensions.recording.state_message import StateMessages, nanoseconds
@@ -31,28 +29,13 @@ from katana450.extensions.recording.topics import (
     SHARED_TOPICS,
     STATE,
     TF,
-    TOPICS,
 )
-
-CHUNK_BYTES = 1 << 20
-"""Maximum size of a chunk before compression. ``flush`` ends one sooner."""
 
 CHECKPOINT_PERIOD = 10.0
 """[s] Time between two complete states: a simulation from one to any moment takes a second."""
 
 SHOWN_PERIOD = 0.05
 """[s] Minimum time between two messages that only displays read."""
-
-
-def started(file: BinaryIO) -> tuple[Writer, dict[str, int]]:
-    """Begin a recording in ``file``; return its writer, and the channel of each topic."""
-    writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-    writer.start("katana450", f"katana450 {version()}")
-    channels = {}
-    for topic in TOPICS:
-        schema = writer.register_schema(topic.schema_name, "jsonschema", json_text(topic.schema))
-        channels[topic.name] = writer.register_channel(topic.name, "json", schema)
-    return writer, channels
 
 
 @dataclass
@@ -75,17 +58,17 @@ class RecordingWriter:
 
     def __init__(self, file: BinaryIO, header: RecordingHeader) -> None:
         """Begin a recording in ``file``, which is open for writing and empty."""
-        self._file = file
-        self._writer, self._channels = started(file)
-        self._writer.add_metadata(METADATA, dict(header.metadata))
-        for each in header.attachments:
-            self._writer.add_attachment(0, 0, each.name, each.media_type, each.data)
+        self._writer = MessageWriter(file, header.metadata, header.attachments)
         self._codec, self._digester = Codec(), Digester()
         self._pseudonyms = Pseudonyms(header.salt)
         self._messages = StateMessages(header.robot, header.environment)
         self._number = 0
         self._written = _Written()
         file.flush()
+
+    def prepare(self, records: Sequence[TickRecord]) -> None:
+        """Do what takes less time for several ticks together. ``put`` must follow for each."""
+        self._messages.prepare([each.state for each in records])
 
     def put(self, record: TickRecord) -> None:
         """Write one tick. Its records must come in the order of the ticks, without gaps.
@@ -134,24 +117,20 @@ class RecordingWriter:
     def flush(self) -> None:
         """Give everything to the system. ``os.fsync`` of the file then brings it to the disk."""
         self._writer.flush()
-        self._file.flush()
 
     def close(self) -> None:
         """Write the index and the end of the file. The file itself stays open."""
         self._writer.finish()
-        self._file.flush()
 
     def _add(self, topic: str, t: float, form: Any) -> None:
-        at = max(nanoseconds(t), 0)
-        self._writer.add_message(self._channels[topic], at, json_text(form), at, self._number)
+        self._writer.add(topic, self._number, max(nanoseconds(t), 0), json_text(form))
 
     def _add_shared(self, t: float) -> None:
         at = max(nanoseconds(t), 0)
         for kind, key, text in self._codec.shared.take_new():
             # The key is that of these bytes, so they are written as they are.
             data = b'{"key":"%b","value":%b}' % (key.encode(), text)
-            channel = self._channels[SHARED_TOPICS[kind]]
-            self._writer.add_message(channel, at, data, at, self._number)
+            self._writer.add(SHARED_TOPICS[kind], self._number, at, data)
 
     def _add_state(self, t: float, state: State) -> None:
         message = self._messages.state(state)

@@ -17,8 +17,13 @@ from katana450.extensions.recording.live.record_wire import RecordSerializer
 MAX_WAITING = 3000
 """Number of records that wait for a slow reader, 30 s of motion; the next ones are lost."""
 
-COLLECTING = 0.1
-"""[s] Minimum time between two turns of the thread, so that ticks wake it rarely."""
+BATCH = 20
+"""Number of records in a message, 0.2 s of motion. It is sent after the tick of the last one, when
+the control thread sleeps."""
+
+COLLECTING = 0.25
+"""[s] Maximum time for which a record waits for further ones. It is longer than a batch takes, so
+that in motion ticks begin the sending, and not a clock that sends during a tick."""
 
 JOIN_TIMEOUT = 1.0
 """[s] Time for the last records when the arm's process ends."""
@@ -36,7 +41,7 @@ class RecordEnd:
         self._waiting: deque[TickRecord] = deque()
         self._lost, self._lost_until = 0, 0.0
         self._losing = threading.Lock()
-        self._any = threading.Event()
+        self._any, self._full = threading.Event(), threading.Event()
         self._closed = threading.Event()
         self._attaching = threading.Lock()
         self._pipe: Connection | None = None
@@ -51,6 +56,8 @@ class RecordEnd:
             self._waiting.append(record)
         if not self._any.is_set():
             self._any.set()
+        if len(self._waiting) >= BATCH and not self._full.is_set():
+            self._full.set()
 
     def attach(self, pipe: Connection, _greeting: object = None) -> None:
         """Send what waits, and all further records, by ``pipe`` in place of any previous one."""
@@ -64,7 +71,6 @@ class RecordEnd:
                 target=self._send, args=(pipe,), name="records out", daemon=True
             )
             self._thread.start()
-            self._any.set()
 
     def close(self) -> None:
         """End after what waits, or after a short time."""
@@ -73,6 +79,7 @@ class RecordEnd:
 
     def _end(self) -> None:
         """Wait for the thread, which ends when its pipe is closed or nothing more comes."""
+        self._full.set()
         self._any.set()
         if self._thread is not None:
             self._thread.join(JOIN_TIMEOUT)
@@ -81,17 +88,29 @@ class RecordEnd:
         serializer = RecordSerializer()
         with suppress(EOFError, OSError):
             while pipe is self._pipe and not (self._closed.is_set() and not self._waiting):
-                self._any.wait()
-                self._any.clear()
+                self._full.wait(COLLECTING)
+                self._full.clear()
+                if not (self._waiting or self._lost):
+                    self._wait_for_any(pipe)
                 while self._waiting:
-                    pipe.send_bytes(serializer.dumped(self._waiting[0]))
-                    # Only now, so that a record whose pipe breaks goes by the next one.
-                    self._waiting.popleft()
+                    count = min(len(self._waiting), BATCH)
+                    records = [self._waiting[place] for place in range(count)]
+                    pipe.send_bytes(serializer.dumped(records))
+                    # Only now, so that records whose pipe breaks go by the next one.
+                    for _ in records:
+                        self._waiting.popleft()
                 if self._lost:
                     self._report_lost(pipe)
-                self._closed.wait(COLLECTING)
         with suppress(OSError):
             pipe.close()
+
+    def _wait_for_any(self, pipe: Connection) -> None:
+        """Wait until the arm moves, or until there is no more to wait for."""
+        self._any.clear()
+        # What came before the flag was cleared has not set it.
+        ended = self._closed.is_set() or pipe is not self._pipe
+        if not (self._waiting or self._lost or ended):
+            self._any.wait()
 
     def _report_lost(self, pipe: Connection) -> None:
         """Send the number of lost records. Until it is 0, the control thread adds no record."""

@@ -27,16 +27,18 @@ class RecordSerializer:
         self._pickler = pickle.Pickler(self._file, pickle.HIGHEST_PROTOCOL)
         self._remembered = 0
 
-    def dumped(self, record: TickRecord) -> bytes:
-        """Return ``record`` as bytes, for the next message."""
+    def dumped(self, records: list[TickRecord]) -> bytes:
+        """Return ``records`` as bytes, for the next message."""
         first = self._remembered == 0
         if first:
             self._pickler.clear_memo()
-        self._remembered = (self._remembered + 1) % MAX_REMEMBERED
+        self._remembered += len(records)
+        if self._remembered >= MAX_REMEMBERED:
+            self._remembered = 0
         self._file.seek(0)
         self._file.truncate()
         self._file.write(BEGIN if first else CONTINUATION)
-        self._pickler.dump(record)
+        self._pickler.dump(records)
         return self._file.getvalue()
 
 
@@ -47,8 +49,8 @@ class RecordDeserializer:
         self._file = io.BytesIO()
         self._unpickler = pickle.Unpickler(self._file)
 
-    def loaded(self, data: bytes) -> TickRecord:
-        """Return the record in ``data``."""
+    def loaded(self, data: bytes) -> list[TickRecord]:
+        """Return the records in ``data``."""
         if data.startswith(BEGIN):
             self._file = io.BytesIO()
             self._unpickler = pickle.Unpickler(self._file)
@@ -56,5 +58,5 @@ class RecordDeserializer:
         self._file.truncate()
         self._file.write(data)
         self._file.seek(len(BEGIN))
-        record: TickRecord = self._unpickler.load()
-        return record
+        records: list[TickRecord] = self._unpickler.load()
+        return records

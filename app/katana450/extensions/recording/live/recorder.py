@@ -17,6 +17,7 @@ from katana450.assembly.record_pipe import connected_to_ticks
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.errors import InputError
 from katana450.extension import ServerFacts
+from katana450.platform_support import lower_priority
 
 if TYPE_CHECKING:
     from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
@@ -26,8 +27,9 @@ if TYPE_CHECKING:
 START_DELAY = 3.0
 """[s] Time after the start of the arm in which the other processes have the processor alone."""
 
-SYNC_INTERVAL = 1.0
-"""[s] Maximum age of what a crash of the machine loses."""
+SYNC_INTERVAL = 0.8
+"""[s] Time between two syncs of the file. With ``COLLECTING`` of the arm's process it is the
+maximum age of what a crash of the machine loses."""
 
 SWITCH_INTERVAL = 0.001
 """[s] Time after which a busy thread lets another one run."""
@@ -55,6 +57,7 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
     facts = config.facts
     # So that ticks are received at once while another thread cuts out a long episode.
     sys.setswitchinterval(SWITCH_INTERVAL)
+    lower_priority()
     supervisor.report(READY)
     try:
         pipe = connected_to_ticks(facts.address, supervisor.ended)
@@ -120,7 +123,7 @@ def _receive(pipe: Connection, ring: Ring) -> None:
                 lost = lost_records(message)
                 with ring.lock:
                     if lost is None:
-                        ring.put(deserializer.loaded(message))
+                        ring.put_all(deserializer.loaded(message))
                     else:
                         count, until = lost
                         ring.lost(until, count)

@@ -6,7 +6,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -76,6 +76,13 @@ class Ring:
         self.last_t = float("-inf")
         """Time of the newest tick [s]."""
         _repair(folder)
+
+    def put_all(self, records: Sequence[TickRecord]) -> None:
+        """Write the records of successive ticks, with less work than by ``put`` for each."""
+        if self._writer is not None:
+            self._writer.prepare(records)
+        for each in records:
+            self.put(each)
 
     def put(self, record: TickRecord) -> None:
         """Write the record of a tick."""
