@@ -127,7 +127,9 @@ def test_arm_that_does_not_follow_is_stopped_until_it_does(
     state = run(session, measured, state, [cmd.SetJoint(0, 1.0)])
     state = run(session, measured, state, [cmd.SetJoint(0, 1.0), cmd.ClearStop()], 200)
     assert state.stopped is not None
-    assert state.stopped.cause.why == "Hold the arm."
+    lasting = mode in (ArmMode.COLLIDED, ArmMode.FAULT)
+    why = "Hold the arm." if lasting else "The arm was not ready for setpoints."
+    assert state.stopped.cause.why == why
     assert "hold the arm" in sentence(state).lower()
     np.testing.assert_array_equal(state.setpoint, measured.q)
     np.testing.assert_array_equal(state.goal, measured.q)
@@ -135,6 +137,7 @@ def test_arm_that_does_not_follow_is_stopped_until_it_does(
     measured.mode, measured.note = ArmMode.HOLDING, ""
     state = run(session, measured, state, [], 2)
     assert clear_refusal(state, state.t) == ""
+    assert Reason.NOT_FOLLOWING not in reasons(state), "it follows again"
     state = run(session, measured, state, [cmd.ClearStop()], 50)
     assert state.stopped is None
     np.testing.assert_array_equal(state.q, session.ready + 0.1)

@@ -33,7 +33,6 @@ from katana450.arm.control.goals import (
 from katana450.arm.control.grip import gripped
 from katana450.arm.control.joint_stepper import JointStepper, Travel, no_travel
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.messages import finding_text
 from katana450.arm.control.modes import (
     IDLE,
     Jogging,
@@ -48,9 +47,8 @@ from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_changes import with_scene_change
 from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
 from katana450.arm.control.state import ACCEPTED, ActiveStop, Finding, Outcome, Reason, State
-from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.control.stopping import stopped_again, with_presses
-from katana450.arm.control.supervision import fault_of, held_where_measured, with_tracking_time
+from katana450.arm.control.supervision import held_where_measured, stop_for, with_tracking_time
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld
@@ -233,11 +231,10 @@ class Session:
         state = with_tracking_time(state, report)
         if state.stopped is None:
             world = self.world_at(state) if state.moving else None
-            cause = fault_of(state, report, None if world is None else world.nearest(state.x))
-            if cause is None:
+            stop = stop_for(state, report, None if world is None else world.nearest(state.x))
+            if stop is None:
                 return state
-            why = report.note or f"{finding_text(cause)}."
-            state = self._stop_motion(state, cmd.Stop(StopCause(why), cause))
+            state = self._stop_motion(state, stop)
         return held_where_measured(state, report)
 
     def _take(self, state: State, command: cmd.Command) -> State:

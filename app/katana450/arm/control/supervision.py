@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control.arm_report import ArmMode, ArmReport
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.modes import IDLE
 from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.stop_cause import StopCause
+from katana450.arm.control.stop_commands import Stop
 from katana450.maths.collision.contact import Contact
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import JointMotion
@@ -61,6 +64,21 @@ def fault_of(state: State, report: ArmReport, nearest: Contact | None) -> Findin
     return None
 
 
+def stop_for(state: State, report: ArmReport, nearest: Contact | None) -> Stop | None:
+    """Return the stop that ``report`` asks for; None without a fault, see ``fault_of``.
+
+    Its cause is a sentence that stays true until the stop is cleared.
+    """
+    fault = fault_of(state, report, nearest)
+    if fault is None:
+        return None
+    why = f"{finding_text(fault)}."
+    if fault.reason is Reason.NOT_FOLLOWING:
+        stays = report.mode in (ArmMode.COLLIDED, ArmMode.FAULT, ArmMode.LOST)
+        why = report.note if stays and report.note else "The arm was not ready for setpoints."
+    return Stop(StopCause(why), fault)
+
+
 def held_where_measured(state: State, report: ArmReport) -> State:
     """Return the stopped ``state`` whose setpoint is where the arm was measured.
 
@@ -75,6 +93,7 @@ def held_where_measured(state: State, report: ArmReport) -> State:
         replace(each, amount=0.0, time=0.0) if each.reason is Reason.STOPPED else each
         for each in state.findings
         if each.reason is not Reason.MEASURED_STOP
+        and not (report.mode.follows and each.reason is Reason.NOT_FOLLOWING)
     )
     if report.measured_stop is not None and report.mode is ArmMode.HOLDING:
         measured = report.measured_stop
