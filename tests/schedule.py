@@ -35,6 +35,8 @@ KINDS = {
     "tests/library/test_run.py": BROWSER,
     "tests/real_arm/test_arm_commands.py": SERVERS[0],
     "tests/real_arm/test_driver.py": SERVERS[1],
+    "tests/real_arm/test_driver_with_emulator.py": SERVERS[0],
+    "tests/real_arm/test_session_with_driver.py": SERVERS[1],
     "tests/real_arm/test_emulator_process.py": SERVERS[0],
     "tests/real_arm/test_faults.py": SERVERS[0],
     "tests/recording/test_episodes_on_a_server.py": SERVERS[1],

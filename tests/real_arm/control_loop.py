@@ -33,6 +33,7 @@ class SmallLoop:
         self.stopped = True
         self.answers: list[tuple[float, DriverAnswer]] = []
         self.longest = 0.0
+        self._held = JOINTS
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         now = time.perf_counter()
@@ -43,7 +44,10 @@ class SmallLoop:
         due = time.perf_counter()
         while not self._ending.is_set():
             t = time.perf_counter()
-            joints = self.setpoint(t)
+            if self.stopped:
+                # As the session does: the setpoint of a stopped arm is where it is measured.
+                self._held = self.measured
+            joints = self._held if self.stopped else self.setpoint(t)
             answer = self.driver.send(joints[:5], float(joints[5]), t, self.stopped)
             self.longest = max(self.longest, time.perf_counter() - t)
             self.answers.append((t, answer))
@@ -94,8 +98,8 @@ class SmallLoop:
 
     def clear_stop(self) -> None:
         """Continue from where the arm is."""
-        measured = self.measured
-        self.setpoint = lambda _: measured
+        held = self._held
+        self.setpoint = lambda _: held
         self.stopped = False
 
     def stop(self) -> None:

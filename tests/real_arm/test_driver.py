@@ -73,7 +73,7 @@ def test_motion_is_followed_over_a_connection() -> None:
         loop.setpoint = swing(JOINTS, begun)
         time.sleep(1.5)
         assert loop.report.mode is ArmMode.MOVING
-        loop.stopped = True
+        loop.stop()
         loop.wait(ArmMode.HOLDING)
         stop = loop.report.measured_stop
         assert stop is not None
@@ -104,7 +104,7 @@ def test_loss_is_reported_in_half_a_second_and_nothing_is_repeated(fault: str) -
         time.sleep(0.5)
         assert orders(paper.arm) == sent
         assert firmware.connections >= 2
-        loop.stopped = True
+        loop.stop()
         loop.engage()
         time.sleep(0.1)
         assert orders(paper.arm) == sent
@@ -174,7 +174,7 @@ def test_inputs_and_outputs_are_asked_for_beside_the_motion() -> None:
         assert driver.ask(requests.WriteOutputs(6)).result(1.0) == replies.DigitalBits(1)
         with pytest.raises(InputError, match="reserved for the driver"):
             driver.ask(requests.CommandMotor(1, 24, 0))
-        loop.stopped = True
+        loop.stop()
         loop.act(ArmAct.DISCONNECT, ArmMode.DISCONNECTED)
         with pytest.raises(LinkLostError):
             driver.ask(requests.ReadInputs()).result(1.0)

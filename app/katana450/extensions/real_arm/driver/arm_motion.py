@@ -45,6 +45,7 @@ class ArmMotion:
         self._motions: deque[SplineMotion] = deque()
         self._finger = FingerMotion(FINGER + 1, variant.axes[FINGER].speed)
         self._finger_freed = self._ended_at = -np.inf
+        self._ignored: FloatArray | None = None
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -66,7 +67,8 @@ class ArmMotion:
         return self._finger.moves(now, float(self._arm.speeds[FINGER]))
 
     def ignore(self, encoders: FloatArray) -> None:
-        """Take the setpoint (6,) [encoders] of a stopped arm: its fingers keep their order."""
+        """Take the setpoint (6,) [encoders] of a stopped arm: only a later change moves it."""
+        self._ignored = encoders
         self._finger.ignore(encoders[FINGER])
 
     def follow(self, encoders: FloatArray, t: float) -> str:
@@ -78,10 +80,12 @@ class ArmMotion:
         if not self._motions or not self._motions[-1].takes_setpoints:
             start = self._motions[-1].target if self._motions else self._arm.held
             away = np.abs(encoders - start)[:FINGER]
-            if away.max() < SMALLEST_STEP:
+            known = start if self._motions or self._ignored is None else self._ignored
+            if np.abs(encoders - known)[:FINGER].max() < SMALLEST_STEP:
                 return ""
             if (away * np.abs(self._encoders.scale[:FINGER])).max() > LARGEST_STEP:
                 return "The setpoint is not where the arm is, so no motion began."
+            self._ignored = None
             self._motions.append(SplineMotion(start, self._encoders.speed))
         motion = self._motions[-1]
         motion.add(t, np.array([*encoders[:FINGER], motion.target[FINGER]]))

@@ -195,6 +195,7 @@ def halt(
             except ArmRefusalError as error:
                 refusal = refusal or str(error)
     resting = yield from _rest(arm, begun)
+    arm.held = arm.positions
     yield ReadStates()
     moved = np.abs((arm.positions - origin) * encoders.scale)[: AXES - 1]
     stop = None if resting is None else MeasuredStop(resting - begun, float(moved.max()))

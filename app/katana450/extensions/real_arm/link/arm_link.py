@@ -20,7 +20,7 @@ from katana450.extensions.real_arm.link.transport import (
     Transport,
 )
 
-EXCHANGE_TIMEOUT = 0.4
+EXCHANGE_TIMEOUT = 0.35
 """[s] Deadline of an exchange: with the time between exchanges, a silent arm is noticed within
 0.5 s."""
 

@@ -1,0 +1,201 @@
+"""The driver with the emulated arm: it follows, survives slow replies and cuts, and stops."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmMode
+from katana450.extensions.real_arm.codec import requests
+from katana450.extensions.real_arm.codec.firmware_codec import RequestReceived
+from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.faults import (
+    AnyFault,
+    Delay,
+    FaultScript,
+    Jitter,
+    Obstacle,
+    PowerCycle,
+)
+from katana450.extensions.real_arm.emulator.firmware import Firmware
+from katana450.extensions.real_arm.emulator.server import EmulatorServer
+from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from tests.conftest import LONG
+from tests.real_arm.control_loop import SmallLoop, swing
+from tests.real_arm.paper_arm import ENDS, JOINTS, MAP
+
+CUTS = 200 if LONG else 6
+SLOW: tuple[AnyFault, ...] = (Delay(seconds=0.035), Jitter(seconds=0.01))
+
+MOTIONS = (
+    requests.MotorFlag.OFF,
+    requests.MotorFlag.CALIBRATE,
+    requests.MotorFlag.MOVE,
+)
+
+
+class Wire:
+    """All requests that reached the firmware, with their times."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.requests: list[tuple[float, requests.ArmRequest]] = []
+        handle = Firmware.handle
+
+        def handled(firmware: Firmware, event: object) -> bytes:
+            if isinstance(event, RequestReceived):
+                self.requests.append((time.perf_counter(), event.request))
+            return handle(firmware, event)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(Firmware, "handle", handled)
+
+    def motions(self) -> list[requests.ArmRequest]:
+        """Return the requests that move the arm, in their order."""
+        return [
+            request
+            for _, request in self.requests
+            if isinstance(request, requests.SendSplines)
+            or (isinstance(request, requests.CommandMotor) and request.flag in MOTIONS)
+        ]
+
+
+@pytest.fixture
+def wire(monkeypatch: pytest.MonkeyPatch) -> Wire:
+    return Wire(monkeypatch)
+
+
+@contextmanager
+def emulated(
+    *faults: AnyFault, calibrated: bool = True
+) -> Iterator[tuple[SmallLoop, EmulatorServer]]:
+    """Yield a loop with the driver of an emulated arm."""
+    arm = EmulatedArm(calibrated=calibrated, calibration_scale=60.0)
+    server = EmulatorServer(arm, "127.0.0.1", 0, FaultScript(faults=faults))
+    server.start()
+    loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
+    try:
+        yield loop, server
+    finally:
+        loop.end()
+        server.stop()
+
+
+def inwards(loop: SmallLoop, size: float = 0.3) -> None:
+    """Let the setpoint swing away from the posture after a calibration."""
+    away = swing(np.zeros(6), time.perf_counter(), size)
+    start, signs = loop.measured, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+    loop.setpoint = lambda t: start + signs * away(t)
+
+
+@pytest.mark.parametrize("faults", [(), SLOW], ids=["fast", "slow"])
+def test_setpoints_are_followed(wire: Wire, faults: tuple[AnyFault, ...]) -> None:
+    with emulated(*faults) as (loop, _):
+        loop.engage()
+        begun = time.perf_counter() + 0.1
+        start = loop.measured
+        plan = swing(start, begun, 0.3)
+        loop.setpoint = plan
+        time.sleep(4.0 if LONG else 2.2)
+        assert loop.report.mode is ArmMode.MOVING
+        reports = loop.reports_since(begun)
+        assert max(np.abs(q - report.expected[:5]).max() for _, report, q in reports) < 0.03
+        assert max(t - report.t for t, report, _ in reports) < 0.45
+        assert loop.longest < 0.05
+        held = MAP.encoders(start)
+        moved = [t for t, _ in loop.answers if np.abs(MAP.encoders(plan(t)) - held).max() >= 1.0]
+        sent = [r for r in wire.motions() if isinstance(r, requests.SendSplines)]
+        knots = np.array([[axis.p0 for axis in packet.segments[:5]] for packet in sent])
+        times = moved[0] - 0.01 + 0.08 * np.arange(len(knots))
+        planned = np.array([MAP.encoders(plan(t))[:5] for t in times])
+        # Half an encoder of rounding, and setpoints that the loop gave at irregular times.
+        assert np.abs(knots - planned)[1:].max() < 0.5 + 0.3
+        loop.stop()
+        loop.wait(ArmMode.HOLDING)
+        assert loop.report.measured_stop is not None
+
+
+def test_arm_is_calibrated_by_an_act_only(wire: Wire) -> None:
+    with emulated(calibrated=False) as (loop, server):
+        loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
+        assert not wire.motions()
+        loop.driver.perform(ArmAct.CALIBRATE, 0.0)
+        loop.wait(ArmMode.CALIBRATING)
+        loop.wait(ArmMode.HOLDING, 10.0)
+        with server.lock:
+            assert server.arm.is_calibrated
+            assert server.arm.detects_collisions
+        assert np.abs(MAP.encoders(loop.measured)).min() == pytest.approx(30500, abs=5)
+
+
+def test_collision_is_reported_and_unblocked(wire: Wire) -> None:
+    with emulated(Obstacle(axis=1, encoder=29500)) as (loop, server):
+        loop.engage()
+        inwards(loop)
+        loop.wait(ArmMode.COLLIDED, 4.0)
+        assert "axis 1" in loop.report.note
+        loop.stop()
+        with server.lock:
+            server.arm.release(1)
+        loop.act(ArmAct.UNBLOCK, ArmMode.HOLDING)
+        count = len(wire.motions())
+        loop.clear_stop()
+        time.sleep(0.3)
+        assert len(wire.motions()) == count
+
+
+def test_power_cycle_ends_in_a_state_where_nothing_moves(wire: Wire) -> None:
+    with emulated(PowerCycle(after=150, seconds=0.4)) as (loop, _):
+        loop.engage()
+        inwards(loop)
+        loop.wait(ArmMode.LOST, 6.0)
+        count = len(wire.motions())
+        loop.wait(ArmMode.UNCALIBRATED, 5.0)
+        time.sleep(0.3)
+        assert len(wire.motions()) == count
+
+
+def cut(server: EmulatorServer, loop: SmallLoop, *, hangs: bool) -> float:
+    """Reset the connection, or let the arm hang; return the time until that is reported [s]."""
+    if not hangs:
+        server.drop_client()
+        return loop.wait(ArmMode.LOST)
+    with server.lock:
+        return loop.wait(ArmMode.LOST)
+
+
+def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:
+    chance = random.Random(21)
+    times, moving = [], 0
+    with emulated() as (loop, server):
+        loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
+        for number in range(CUTS):
+            count = len(wire.motions())
+            loop.stop()
+            loop.driver.perform(ArmAct.ENGAGE, 0.0)
+            if number % 5:
+                loop.wait(ArmMode.HOLDING)
+                loop.clear_stop()
+                inwards(loop, 0.1)
+            time.sleep(chance.uniform(0.0, 0.8))
+            times.append(cut(server, loop, hangs=number % 4 == 3))
+            # The request that had no reply may still arrive from the old connection, once.
+            loop.wait(ArmMode.UNCALIBRATED, 5.0)
+            motions = wire.motions()
+            time.sleep(0.1)
+            assert wire.motions() == motions
+            packets = [r for r in motions[count:] if isinstance(r, requests.SendSplines)]
+            moving += len(packets) > 4
+            # Each packet begins where the one before it ends, so none came twice.
+            for before, after in itertools.pairwise(packets):
+                ends = [axis.target for axis in before.segments]
+                assert [axis.p0 for axis in after.segments] == ends
+    # A machine that others keep busy delays single ones.
+    assert sorted(times)[-1 - CUTS // 20] < 0.5
+    assert moving >= CUTS // 4

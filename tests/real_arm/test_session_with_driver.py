@@ -1,0 +1,109 @@
+"""The control loop with its session drives the emulated arm, from the connection to a stop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmMode
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, State
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.assembly.robot_session import describe_robot
+from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.faults import Delay, FaultScript, Jitter
+from katana450.extensions.real_arm.emulator.server import EmulatorServer
+from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+from tests.real_arm.paper_arm import ENDS, JOINTS
+
+
+class Operator:
+    """A person at the loop: gives commands and looks at the state."""
+
+    def __init__(self, session: Session, driver: KatanaDriver) -> None:
+        self._mailbox = Mailbox(session.check)
+        self.loop = ControlLoop(session, driver, self._mailbox, MonotonicClock(), 100.0)
+
+    @property
+    def state(self) -> State:
+        return self.loop.state_publisher.snapshot.state
+
+    def mode(self) -> ArmMode:
+        report = self.state.report
+        return ArmMode.DISCONNECTED if report is None else report.mode
+
+    def give(self, command: cmd.Command) -> None:
+        self._mailbox.put(command)
+
+    def until(self, condition: Callable[[State], bool], seconds: float = 8.0) -> State:
+        end = time.perf_counter() + seconds
+        while time.perf_counter() < end:
+            if condition(state := self.state):
+                return state
+            time.sleep(0.005)
+        raise AssertionError(f"{self.mode()}, {self.state.findings}, {self.state.stopped}")
+
+    def perform(self, act: ArmAct, mode: ArmMode) -> None:
+        self.give(cmd.OperateArm(act, confirmed=True))
+        self.until(lambda _: self.mode() is mode)
+
+    def clear_stop(self) -> None:
+        # A stop may be cleared 1 s after it.
+        end = time.perf_counter() + 5.0
+        while self.state.stopped is not None and time.perf_counter() < end:
+            self.give(cmd.ClearStop())
+            time.sleep(0.1)
+        assert self.state.stopped is None
+
+
+@pytest.fixture(params=["fast", "slow"])
+def operator(request: pytest.FixtureRequest) -> Iterator[Operator]:
+    slow = (Delay(seconds=0.03), Jitter(seconds=0.02)) if request.param == "slow" else ()
+    arm = EmulatedArm(calibration_scale=60.0)
+    server = EmulatorServer(arm, "127.0.0.1", 0, FaultScript(faults=slow))
+    server.start()
+    session = describe_robot(Settings(), URDF_PATH, None).session
+    found = Operator(session, KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
+    found.loop.start()
+    yield found
+    found.loop.stop()
+    server.stop()
+
+
+def test_person_connects_calibrates_moves_and_stops(operator: Operator) -> None:
+    operator.until(lambda state: state.stopped is not None)
+    operator.perform(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
+    assert "calibrate it" in operator.state.report.note  # type: ignore[union-attr]
+    operator.perform(ArmAct.CALIBRATE, ArmMode.HOLDING)
+    operator.clear_stop()
+    # Slow enough that a machine that others keep busy sends the setpoints in time.
+    operator.give(cmd.SpeedScale(0.3))
+    start = operator.state.q.copy()
+    # The calibrated posture is at the ends of the axes.
+    goal = start + np.array([0.3, 0.3, -0.3, 0.3, -0.3])
+    operator.give(cmd.SetJoints(goal))
+    operator.give(cmd.SetGripper(0.0))
+    operator.until(lambda state: state.moving)
+    there = operator.until(lambda state: not state.moving)
+    assert there.stopped is None
+    assert np.abs(there.q - goal).max() < 0.005
+    assert abs(there.gripper) < 0.02
+    operator.give(cmd.SetJoints(start + 0.25 * (goal - start)))
+    operator.until(lambda state: state.moving and np.abs(state.q - goal).max() > 0.1)
+    operator.give(cmd.Stop())
+    stopped = operator.until(lambda state: state.stopped is not None and not state.moving)
+    assert Reason.MEASURED_STOP in [finding.reason for finding in stopped.findings]
+    operator.clear_stop()
+    time.sleep(0.3)
+    assert np.abs(operator.state.q - stopped.q).max() < 0.003
+    assert operator.state.stopped is None
