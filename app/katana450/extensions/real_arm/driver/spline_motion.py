@@ -10,6 +10,7 @@ from katana450.extensions.real_arm.codec.requests import More, SendSplines
 from katana450.extensions.real_arm.splines import (
     SEGMENT_TICKS,
     SEGMENT_TIME,
+    SPEED_UNIT,
     TICK,
     SplineSegment,
     SplineStream,
@@ -23,8 +24,12 @@ AHEAD = 4
 LINGER = 0.4
 """[s] Time of rest after which a motion ends. A new one must wait until the arm has ended it."""
 
-LATEST = 0.6 * SEGMENT_TIME
-"""[s] Motion left in the arm below which a segment without a successor is braked."""
+LATEST = SEGMENT_TIME
+"""[s] Motion left in the arm below which it is braked if no further segment is there."""
+
+BRAKE_FRACTION = 0.09
+"""Part of the maximum speed that a brake takes in a segment: 2 encoders per tick^2, as the larger of
+the two accelerations of the firmware. A faster one would look like a collision."""
 
 RESERVE = 1.5 * SEGMENT_TIME
 """[s] Motion left in the arm above which another request may come before its next segment."""
@@ -46,6 +51,7 @@ class SplineMotion:
         speed: (6,) maximum of each axis [encoders per tick].
         """
         self._stream = SplineStream(start, speed)
+        self._speed = speed
         self._ready: deque[tuple[SplineSegment, bool]] = deque()
         self._sent: deque[SplineSegment] = deque()
         self._dropped = 0
@@ -129,11 +135,16 @@ class SplineMotion:
         return (self._dropped + len(self._sent)) * SEGMENT_TIME - (now - self._started)
 
     def _brake(self, now: float) -> None:
-        """End a motion whose setpoints are late by a segment to rest, before the arm runs dry."""
-        if self._started is None or self._has_sent_last or self._left(now) > LATEST:
+        """End a motion whose setpoints are late by segments to rest, before the arm runs dry."""
+        if self._started is None or self._is_closed or self._left(now) > LATEST:
             return
-        joint = self._sent[-1].end
+        self._is_closed, joint = True, self._sent[-1].end
         self.is_late = not joint.is_at_rest
-        rest = joint.position + joint.speed / (2 * 64) * SEGMENT_TICKS
-        self._ready.append((joined(joint, rest, np.zeros(len(rest))), True))
-        self._is_closed = True
+        step = self._speed * BRAKE_FRACTION
+        while not self._ready or not joint.is_at_rest:
+            before = joint.speed / SPEED_UNIT
+            speed = before - np.clip(before, -step, step)
+            place = joint.position + 0.5 * (before + speed) * SEGMENT_TICKS
+            segment = joined(joint, place, speed)
+            joint = segment.end
+            self._ready.append((segment, joint.is_at_rest))
