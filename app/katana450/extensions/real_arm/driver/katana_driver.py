@@ -35,8 +35,9 @@ IDLE_TIME = 0.005
 UNCONNECTED_TIME = 0.1
 """[s] The same without a connection."""
 
-SHORTEST_RETRY, LONGEST_RETRY = 0.1, 2.0
-"""[s] Time between two attempts to connect. It doubles with each failed one."""
+SHORTEST_RETRY, LONGEST_RETRY = 0.25, 2.0
+"""[s] Time between two attempts to connect. It doubles with each failed one, and is long enough for
+the control loop to report each loss."""
 
 MAX_SILENCE = 0.5
 """[s] Age of the newest answer of the thread above which the arm counts as lost."""
