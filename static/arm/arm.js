@@ -32,7 +32,8 @@ export class Arm {
     if (!arm) return;
     const { mode, note, acts, lag, error, age, round_trip: trip, stop } = arm;
     // What a person must do next is seen without a click; a working arm needs no room.
-    if (mode !== this.#mode && FOLLOWS.includes(mode) !== FOLLOWS.includes(this.#mode)) this.card.open = !FOLLOWS.includes(mode);
+    const follows = FOLLOWS.includes(mode);
+    if (!this.#mode || follows !== FOLLOWS.includes(this.#mode)) this.card.open = !follows;
     this.#mode = mode;
     this.card.dataset.mode = mode;
     write(this.#about, `Arm ${mode}`);

@@ -28,7 +28,7 @@ LATEST = SEGMENT_TIME
 """[s] Motion left in the arm below which it is braked if no further segment is there."""
 
 BRAKE_FRACTION = 0.09
-"""Part of the maximum speed that a brake takes in a segment: 2 encoders per tick^2, as the larger of
+"""Part of the maximum speed that a brake takes in a segment: 2 encoders per tick^2, the larger of
 the two accelerations of the firmware. A faster one would look like a collision."""
 
 RESERVE = 1.5 * SEGMENT_TIME
