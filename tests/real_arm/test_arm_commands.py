@@ -7,11 +7,15 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.client import Client, connect
 from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.commands.exchange_lines import ExchangeDecoder
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
@@ -19,7 +23,11 @@ from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.link.arm_link import ArmLink
 from katana450.extensions.real_arm.link.logged import ExchangeLog, LoggedTransport
 from katana450.extensions.real_arm.link.tcp import TcpTransport
-from tests.real_arm.emulated import ROOT, TIMEOUT
+from katana450.server.api import answers
+from katana450.server.api.arm_answers import MeasuredArm
+from katana450.server.api.motion_requests import OperateArm
+from tests.browser.server import APP, AppServer
+from tests.real_arm.emulated import ROOT, TIMEOUT, emulator
 
 
 @pytest.fixture
@@ -155,6 +163,57 @@ def test_missing_log_is_reported(tmp_path: Path) -> None:
     done = katana450("arm", "log", str(tmp_path / "none"))
     assert done.returncode == 1
     assert "cannot be read" in done.stderr
+
+
+@pytest.mark.long
+def test_emulated_arm_is_shown_where_it_really_is() -> None:
+    with emulator("--view", "18077", "--calibrated", "--calibration-scale", "10"):
+        page = urllib.request.urlopen("http://127.0.0.1:18077", timeout=TIMEOUT).read()
+        assert b"<html" in page
+
+
+@pytest.mark.long
+def test_server_drives_the_emulated_arm_and_keeps_a_log(tmp_path: Path) -> None:
+    log = tmp_path / "exchanges.log"
+    with emulator("--calibrated") as port:
+        arm = ("--arm", f"tcp://127.0.0.1:{port}", "--arm-log", str(log))
+        with AppServer((*APP, *arm)) as app, connect(app.url, "Test") as client:
+            assert measured(client).mode == "disconnected"
+            for act, mode in ((ArmAct.CONNECT, "uncalibrated"), (ArmAct.ENGAGE, "holding")):
+                client.ask(OperateArm(act=act, confirmed=True))
+                wait_for(client, mode)
+            client.clear_stop()
+            target = [each - 0.1 * np.sign(each) for each in client.query(answers.State).q]
+            state = client.joints(target)
+            wait_for(client, "holding")
+            state = client.query(answers.State)
+            assert np.degrees(np.abs(np.array(state.q) - target).max()) < 0.2
+            assert measured(client).tracking_error < np.radians(1.0)
+    assert b" > 01 18 4b 48" in log.read_bytes(), "polynomials were sent"
+
+
+@pytest.mark.long
+def test_server_simulates_a_plant() -> None:
+    with AppServer((*APP, "--plant", "katana450")) as app, connect(app.url, "Test") as client:
+        assert measured(client).mode == "holding"
+        state = client.joints([0.0, -1.0, 1.0, 0.5, 0.0])
+        time.sleep(0.5)
+        state = client.query(answers.State)
+        away = np.degrees(np.abs(np.array(state.q) - [0.0, -1.0, 1.0, 0.5, 0.0]).max())
+        assert 0.0 < away < 0.15, "it droops"
+
+
+def measured(client: Client) -> MeasuredArm:
+    arm = client.query(answers.State).arm
+    assert arm is not None
+    return arm
+
+
+def wait_for(client: Client, mode: str) -> None:
+    end = time.monotonic() + TIMEOUT
+    while measured(client).mode != mode:
+        assert time.monotonic() < end, measured(client)
+        time.sleep(0.05)
 
 
 @pytest.mark.parametrize(

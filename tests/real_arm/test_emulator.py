@@ -109,8 +109,25 @@ def test_splines_are_followed_as_the_closed_polynomial(stiff: Bench) -> None:
         worst = max(worst, abs(axis.plant.position - wanted))
     assert 0.0 < worst < 0.5, "an axis without friction follows its setpoint"
     assert stiff.wait_until(HOLDS, 1.0) <= 0.02
-    assert stiff.states == (*(AxisStatus.SPLINES_DONE,) * 5, AxisStatus.FIXED)
+    assert stiff.states == (AxisStatus.SPLINES_DONE,) * 6
     assert abs(stiff.positions[0] - second.target) <= 1
+
+
+@pytest.mark.parametrize(("exact", "moved"), [(1, False), (3, True)])
+def test_gripper_follows_only_if_it_is_asked_to(stiff: Bench, exact: int, *, moved: bool) -> None:
+    still = [AxisSegment(10, each, each, 0, 0, 0) for each in stiff.positions]
+    still[5] = AxisSegment(10, 30400, 30500, -640, 0, 0)
+    stiff.ask(req.SendSplines(tuple(still), 1, exact))
+    stiff.wait(0.2)
+    assert (stiff.positions[5] == 30400) is moved
+    for axis in range(1, 7):
+        place = stiff.positions[axis - 1]
+        stiff.ask(req.StoreSpline(axis, place - 64, 10, place, -410, 0, 0))
+    before = stiff.positions
+    stiff.ask(req.StartSplines(1, exact))
+    stiff.wait(0.2)
+    assert stiff.positions[0] == before[0] - 64
+    assert (stiff.positions[5] == before[5] - 64) is moved
 
 
 def test_stored_splines_wait_for_the_start(bench: Bench) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from katana450.arm.control.arm_report import ArmMode
 from katana450.arm.drivers.driver import DriverAnswer
+from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.real_arm.plant.axis import PlantAxis
@@ -21,6 +23,8 @@ from katana450.maths.geometry.arrays import FloatArray
 START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])
 
 TICK = 0.01
+
+GANTRY = Path(__file__).parents[1] / "exchange" / "gantry.urdf"
 
 
 def eased(s: float) -> float:
@@ -180,6 +184,17 @@ def test_weights_follow_the_posture(robot: Robot) -> None:
     assert stretched[1] == pytest.approx(-1.0)
     assert abs(upright[1]) < 0.1
     assert stretched[0] == 0.0
+
+
+def test_robot_without_an_arm_has_a_plant_without_weights() -> None:
+    gantry = load(GANTRY)
+    start = np.zeros(len(gantry.driven))
+    driver = PlantDriver(gantry, start, 0.0, KATANA450)
+    driver.start(0.0)
+    target = np.clip(start + 0.01, gantry.joint_group.lower, gantry.joint_group.upper)
+    for n in range(1, 200):
+        answer = driver.send(target, 0.0, n * TICK)
+    assert np.allclose(answer.q, target, atol=1e-3)
 
 
 def test_unknown_profile_is_refused_with_the_known_ones() -> None:

@@ -35,18 +35,20 @@ def emulate(options: Namespace) -> int:
     )
     raise_priority()
     emulator = EmulatorServer(arm, options.host, options.port, script)
+    window = None
+    if options.view is not None:
+        from katana450.extensions.real_arm.emulator.window import ArmWindow
+
+        window = ArmWindow(emulator, robot, options.host, options.view)
     emulator.start()
     say(f"Emulated arm: tcp://{options.host}:{emulator.port} (Ctrl-C stops)")
+    if window is not None:
+        say(f"The arm behind the wire: {window.url}")
     try:
-        if options.view is not None:
-            from katana450.extensions.real_arm.emulator.window import ArmWindow
-
-            window = ArmWindow(emulator, robot, options.host, options.view)
-            say(f"The arm behind the wire: {window.url}")
         while not ending.wait(LONGEST_WAIT):
             pass
-        if options.view is not None:
-            window.close()
     finally:
+        if window is not None:
+            window.close()
         emulator.stop()
     return 0

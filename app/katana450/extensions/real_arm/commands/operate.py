@@ -56,7 +56,10 @@ def operate(options: Namespace) -> int:
     try:
         end = perform(PROCEDURES[act](arm), link, arm)
     except KeyboardInterrupt:
-        # Ctrl-C during a motion must not leave the arm moving.
+        # Ctrl-C must not leave the arm moving. It may have come in the middle of an exchange, so
+        # the connection cannot be used any more.
+        link.close()
+        link = ArmLink(url.open())
         perform(hold(arm, DEFAULT_VARIANT), link, arm)
         print("katana450: Interrupted. The arm was frozen.", file=sys.stderr)
         return 130

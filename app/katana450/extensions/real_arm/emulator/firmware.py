@@ -213,10 +213,12 @@ class Firmware:
             return replies.SplineStored()
         if request.more not in (req.More.START, req.More.LAST, req.More.STORE):
             raise RequestError(INVALID_ARGUMENT, 0, f"more must be 0, 1 or 2, not {request.more}")
+        followed = len(arm.axes) if request.exact & EXACT_GRIPPER else GRIPPER
         if isinstance(request, req.StartSplines):
+            for axis in arm.axes[followed:]:
+                axis.splines.clear()
             self._start([axis for axis in arm.axes if len(axis.splines)], request.more)
             return replies.SplinesStarted()
-        followed = len(arm.axes) if request.exact & EXACT_GRIPPER else GRIPPER
         # All axes have room, or none gets anything.
         for number in range(1, followed + 1):
             self._check_room(number)
@@ -224,6 +226,10 @@ class Firmware:
             self._store(number, segment, request.more)
         if request.more != req.More.STORE:
             self._start(arm.axes[:followed], request.more)
+            for axis in arm.axes[followed:]:
+                # A client that waits for all axes would wait for a gripper that does not follow.
+                if axis.status == AxisStatus.FIXED:
+                    axis.status = AxisStatus.SPLINES_DONE
         return replies.SplinesSent()
 
     def _check_room(self, number: int) -> EmulatedAxis:

@@ -23,6 +23,9 @@ STICTION = 1.05
 """Friction of an axis at rest as a multiple of that in motion. It also ends a creeping motion,
 which would approach its end without reaching it."""
 
+SMALLEST = 1e-9
+"""[unit/s^2] Acceleration limit of an axis that cannot move, as of fingers that do not exist."""
+
 LIGHT = 0.02
 """Fraction of the largest weight below which friction holds a link inside its play."""
 
@@ -85,7 +88,7 @@ class PlantAxis:
         self.speed = self.effort = 0.0
         self.contact = -math.inf
         self._max_speed = max_speed
-        self._max_acceleration = max_acceleration * profile.reserve
+        self._max_acceleration = max(max_acceleration, SMALLEST) * profile.reserve
         self._spring = profile.bandwidth**2
         self._damping = 2.0 * profile.damping * profile.bandwidth
         self._viscous = profile.viscous
