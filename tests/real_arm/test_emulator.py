@@ -167,6 +167,23 @@ def test_late_polynomial_finds_the_arm_at_the_end_of_the_last(stiff: Bench) -> N
     assert not buffer.is_running
 
 
+def test_empty_polynomials_are_passed_over() -> None:
+    buffer = SplineBuffer()
+    for segment in (
+        AxisSegment(0, 100, 100, 0, 0, 0),
+        AxisSegment(10, 110, 100, 64, 0, 0),
+        AxisSegment(0, 110, 110, 0, 0, 0),
+        AxisSegment(10, 120, 110, 64, 0, 0),
+    ):
+        buffer.store(segment, req.More.STORE)
+    buffer.start(req.More.LAST)
+    places = []
+    while buffer.is_running:
+        buffer.advance(0.05)
+        places.append(buffer.position)
+    assert places == [105.0, 110.0, 115.0, 120.0]
+
+
 def test_flush_drops_what_waits_and_freeze_stops_at_once(bench: Bench) -> None:
     ramp = [AxisSegment(20, 30500 - 800 * n, 31300 - 800 * n, -2560, 0, 0) for n in range(1, 9)]
     bench.splines(1, ramp)

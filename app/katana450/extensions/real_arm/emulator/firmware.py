@@ -209,7 +209,8 @@ class Firmware:
     ) -> replies.ArmReply:
         arm = self.arm
         if isinstance(request, req.StoreSpline):
-            self._store(request.axis, _segment_of(request), req.More.STORE)
+            segment = _segment_of(request)
+            self._free_axis(request.axis, segment).splines.store(segment, req.More.STORE)
             return replies.SplineStored()
         if request.more not in (req.More.START, req.More.LAST, req.More.STORE):
             raise RequestError(INVALID_ARGUMENT, 0, f"more must be 0, 1 or 2, not {request.more}")
@@ -219,11 +220,11 @@ class Firmware:
                 axis.splines.clear()
             self._start([axis for axis in arm.axes if len(axis.splines)], request.more)
             return replies.SplinesStarted()
-        # All axes have room, or none gets anything.
-        for number in range(1, followed + 1):
-            self._check_room(number)
-        for number, segment in enumerate(request.segments[:followed], 1):
-            self._store(number, segment, request.more)
+        segments = request.segments[:followed]
+        # All axes can take theirs, or none gets anything.
+        axes = [self._free_axis(number, each) for number, each in enumerate(segments, 1)]
+        for axis, segment in zip(axes, segments, strict=True):
+            axis.splines.store(segment, request.more)
         if request.more != req.More.STORE:
             self._start(arm.axes[:followed], request.more)
             for axis in arm.axes[followed:]:
@@ -232,19 +233,17 @@ class Firmware:
                     axis.status = AxisStatus.SPLINES_DONE
         return replies.SplinesSent()
 
-    def _check_room(self, number: int) -> EmulatedAxis:
-        self._check_ready(number)
+    def _free_axis(self, number: int, segment: req.AxisSegment) -> EmulatedAxis:
+        """Return the axis ``number``. Raises RequestError if it cannot take ``segment`` now."""
         axis = self._axis(number)
+        self._check_ready(number)
+        if segment.ticks < 0:
+            raise RequestError(INVALID_ARGUMENT, number, "time is negative")
         if axis.mode is AxisMode.OFF or axis.status == AxisStatus.COLLIDED:
             raise RequestError(NOT_OPERATIONAL, number, "axis does not hold")
         if axis.splines.is_full:
             raise RequestError(SPLINE_FAILED, number, "move buffer error")
         return axis
-
-    def _store(self, number: int, segment: req.AxisSegment, more: int) -> None:
-        if segment.ticks < 0:
-            raise RequestError(INVALID_ARGUMENT, number, "time is negative")
-        self._check_room(number).splines.store(segment, more)
 
     def _start(self, axes: list[EmulatedAxis] | tuple[EmulatedAxis, ...], more: int) -> None:
         for axis in axes:
