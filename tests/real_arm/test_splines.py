@@ -77,8 +77,8 @@ def test_circle_is_followed_within_half_an_encoder() -> None:
     found = positions(segments)
     # The stream begins one tick before the first setpoint, at the start.
     plan = np.vstack([START, setpoints])[: len(found)]
-    joints = slice(0, None, SEGMENT_TICKS)
-    assert np.abs(found[joints] - plan[joints]).max() <= 0.5
+    knots = slice(0, None, SEGMENT_TICKS)
+    assert np.abs(found[knots] - plan[knots]).max() <= 0.5
     assert np.abs(found - plan).max() < 0.6
     assert segments[-1].end.is_at_rest
 
@@ -137,7 +137,7 @@ def test_no_coefficient_overflows(
 ) -> None:
     limited = np.clip(position, MAP.lower, MAP.upper)
     stream = SplineStream(limited.astype(int), MAP.speed)
-    begin = joined(stream.joint, limited, np.array(speed, float))
+    begin = joined(stream.knot, limited, np.array(speed, float))
     segments = [begin]
     for _ in range(5):
         goal = np.clip(target, MAP.lower, MAP.upper)
@@ -154,6 +154,6 @@ def test_still_setpoints_end_at_rest() -> None:
     for tick in range(1, 50):
         stream.add(tick * TICK, START + min(tick, 20) * np.array([5, 0, 0, 0, 0, 0]))
         stream.cut()
-    assert stream.joint.is_at_rest
+    assert stream.knot.is_at_rest
     assert stream.still_for() > 0.25
-    assert (stream.joint.position == START + np.array([100, 0, 0, 0, 0, 0])).all()
+    assert (stream.knot.position == START + np.array([100, 0, 0, 0, 0, 0])).all()

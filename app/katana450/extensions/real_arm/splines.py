@@ -6,7 +6,7 @@ encoder per tick can be joined exactly: with v in these units and a travel of m 
     p1 = v0,  p2 = 48 m - 2 (2 v0 + v1),  p3 = 8 (v0 + v1) - 128 m
 
 are whole numbers, and the polynomial ends at exactly p0 + m with exactly v1. So only positions and
-speeds at joints are rounded, each by itself, and no error accumulates.
+speeds at knots are rounded, each by itself, and no error accumulates.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ LONGEST_GAP = 1.5 * TICK
 
 
 @dataclass(frozen=True, eq=False)
-class SplineJoint:
-    """Joint between two segments: positions (6,) [encoders], speeds (6,) [encoders/tick / 64]."""
+class SplineKnot:
+    """Knot between two segments: positions (6,) [encoders], speeds (6,) [encoders/tick / 64]."""
 
     position: IntArray
     speed: IntArray
@@ -58,10 +58,10 @@ class SplineJoint:
 
 @dataclass(frozen=True, eq=False)
 class SplineSegment:
-    """A segment of 8 ticks for all axes, from one joint to the next."""
+    """A segment of 8 ticks for all axes, from one knot to the next."""
 
-    start: SplineJoint
-    end: SplineJoint
+    start: SplineKnot
+    end: SplineKnot
 
     @property
     def travel(self) -> IntArray:
@@ -81,13 +81,13 @@ class SplineSegment:
         return np.array([axis.at(tick) for axis in self.axes()])
 
 
-def joined(start: SplineJoint, position: FloatArray, speed: FloatArray) -> SplineSegment:
+def joined(start: SplineKnot, position: FloatArray, speed: FloatArray) -> SplineSegment:
     """Return the segment from ``start`` towards ``position`` and ``speed``.
 
     It ends there, rounded, or as near to it as 16 bits allow.
 
     Args:
-        start: Joint where it begins.
+        start: Knot where it begins.
         position: (6,) [encoders].
         speed: (6,) [encoders per tick].
     """
@@ -97,7 +97,7 @@ def joined(start: SplineJoint, position: FloatArray, speed: FloatArray) -> Splin
     mean = (start.speed + v1) * SEGMENT_TICKS // (2 * SPEED_UNIT)
     m = np.rint(position).astype(np.int64) - start.position
     m = np.clip(m, mean - MAX_DEVIATION, mean + MAX_DEVIATION)
-    return SplineSegment(start, SplineJoint(start.position + m, v1))
+    return SplineSegment(start, SplineKnot(start.position + m, v1))
 
 
 class SplineStream:
@@ -108,7 +108,7 @@ class SplineStream:
 
         speed: (6,) maximum of each axis [encoders per tick], to which setpoints are slowed down.
         """
-        self._joint = SplineJoint(np.array(start, np.int64), np.zeros(len(start), np.int64))
+        self._knot = SplineKnot(np.array(start, np.int64), np.zeros(len(start), np.int64))
         self._max_speed = speed
         self._times: deque[float] = deque()
         self._points: deque[FloatArray] = deque()
@@ -116,9 +116,9 @@ class SplineStream:
         self._is_still = True
 
     @property
-    def joint(self) -> SplineJoint:
+    def knot(self) -> SplineKnot:
         """End of the newest segment."""
-        return self._joint
+        return self._knot
 
     def still_for(self) -> float:
         """Return the time [s] for which the setpoints have not changed."""
@@ -127,7 +127,7 @@ class SplineStream:
     def add(self, t: float, encoders: FloatArray) -> None:
         """Add the setpoint (6,) [encoders] at ``t`` [s]. One that is not newer is ignored."""
         if not self._times:
-            self._append(t - TICK, self._joint.position.astype(float))
+            self._append(t - TICK, self._knot.position.astype(float))
             self._end = t - TICK + SEGMENT_TIME
         if t <= self._times[-1]:
             return
@@ -150,8 +150,8 @@ class SplineStream:
         if not self._times or self._times[-1] < self._end + TICK / 2:
             return None
         position, speed = self._at(self._end)
-        segment = joined(self._joint, position, speed)
-        self._joint = segment.end
+        segment = joined(self._knot, position, speed)
+        self._knot = segment.end
         self._end += SEGMENT_TIME
         while len(self._times) > 3 and self._times[2] < self._end - SEGMENT_TIME:
             self._times.popleft()

@@ -13,7 +13,7 @@ from katana450.extensions.real_arm.codec.requests import (
     MotorFlag,
     SendSplines,
 )
-from katana450.extensions.real_arm.driver.finger_motion import FingerMotion
+from katana450.extensions.real_arm.driver.finger_orders import FingerOrders
 from katana450.extensions.real_arm.driver.readings import ArmReadings
 from katana450.extensions.real_arm.driver.spline_motion import SplineMotion
 from katana450.extensions.real_arm.encoders import EncoderMap
@@ -43,7 +43,7 @@ class ArmMotion:
         """Create it for the arm that ``arm`` measures."""
         self._variant, self._encoders, self._arm = variant, encoders, arm
         self._motions: deque[SplineMotion] = deque()
-        self._finger = FingerMotion(FINGER + 1, variant.axes[FINGER].speed)
+        self._finger = FingerOrders(FINGER + 1, variant.axes[FINGER].speed)
         self._finger_freed = self._ended_at = -np.inf
         self._ignored: FloatArray | None = None
 
@@ -55,7 +55,7 @@ class ArmMotion:
     def clear(self) -> None:
         """Drop all motions and targets, so that only a later setpoint moves anything."""
         self._motions.clear()
-        self._finger = FingerMotion(FINGER + 1, self._variant.axes[FINGER].speed)
+        self._finger = FingerOrders(FINGER + 1, self._variant.axes[FINGER].speed)
 
     def moves(self, now: float) -> bool:
         """Return whether anything moves at ``now`` [s], or is about to."""

@@ -69,7 +69,7 @@ class SplineMotion:
     @property
     def target(self) -> IntArray:
         """End of the newest segment, (6,) [encoders]."""
-        return self._stream.joint.position
+        return self._stream.knot.position
 
     def add(self, t: float, encoders: FloatArray) -> None:
         """Add the setpoint (6,) [encoders] at ``t`` [s]."""
@@ -138,13 +138,13 @@ class SplineMotion:
         """End a motion whose setpoints are late by segments to rest, before the arm runs dry."""
         if self._started is None or self._is_closed or self._left(now) > LATEST:
             return
-        self._is_closed, joint = True, self._sent[-1].end
-        self.is_late = not joint.is_at_rest
+        self._is_closed, knot = True, self._sent[-1].end
+        self.is_late = not knot.is_at_rest
         step = self._speed * BRAKE_FRACTION
-        while not self._ready or not joint.is_at_rest:
-            before = joint.speed / SPEED_UNIT
+        while not self._ready or not knot.is_at_rest:
+            before = knot.speed / SPEED_UNIT
             speed = before - np.clip(before, -step, step)
-            place = joint.position + 0.5 * (before + speed) * SEGMENT_TICKS
-            segment = joined(joint, place, speed)
-            joint = segment.end
-            self._ready.append((segment, joint.is_at_rest))
+            place = knot.position + 0.5 * (before + speed) * SEGMENT_TICKS
+            segment = joined(knot, place, speed)
+            knot = segment.end
+            self._ready.append((segment, knot.is_at_rest))

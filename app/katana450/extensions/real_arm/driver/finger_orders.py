@@ -18,7 +18,7 @@ MOVING_SPEED = 100.0
 """[encoders/s] Speed above which the fingers move."""
 
 
-class FingerMotion:
+class FingerOrders:
     """Targets of the gripper. Only a setpoint that changes gives one, so a stop is not undone."""
 
     def __init__(self, axis: int, speed: float) -> None:
