@@ -108,25 +108,28 @@ export class Episodes {
   }
 
   async #act(act) {
-    const { running, saving, last: before } = this.#state ?? {};
+    const { running, saving, last: before, undo } = this.#state ?? {};
     if (act === "rec" && saving) return;
+    // The episode that is seen: another person may have ended it, or judged another one.
+    const seen = { number: running?.number ?? saving ?? before?.number };
     const request =
-      act === "rec" ? (running ? { do: "stop" } : { do: "start", task: this.#task.value })
-      : act in OUTCOMES ? { do: "judge", outcome: act }
-      // The one that is seen, so that a second press does not reach the one before it.
-      : act === "discard" && !saving ? { do: act, number: (running ?? before)?.number }
-      : { do: act };
+      act === "rec" ? (running ? { do: "stop", ...seen } : { do: "start", task: this.#task.value })
+      : act in OUTCOMES ? { do: "judge", outcome: act, ...seen }
+      : act === "undo" ? { do: act, number: undo?.number }
+      : { do: act, ...seen };
     const done = await this.#ask(request);
     if (!done) return;
     // The next key may come before the next state.
     const { number, outcome, begin, end } = done;
     const last = { number, outcome, seconds: end - begin };
-    this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: act === "undo" ? null : { number } };
+    const judged = act in OUTCOMES && (running || saving || before?.outcome !== act);
+    const undoable = act === "undo" ? null : judged || act === "discard" || act === "rerecord" ? { number } : this.#state?.undo;
+    this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: undoable };
     const name = `Episode ${number}`;
     if (act === "rec" && running) this.toast(by(`${name} has ended.`, " Y: success, N: failure, X: discard"));
     else if (act in OUTCOMES) this.toast(by(`${name}: ${act}.`, " U: undo"));
     else if (act === "discard") this.toast(by(`${name} is discarded.`, " U: undo"));
-    else if (act === "undo") this.toast(`${name} is as before.`);
+    else if (act === "undo") this.toast(end ? `${name} is as before.` : "Both attempts are kept.");
   }
 
   // Send `request`; return the episode, or null after a refusal, which is shown.
@@ -158,7 +161,8 @@ export class Episodes {
     this.#list.replaceChildren(...episodes.reverse().map((each) => this.#row(each)), ...discarded.reverse().map((each) => this.#gone(each)));
     this.#list.querySelector(`[data-key="${kept}"]`)?.focus();
     const wrong = unreadable.length ? ` ${unreadable.join(" ")}` : "";
-    write(this.#about, `${episodes.length} kept, ${discarded.length} discarded, in ${folder}.${wrong}`);
+    // People who may only watch do not learn where the files are.
+    write(this.#about, `${episodes.length} kept, ${discarded.length} discarded${folder && `, in ${folder}`}.${wrong}`);
   }
 
   #row(each) {

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from katana450.extensions.recording.episodes import keeper as keeper_module
+from katana450.extensions.recording.episodes import running_episode
 from tests.recording.episode_bench import Bench
 
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     """Return a ring with a keeper of episodes, which does not wait for late records."""
-    monkeypatch.setattr(keeper_module, "LATE_SECONDS", 0.0)
+    monkeypatch.setattr(running_episode, "LATE_SECONDS", 0.0)
     found = Bench(tmp_path)
     yield found
     found.keeper.close()

@@ -39,7 +39,9 @@ class Bench:
 
     def made(self) -> EpisodeKeeper:
         run_name = self.header.metadata["utc_offset_ns"]
-        return EpisodeKeeper(self.folder, self.ring, self.ring_folder, run_name, lambda: self.t)
+        keeper = EpisodeKeeper(self.folder, self.ring, self.ring_folder, run_name, lambda: self.t)
+        keeper.finishing.join()
+        return keeper
 
     def move(self, ticks: int) -> None:
         """Record the next ``ticks``."""

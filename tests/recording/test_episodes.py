@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 import katana450
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes import keeper as keeper_module
+from katana450.extensions.recording.episodes import running_episode
 from katana450.extensions.recording.episodes.episode import (
     Episode,
     EpisodeOutcome,
@@ -267,7 +267,7 @@ def test_episode_without_any_motion_is_not_kept(bench: Bench) -> None:
 def test_episode_ends_by_itself_at_the_maximum(bench: Bench) -> None:
     bench.ask(do="start", task="long")
     bench.move(60)
-    bench.t += keeper_module.MAX_SECONDS - 60.0
+    bench.t += running_episode.MAX_SECONDS - 60.0
     assert bench.keeper.status()["running"]["left"] <= 60
     bench.t += 60.0
     bench.keeper.tick()
@@ -279,6 +279,7 @@ def test_episode_ends_by_itself_at_the_maximum(bench: Bench) -> None:
 def test_full_disk_is_reported_and_the_episode_saved_later(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(running_episode, "RETRY_SECONDS", 0.0)
     bench.ask(do="start", task="pour")
     bench.move(60)
     # A folder stands where the file should be.
@@ -292,8 +293,6 @@ def test_full_disk_is_reported_and_the_episode_saved_later(
         bench.ask(do="judge", outcome="failure")
     assert bench.ring.held is not None
     blocked.rmdir()
-    monkeypatch.setattr(keeper_module, "RETRY_SECONDS", 0.0)
-    bench.keeper._retry_at = 0.0
     bench.keeper.tick()
     assert bench.keeper.status()["problem"] == ""
     assert bench.folder.find(1).episode.outcome is EpisodeOutcome.SUCCESS

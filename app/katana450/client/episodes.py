@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
 from katana450.atomic import write_files, writer_of
-from katana450.client.files import LostError, Site
+from katana450.client.files import LostError, RefusedError, Site
 from katana450.server.api.fields import ROOT
 
 PATH = f"{ROOT}/episodes"
+
+Answer = TypeVar("Answer")
 
 
 class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
@@ -46,11 +48,16 @@ class _List(msgspec.Struct):
     folder: str
 
 
+class _Done(msgspec.Struct):
+    number: int
+
+
 class EpisodeClient:
     """Records and judges the episodes of a server.
 
     Each method waits for the answer; an asyncio program calls it by ``asyncio.to_thread``. Raises
-    RefusedError with the reason if the server refuses, and LostError if there is no server.
+    RefusedError with the reason if the server refuses, and LostError if there is no server, or its
+    answer is not understood.
     """
 
     def __init__(self, site: Site) -> None:
@@ -65,19 +72,27 @@ class EpisodeClient:
         return tuple(self._listed().discarded)
 
     def folder(self) -> Path:
-        """Return the folder of the episodes, on the machine of the server."""
-        return Path(self._listed().folder)
+        """Return the folder of the episodes, on the machine of the server.
+
+        Raises RefusedError for a client that may only watch.
+        """
+        folder = self._listed().folder
+        if not folder:
+            raise RefusedError("Your role may watch, but not see where the files are.")
+        return Path(folder)
 
     def start(self, task: str | None = None) -> int:
         """Begin an episode and return its number. ``task``: None for that of the last one."""
         return self._number({"do": "start", "task": task})
 
-    def stop(self, outcome: str = "unjudged") -> int:
+    def stop(self, outcome: str = "unjudged", number: int | None = None) -> int:
         """End the episode that runs and return its number.
 
-        ``outcome``: unjudged, success or failure.
+        Args:
+            outcome: unjudged, success or failure.
+            number: the episode, so that no other one is ended; None for any.
         """
-        return self._number({"do": "stop", "outcome": outcome})
+        return self._number({"do": "stop", "outcome": outcome, "number": number})
 
     def judge(self, outcome: str, number: int | None = None) -> int:
         """Judge an episode and return its number.
@@ -96,13 +111,19 @@ class EpisodeClient:
         """Bring the discarded episode ``number`` back; return ``number``."""
         return self._number({"do": "restore", "number": number})
 
-    def undo(self) -> int:
-        """Undo the last judgement or discard, up to 10 s after it; return its number."""
-        return self._number({"do": "undo"})
+    def undo(self, number: int | None = None) -> int:
+        """Undo the last judgement, discard or re-record, up to 10 s after it; return its number.
 
-    def rerecord(self) -> int:
-        """Discard the last episode and begin it again; return the new number."""
-        return self._number({"do": "rerecord"})
+        ``number``: the episode, so that nothing else is undone; None for any.
+        """
+        return self._number({"do": "undo", "number": number})
+
+    def rerecord(self, number: int | None = None) -> int:
+        """Begin an episode again and return the new number; see ``judge``.
+
+        The old one is discarded when the new one is kept.
+        """
+        return self._number({"do": "rerecord", "number": number})
 
     def describe(self, number: int, *, task: str | None = None, note: str | None = None) -> int:
         """Change the texts of the episode ``number``; None keeps one. Return ``number``."""
@@ -121,11 +142,18 @@ class EpisodeClient:
         write_files({out: writer_of(content)})
 
     def _listed(self) -> _List:
-        try:
-            return msgspec.json.decode(self._site.fetched(PATH), type=_List)
-        except msgspec.MsgspecError as error:
-            raise LostError(f"The list of episodes is not understood: {error}.") from error
+        return _understood(self._site.fetched(PATH), _List)
 
     def _number(self, request: dict[str, Any]) -> int:
-        done = msgspec.json.decode(self._site.fetched(PATH, msgspec.json.encode(request)))
-        return int(done["number"])
+        return _understood(self._site.fetched(PATH, msgspec.json.encode(request)), _Done).number
+
+
+def _understood(content: bytes, kind: type[Answer]) -> Answer:
+    """Return the answer ``content`` of a server. Raises LostError if it is not of ``kind``."""
+    try:
+        return msgspec.json.decode(content, type=kind)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise LostError(
+            f"The answer about episodes is not understood: {error}. Is the server of the same "
+            "version?"
+        ) from error

@@ -185,7 +185,7 @@ TOPICS: Final = (
             "description of an episode; the last one of each number counts",
             ("t", "kind", "number", "begin", "outcome"),
             t=T,
-            kind=_text("begun, ended, judged, noted, trimmed or unfinished"),
+            kind=_text("begun, ended, judged, noted, trimmed, discarded, restored or unfinished"),
             number={"type": "integer", "description": "number of the episode, from 1"},
             task=_text("task in words"),
             begin=_number("first moment [s]"),

@@ -85,7 +85,8 @@ def message_of(episode: Episode, t: float, kind: str) -> dict[str, Any]:
     Args:
         episode: the episode.
         t: time of the message [s] on the clock of the recording.
-        kind: what is reported: begun, ended, judged, noted, trimmed or unfinished.
+        kind: what is reported: begun, ended, judged, noted, trimmed, discarded, restored or
+            unfinished.
     """
     by = episode.by
     return {

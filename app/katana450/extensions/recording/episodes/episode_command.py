@@ -87,7 +87,7 @@ def _recover(path: Path) -> int:
     folder = EpisodeFolder(path)
     folder.claim()
     try:
-        said = finish_interrupted(folder)
+        said = finish_interrupted(folder, folder.markers())
     finally:
         folder.release()
     for each in said or ["No episode was interrupted."]:

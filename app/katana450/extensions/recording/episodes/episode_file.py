@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.episodes.episode import (
     Episode,
+    episode_of,
     episodes_of,
     message_of,
 )
@@ -17,6 +19,9 @@ from katana450.extensions.recording.files.recording_file import Message, Recordi
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.state_message import nanoseconds
 from katana450.extensions.recording.topics import EPISODES
+
+SAME = 1e-3
+"""[s] Largest difference of times that are the same."""
 
 
 def episodes_in(file: RecordingFile) -> tuple[Episode, ...]:
@@ -39,6 +44,29 @@ def only_episode(file: RecordingFile) -> Episode:
     if len(found) != 1:
         raise InputError(f"{file.path} describes {len(found)} episodes, not one.")
     return found[0]
+
+
+def shown_part(file: RecordingFile, start: float | None, end: float | None) -> tuple[float, float]:
+    """Return begin and end of a part of ``file``, in seconds after its begin. Raises InputError.
+
+    Each is ``start`` or ``end`` if that is given. Else it is that of the episode, which may be
+    trimmed, if the file was cut out as that of one episode; else it is that of the file.
+    """
+    first, last = 0.0, math.inf
+    found = episodes_in(file)
+    if len(found) == 1 and found[0].end is not None and _is_cut_out(file):
+        first, last = (max(t - file.start, 0.0) for t in (found[0].begin, found[0].end))
+    return first if start is None else start, last if end is None else end
+
+
+def _is_cut_out(file: RecordingFile) -> bool:
+    """Return whether nothing in ``file`` is outside its episode as it was first described.
+
+    A recording of ten minutes may have one episode too, which is a part of it.
+    """
+    whole = episode_of(next(file.messages(EPISODES)).data)
+    ended = whole.end is not None and file.end <= whole.end + SAME
+    return ended and whole.begin <= file.start + SAME
 
 
 def write_episode(

@@ -61,12 +61,14 @@ class EpisodeMarker:
         ring: folder of the ring with its ticks.
         first: name of the first file of the ring that belongs to it; empty for any.
         run: text that names the run of the server, see ``utc_offset_ns`` of a recording.
+        replaces: numbers of the episodes that are discarded when it is kept.
     """
 
     episode: Episode
     ring: Path
     first: str
     run: str
+    replaces: tuple[int, ...] = ()
 
 
 def episode_files(folder: Path) -> list[Path]:
@@ -215,6 +217,7 @@ class EpisodeFolder:
                 "ring": str(marker.ring),
                 "first": marker.first,
                 "run": marker.run,
+                "replaces": marker.replaces,
             }
         )
         write_files({self._marker(episode.number): writer_of(text)}, mode=0o600)
@@ -265,8 +268,9 @@ def _marker_in(path: Path) -> EpisodeMarker:
     try:
         found = json.loads(path.read_bytes())
         episode = episode_of(json.dumps(found["episode"]))
+        ring, first, run = (str(found[name]) for name in ("ring", "first", "run"))
         return EpisodeMarker(
-            episode, Path(str(found["ring"])), str(found["first"]), str(found["run"])
+            episode, Path(ring), first, run, tuple(map(int, found.get("replaces", ())))
         )
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise InputError(f"{path} does not describe a running episode: {error}.") from error

@@ -26,8 +26,13 @@ def add_episode_options(parser: argparse.ArgumentParser) -> None:
             "number", type=int, nargs="?", metavar="NUMBER", help="default: the last episode"
         )
     restore = acts.add_parser("restore", help="bring a discarded episode back")
-    acts.add_parser("undo", help="undo the last judgement or discard, up to 10 s after it")
-    acts.add_parser("rerecord", help="discard the last episode and begin it again")
+    acts.add_parser(
+        "undo", help="undo the last judgement, discard or re-record, up to 10 s after it"
+    )
+    acts.add_parser(
+        "rerecord",
+        help="begin the last episode again; when the new one is kept, the old one is discarded",
+    )
     describe = acts.add_parser("describe", help="change task or note of an episode")
     trim = acts.add_parser("trim", help="give an episode another begin and end")
     for each in (restore, describe, trim):

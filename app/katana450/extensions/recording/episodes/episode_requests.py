@@ -44,9 +44,11 @@ class StopEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="stop"):
 
     Attributes:
         outcome: Its outcome, if it is known already.
+        number: The episode; another one that runs is not ended. None for any.
     """
 
     outcome: Judgement = "unjudged"
+    number: Number | None = None
 
 
 class JudgeEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="judge"):
@@ -81,12 +83,25 @@ class RestoreEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="restore"):
     number: Number
 
 
-class UndoEpisode(EpisodeRequest, frozen=True, tag="undo"):
-    """Undo the last judgement or discard, up to 10 s after it."""
+class UndoEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="undo"):
+    """Undo the last judgement, discard or re-record, up to 10 s after it.
+
+    Attributes:
+        number: The episode; what was done to another one since is not undone. None for any.
+    """
+
+    number: Number | None = None
 
 
-class RerecordEpisode(EpisodeRequest, frozen=True, tag="rerecord"):
-    """Discard the episode that runs, or else the last one, and begin it again."""
+class RerecordEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="rerecord"):
+    """Begin an episode again. When the new one is kept, the old one is discarded.
+
+    Attributes:
+        number: The old episode; None for the one that runs, or else the last one. One that runs is
+            ended first.
+    """
+
+    number: Number | None = None
 
 
 class DescribeEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="describe"):

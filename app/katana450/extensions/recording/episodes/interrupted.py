@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -50,13 +50,14 @@ def cut_out(folder: EpisodeFolder, marker: EpisodeMarker, kind: str) -> Episode:
     return episode
 
 
-def finish_interrupted(folder: EpisodeFolder) -> list[str]:
-    """Write the file of each episode whose process has ended; return a sentence about each.
+def finish_interrupted(folder: EpisodeFolder, markers: Sequence[EpisodeMarker]) -> list[str]:
+    """Write the file of each episode of ``markers``, whose processes have ended.
 
-    Those that cannot be written now keep their markers, for the next attempt.
+    Returns a sentence about each. Those that cannot be written now keep their markers, for the
+    next attempt.
     """
     said = []
-    for marker in folder.markers():
+    for marker in markers:
         number = marker.episode.number
         if any(folder.path(number, discarded=each).exists() for each in (False, True)):
             folder.unmark(number)

@@ -7,11 +7,11 @@ read meanwhile.
 from __future__ import annotations
 
 import logging
+import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,31 +35,13 @@ from katana450.extensions.recording.episodes.episode_requests import (
     TrimEpisode,
     UndoEpisode,
 )
-from katana450.extensions.recording.episodes.interrupted import (
-    NothingRecordedError,
-    cut_out,
-    finish_interrupted,
-)
+from katana450.extensions.recording.episodes.interrupted import finish_interrupted
+from katana450.extensions.recording.episodes.running_episode import MAX_SECONDS, RunningEpisode
 from katana450.extensions.recording.episodes.undoable_judgement import (
     UNDO_SECONDS,
     UndoableJudgement,
 )
 from katana450.extensions.recording.live.ring import Ring
-
-MAX_SECONDS = 3600.0
-"""[s] Maximum length of an episode, for which the ring keeps its files."""
-
-WARNING_SECONDS = 300.0
-"""[s] Time before the maximum from which the page says how much is left."""
-
-LATE_SECONDS = 0.3
-"""[s] Time without a tick after which all ticks until the end of an episode have arrived."""
-
-MAX_WAIT = 10.0
-"""[s] Maximum time for which the end of an episode waits for late ticks."""
-
-RETRY_SECONDS = 5.0
-"""[s] Time after which an episode that could not be saved is saved again."""
 
 log = logging.getLogger(__name__)
 
@@ -75,7 +57,10 @@ class EpisodeKeeper:
         run: str,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        """Use ``folder``, which is claimed. Episodes that a crash interrupted are finished.
+        """Use ``folder``, which is claimed.
+
+        Episodes that a crash interrupted are finished in a thread of their own, so that the ticks
+        do not wait for an hour that is copied.
 
         Args:
             folder: the folder of episodes.
@@ -85,23 +70,30 @@ class EpisodeKeeper:
             clock: the clock of the recording [s].
         """
         self._folder, self._ring, self._ring_folder = folder, ring, ring_folder
-        self._run, self._clock = run, clock
+        self._clock = clock
         self._requests = threading.Lock()
         self._changed = threading.Condition()
-        self._marker: EpisodeMarker | None = None
-        self._size_before = 0
-        self._unsaved = False
-        self._retry_at = float("inf")
-        self._saving = False
         self._undoable: UndoableJudgement | None = None
         self._notice = ""
-        self._problem = ""
         self._revision = 0
-        for said in finish_interrupted(folder):
-            self._notice = said
-        last = folder.last()
-        self._task = "" if last is None else last.episode.task
-        self._hold_interrupted()
+        self._running = RunningEpisode(folder, ring, ring_folder, run, self._note_change)
+        interrupted, last = folder.markers(), folder.last()
+        newest = interrupted[-1] if interrupted else last
+        self._task = "" if newest is None else newest.episode.task
+        self.finishing = threading.Thread(
+            target=self._finish, args=(interrupted,), name="interrupted episodes", daemon=True
+        )
+        """The thread that finishes interrupted episodes."""
+        self.finishing.start()
+
+    def _finish(self, interrupted: Sequence[EpisodeMarker]) -> None:
+        try:
+            for said in finish_interrupted(self._folder, interrupted):
+                self._note_change(said)
+            self._running.hold_needed()
+        except Exception:
+            # They keep their markers, and new episodes can be recorded.
+            log.exception("Interrupted episodes could not be finished.")
 
     # The state for the pages
 
@@ -119,37 +111,22 @@ class EpisodeKeeper:
     @property
     def active(self) -> bool:
         """True if the state changes by itself, because an episode runs or can be undone."""
-        return self._marker is not None or self._undo() is not None
+        return self._running.episode is not None or self._undo() is not None
 
     def status(self) -> dict[str, Any]:
         """Return the state as JSON values."""
-        marker, undo = self._marker, self._undo()
-        now = self._clock()
-        status: dict[str, Any] = {
+        undo = self._undo()
+        return {
             "revision": self._revision,
-            "running": None,
-            "saving": self._saving,
+            "running": self._running.status(self._clock()),
+            "saving": self._running.saving,
             "count": self._folder.count(),
             "task": self._task,
             "last": self._last_kept(),
-            "undo": None
-            if undo is None
-            else {"number": undo.number, "discarded": undo.before is None},
-            "problem": self._problem or (self._ring.problem if marker is not None else ""),
-            "notice": self._notice,
+            "undo": None if undo is None else {"number": undo.number},
+            "problem": self._without_paths(self._running.problem),
+            "notice": self._without_paths(self._notice),
         }
-        if marker is not None and marker.episode.end is None:
-            episode = marker.episode
-            length = now - episode.begin
-            left = MAX_SECONDS - length
-            status["running"] = {
-                "number": episode.number,
-                "seconds": max(int(length), 0),
-                "bytes": max(self._ring.size_from(marker.first) - self._size_before, 0),
-                "left": max(int(left), 0) if left < WARNING_SECONDS else None,
-                "by": episode.by.name,
-            }
-        return status
 
     def _last_kept(self) -> dict[str, Any] | None:
         """Return the last kept episode for the state; None without any."""
@@ -162,6 +139,15 @@ class EpisodeKeeper:
             "outcome": episode.outcome.value,
             "seconds": round(episode.length, 1),
         }
+
+    def _without_paths(self, text: str) -> str:
+        """Return ``text`` for all who watch: where files are does not concern them."""
+        for folder, name in (
+            (self._folder.folder, "the folder of episodes"),
+            (self._ring_folder.absolute(), "the folder of the last minutes"),
+        ):
+            text = text.replace(f"{folder}{os.sep}", "").replace(str(folder), name)
+        return text
 
     def _undo(self) -> UndoableJudgement | None:
         undo = self._undoable
@@ -189,127 +175,83 @@ class EpisodeKeeper:
                 self._note_change()
 
     def _handle(self, request: EpisodeRequest, by: EpisodeGiver, t: float) -> dict[str, Any]:
+        kind = request.__struct_config__.tag
         match request:
             case StartEpisode(task=task):
                 episode = self._start(self._task if task is None else task, by, t)
-            case StopEpisode(outcome=outcome):
-                episode = self._stop(EpisodeOutcome(outcome), t)
+            case StopEpisode(outcome=outcome, number=number):
+                episode = self._stop(EpisodeOutcome(outcome), t, number)
             case JudgeEpisode(number=number, outcome=outcome):
                 episode = self._judge(number, EpisodeOutcome(outcome), t)
             case DiscardEpisode(number=number):
                 episode = self._discard(number, t)
             case RestoreEpisode(number=number):
+                self._undoable = None
                 self._folder.restore(number)
-                episode = self._folder.find(number).episode
-            case UndoEpisode():
-                episode = self._undone()
-            case RerecordEpisode():
-                before = self._discard(None, t)
-                episode = self._start(before.task, by, self._clock())
+                episode = self._described(self._folder.find(number).episode, "restored")
+            case UndoEpisode(number=number):
+                episode = self._undone(number)
+            case RerecordEpisode(number=number):
+                episode = self._rerecord(number, by, t)
             case DescribeEpisode(number=number, task=task, note=note):
                 texts = {"task": task, "note": note}
                 changes = {name: text for name, text in texts.items() if text is not None}
-                episode = self._folder.change(number, "noted", **changes)
+                episode = self._change(number, "noted", **changes)
             case TrimEpisode(number=number, begin=begin, end=end):
                 episode = self._trim(number, begin, end)
             case _:
                 raise AssertionError(f"{type(request).__name__} is not handled.")
-        return {**message_of(episode, t, ""), "kind": request.__struct_config__.tag}
+        return {**message_of(episode, t, ""), "kind": kind}
+
+    def _change(self, number: int, kind: str, **changes: Any) -> Episode:
+        """Write a new description of a kept episode into its file, and into the recording."""
+        return self._described(self._folder.change(number, kind, **changes), kind)
+
+    def _described(self, episode: Episode, kind: str) -> Episode:
+        """Return ``episode`` after its description is in the recording too."""
+        t = self._clock()
+        with self._ring.lock:
+            self._ring.describe(t, message_of(episode, t, kind))
+        return episode
 
     def _start(self, task: str, by: EpisodeGiver, t: float) -> Episode:
-        if self._marker is not None:
-            if self._unsaved:
-                self._save()
-            else:
-                running = self._marker.episode.number
-                raise InputError(f"Episode {running} runs already. End it first.")
+        before, replaces = self._running.episode, self._running.replaces
+        if before is not None and before.end is not None:
+            self._replacing(self._running.save(), replaces)
         number = self._folder.next_number()
         episode = Episode(number, task.strip(), t, None, EpisodeOutcome.RUNNING, "", by)
-        with self._ring.lock:
-            first = self._ring.newest
-            # It may be finished by a program with another working directory.
-            marker = EpisodeMarker(episode, self._ring_folder.absolute(), first, self._run)
-            self._folder.mark(marker)
-            self._ring.held = first
-            self._size_before = self._ring.size_from(first)
-            self._ring.describe(t, message_of(episode, t, "begun"))
-            problem = self._ring.problem
-        if problem:
-            self._folder.unmark(number)
-            self._ring.held = None
-            raise InputError(problem)
-        self._marker, self._task = marker, episode.task
+        self._running.start(episode)
+        self._task = episode.task
         return episode
 
-    def _stop(self, outcome: EpisodeOutcome, t: float) -> Episode:
-        marker = self._marker
-        if marker is None or marker.episode.end is not None:
-            raise InputError("No episode runs.")
-        episode = replace(marker.episode, end=max(t, marker.episode.begin), outcome=outcome)
-        self._marker = replace(marker, episode=episode)
-        self._saving = True
-        self._note_change()
-        try:
-            with suppress(InputError):
-                # Saved at the next start with this end, if this process is killed now. A full disk
-                # is reported below.
-                self._folder.mark(self._marker)
-            self._wait_for_ticks(t)
-            with self._ring.lock:
-                self._ring.describe(t, message_of(episode, t, "ended"))
-            return self._save()
-        finally:
-            self._saving = False
+    def _stop(self, outcome: EpisodeOutcome, t: float, number: int | None = None) -> Episode:
+        replaces = self._running.replaces
+        self._check_running(number)
+        if self._undoable is not None and self._undoable.replaced is not None:
+            self._undoable = None
+        return self._replacing(self._running.stop(outcome, t), replaces)
 
-    def _wait_for_ticks(self, t: float) -> None:
-        """Wait until the ticks until ``t`` [s] have arrived; an arm at rest has none."""
-        deadline, newest, heard = time.monotonic() + MAX_WAIT, self._ring.last_t, time.monotonic()
-        while newest < t and time.monotonic() < min(deadline, heard + LATE_SECONDS):
-            time.sleep(0.02)
-            if self._ring.last_t != newest:
-                newest, heard = self._ring.last_t, time.monotonic()
+    def _check_running(self, number: int | None) -> None:
+        """Raise InputError if another episode than that of ``number`` runs."""
+        running = self._running.episode
+        if running is not None and number not in (None, running.number):
+            raise InputError(
+                f"Episode {running.number} runs now, not episode {number}, which has ended."
+            )
 
-    def _save(self) -> Episode:
-        """Write the file of the episode that has ended; keep it for another attempt if not."""
-        marker = self._marker
-        assert marker is not None
-        number = marker.episode.number
-        try:
-            episode = cut_out(self._folder, marker, "ended")
-        except NothingRecordedError:
-            self._forget(number)
-            raise
-        except InputError as error:
-            self._unsaved, self._retry_at = True, time.monotonic() + RETRY_SECONDS
-            self._problem = f"Episode {number} is not saved yet: {error}"
-            log.error("%s", self._problem)
-            raise InputError(f"{self._problem} It is tried again every few seconds.") from error
-        self._forget(number)
+    def _replacing(self, episode: Episode, replaced: tuple[int, ...]) -> Episode:
+        """Return ``episode``, which is saved, after the ones that it replaces are discarded."""
+        if episode.outcome is not EpisodeOutcome.UNFINISHED:
+            for each in replaced:
+                # Somebody may have discarded it meanwhile.
+                with suppress(InputError):
+                    self._move_to_discarded(each)
         return episode
 
-    def _forget(self, number: int) -> None:
-        """Release the files of the ring that episode ``number`` has needed."""
-        self._folder.unmark(number)
-        self._marker, self._unsaved, self._retry_at, self._problem = None, False, float("inf"), ""
-        self._hold_interrupted()
-
-    def _hold_interrupted(self) -> None:
-        """Hold the files of the ring that interrupted episodes still need."""
-        ring = self._ring_folder.absolute()
-        firsts = [each.first for each in self._folder.markers() if each.ring == ring]
-        self._ring.held = min(firsts, default=None)
-
-    def _runs(self, number: int | None) -> bool:
-        """Return whether the episode of ``number``, or for None any one, runs.
-
-        Raises InputError for one that has ended and could not be saved yet.
-        """
-        marker = self._marker
-        if marker is None or number not in (None, marker.episode.number):
-            return False
-        if marker.episode.end is not None:
-            raise InputError(self._problem)
-        return True
+    def _move_to_discarded(self, number: int) -> Episode:
+        episode = self._folder.find(number).episode
+        self._folder.discard(number)
+        return self._described(episode, "discarded")
 
     def _last(self, number: int | None) -> Episode:
         """Return the episode of ``number``; for None the last one."""
@@ -321,37 +263,73 @@ class EpisodeKeeper:
         return kept.episode
 
     def _judge(self, number: int | None, outcome: EpisodeOutcome, t: float) -> Episode:
-        if self._runs(number):
+        before = EpisodeOutcome.UNJUDGED
+        if self._running.runs(number):
             # With its outcome, which is kept if it can only be saved later.
-            episode, before = self._stop(outcome, t), EpisodeOutcome.UNJUDGED
+            episode = self._stop(outcome, t)
         else:
             found = self._last(number)
-            episode = self._folder.change(found.number, "judged", outcome=outcome)
+            episode = self._change(found.number, "judged", outcome=outcome)
             before = found.outcome
-        until = self._clock() + UNDO_SECONDS
-        self._undoable = UndoableJudgement(episode.number, before, until)
+        if outcome is not before:
+            self._make_undoable(episode.number, before)
         return episode
 
     def _discard(self, number: int | None, t: float) -> Episode:
-        runs = self._runs(number)
-        episode = self._stop(EpisodeOutcome.UNJUDGED, t) if runs else self._last(number)
-        self._folder.discard(episode.number)
-        until = self._clock() + UNDO_SECONDS
-        self._undoable = UndoableJudgement(episode.number, None, until)
+        if self._running.runs(number):
+            # What it was to replace stays.
+            self._running.set_replaces(())
+            number = self._stop(EpisodeOutcome.UNJUDGED, t).number
+        episode = self._move_to_discarded(self._last(number).number)
+        self._make_undoable(episode.number, None)
         return episode
 
-    def _undone(self) -> Episode:
+    def _rerecord(self, number: int | None, by: EpisodeGiver, t: float) -> Episode:
+        """Begin an episode that replaces the one that runs, or else the last one, when it is kept.
+
+        Until then nothing is discarded.
+        """
+        replaced: tuple[int, ...] = ()
+        if self._running.runs(None):
+            self._check_running(number)
+            replaced = self._running.replaces
+            self._running.set_replaces(())
+            before = self._stop(EpisodeOutcome.UNJUDGED, t)
+        else:
+            before = self._last(number)
+        episode = self._start(before.task, by, self._clock())
+        self._running.set_replaces((*replaced, before.number))
+        self._make_undoable(episode.number, None, replaced)
+        return episode
+
+    def _make_undoable(
+        self,
+        number: int,
+        before: EpisodeOutcome | None,
+        replaced: tuple[int, ...] | None = None,
+    ) -> None:
+        until = self._clock() + UNDO_SECONDS
+        self._undoable = UndoableJudgement(number, before, until, replaced)
+
+    def _undone(self, number: int | None) -> Episode:
         undo = self._undo()
         if undo is None:
             raise InputError(
                 f"There is nothing to undo: only the last judgement, for {UNDO_SECONDS:g} s. The "
                 "list of episodes changes every one."
             )
+        if number not in (None, undo.number):
+            raise InputError(
+                f"The last judgement is that of episode {undo.number}, not {number}. The list of "
+                "episodes changes every one."
+            )
         self._undoable = None
+        if undo.replaced is not None:
+            return self._running.set_replaces(undo.replaced)
         if undo.before is None:
             self._folder.restore(undo.number)
-            return self._folder.find(undo.number).episode
-        return self._folder.change(undo.number, "judged", outcome=undo.before)
+            return self._described(self._folder.find(undo.number).episode, "restored")
+        return self._change(undo.number, "judged", outcome=undo.before)
 
     def _trim(self, number: int, begin: float, end: float) -> Episode:
         found = self._folder.find(number)
@@ -363,22 +341,21 @@ class EpisodeKeeper:
                 f"Episode {number} lasts {length:.1f} s: choose a begin from 0 s, and an end after "
                 "it up to there."
             )
-        return self._folder.change(number, "trimmed", begin=start, end=stop)
+        return self._change(number, "trimmed", begin=start, end=stop)
 
     # Over time
 
     def tick(self) -> None:
         """End an episode that has reached the maximum, and save one that could not be saved."""
-        if not self.active or self._saving:
+        if not self.active or self._running.saving is not None:
             return
         with self._requests:
-            marker = self._marker
-            if marker is None:
+            episode, replaces = self._running.episode, self._running.replaces
+            if episode is None:
                 return
-            episode = marker.episode
-            if self._unsaved and time.monotonic() >= self._retry_at:
+            if self._running.retry_due:
                 with suppress(InputError):
-                    self._save()
+                    self._replacing(self._running.save(), replaces)
                     self._note_change(f"Episode {episode.number} is saved now.")
             elif episode.end is None and self._clock() - episode.begin >= MAX_SECONDS:
                 notice = f"Episode {episode.number} ended after {MAX_SECONDS / 60:g} minutes."
@@ -389,6 +366,6 @@ class EpisodeKeeper:
     def close(self) -> None:
         """End an episode that runs, because the server ends."""
         with self._requests, suppress(InputError):
-            if self._marker is not None and self._marker.episode.end is None:
+            if self._running.runs(None):
                 self._stop(EpisodeOutcome.UNFINISHED, self._clock())
         self._folder.release()

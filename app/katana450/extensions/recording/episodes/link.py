@@ -10,6 +10,7 @@ import json
 import logging
 import secrets
 import threading
+import time
 from contextlib import suppress
 from multiprocessing import AuthenticationError
 from multiprocessing.connection import (
@@ -36,6 +37,9 @@ IDLE_SECONDS = 60.0
 
 ACTIVE_SECONDS = 0.5
 """[s] Time between two states for a watcher while an episode runs."""
+
+ACCEPT_SECONDS = 0.5
+"""[s] Time after a connection that could not be accepted until the next one."""
 
 GREETING_SECONDS = 5.0
 """[s] Maximum time for which a client waits until the process that records greets it."""
@@ -84,12 +88,16 @@ class EpisodeListener:
             threading.Thread(target=work, name=name, daemon=True).start()
 
     def _accept(self) -> None:
+        reported = ""
         while True:
             try:
                 connection = self._listener.accept()
             except OSError as error:
-                log.error("No request about episodes could be accepted: %s.", error)
-                return
+                # As when too many files are open: later requests may be accepted.
+                if reported != (reported := str(error)):
+                    log.error("A request about episodes could not be accepted: %s.", error)
+                time.sleep(ACCEPT_SECONDS)
+                continue
             threading.Thread(
                 target=self._serve, args=(connection,), name="episode request", daemon=True
             ).start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
@@ -62,16 +63,20 @@ class EpisodeRoutes:
 
     async def _list(self, request: Request) -> Response:
         """Return all episodes, and the state of the one that runs."""
-        self._context.identity(request)
+        may_drive = self._context.identity(request).role.may_drive
         async with self._listing:
-            return JSONResponse(await asyncio.to_thread(self._listed))
+            return JSONResponse(await asyncio.to_thread(self._listed, paths=may_drive))
 
-    def _listed(self) -> dict[str, Any]:
+    def _listed(self, *, paths: bool) -> dict[str, Any]:
+        """Return the lists. ``paths``: whether to tell where the files are."""
+        unreadable = self._read.unreadable()
+        if not paths:
+            unreadable = [each.replace(f"{self._folder}{os.sep}", "") for each in unreadable]
         return {
             "episodes": [described(each) for each in self._read.kept()],
             "discarded": [described(each) for each in self._read.discarded()],
-            "unreadable": self._read.unreadable(),
-            "folder": str(self._folder),
+            "unreadable": unreadable,
+            "folder": str(self._folder) if paths else "",
             "state": self._context.hub.shown.get(ENTRY),
         }
 

@@ -1,0 +1,233 @@
+"""Requests about episodes by several people: none reaches another episode than the one meant."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from multiprocessing.connection import Listener
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from katana450.client.episodes import EpisodeClient
+from katana450.client.files import LostError, RefusedError, Site
+from katana450.errors import InputError
+from katana450.extensions.recording.episodes import interrupted, link
+from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome, episodes_of
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
+from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
+from katana450.extensions.recording.episodes.link import EpisodeListener, request_episode
+from katana450.extensions.recording.episodes.routes import EpisodeRoutes
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.places import recordings_in
+from katana450.extensions.recording.topics import EPISODES
+from katana450.platform_support import pipe_address
+from katana450.server.web.http_api import RouteContext
+from tests.recording.episode_bench import ADA, Bench
+
+PORT = 8080
+
+
+def attempt(bench: Bench, **stop: object) -> None:
+    """Record an episode and end it."""
+    bench.ask(do="start", task="pour")
+    bench.move(40)
+    bench.ask(**{"do": "stop", **stop})
+
+
+def numbers(bench: Bench) -> tuple[list[int], list[int]]:
+    """Return the numbers of the kept and of the discarded episodes."""
+    kept, gone = bench.folder.kept(), bench.folder.discarded()
+    return [each.episode.number for each in kept], [each.episode.number for each in gone]
+
+
+def test_request_for_an_episode_that_has_ended_reaches_no_other(bench: Bench) -> None:
+    attempt(bench)
+    bench.ask(do="start", task="stir")
+    bench.move(40)
+    for request in ("stop", "rerecord"):
+        with pytest.raises(InputError, match="Episode 2 runs now, not episode 1, which has ended"):
+            bench.ask(do=request, number=1)
+    # Only the one that was seen is judged, while the other one continues.
+    bench.ask(do="judge", number=1, outcome="success")
+    assert bench.keeper.status()["running"]["number"] == 2
+    with pytest.raises(InputError, match="that of episode 1, not 2"):
+        bench.ask(do="undo", number=2)
+    bench.ask(do="stop", number=2)
+    assert bench.folder.find(1).episode.outcome is EpisodeOutcome.SUCCESS
+    assert bench.folder.find(2).episode.outcome is EpisodeOutcome.UNJUDGED
+
+
+def test_undo_is_offered_only_if_there_is_something_to_undo(bench: Bench) -> None:
+    def offered() -> object:
+        return bench.keeper.status()["undo"]
+
+    attempt(bench, outcome="success")
+    assert offered() is None
+    bench.ask(do="judge", outcome="success")
+    assert offered() is None
+    bench.ask(do="judge", outcome="failure")
+    assert offered() == {"number": 1}
+    bench.ask(do="discard")
+    assert offered() == {"number": 1}
+    # The list has undone it already.
+    bench.ask(do="restore", number=1)
+    assert offered() is None
+
+
+def test_episode_is_discarded_only_when_the_one_that_replaces_it_is_kept(bench: Bench) -> None:
+    attempt(bench)
+    assert bench.ask(do="rerecord", number=1)["number"] == 2
+    assert numbers(bench) == ([1], [])
+    bench.move(40)
+    # A worse one.
+    bench.ask(do="discard")
+    assert numbers(bench) == ([1], [2])
+    assert bench.ask(do="rerecord")["number"] == 3
+    bench.move(40)
+    bench.ask(do="judge", outcome="success")
+    assert numbers(bench) == ([3], [1, 2])
+    # A crash keeps both.
+    assert bench.ask(do="rerecord")["number"] == 4
+    bench.move(40)
+    bench.ring.sync()
+    bench.keeper = bench.made()
+    assert numbers(bench) == ([3, 4], [1, 2])
+    assert bench.folder.find(4).episode.outcome is EpisodeOutcome.UNFINISHED
+
+
+def test_judgements_are_in_the_last_minutes_too(bench: Bench) -> None:
+    attempt(bench)
+    bench.ask(do="judge", outcome="failure")
+    bench.ask(do="describe", number=1, note="spilled")
+    bench.ring.close()
+    (path,) = recordings_in(bench.ring_folder)
+    with RecordingFile.open(path) as file:
+        messages = [each.data for each in file.messages(EPISODES)]
+    kinds = [json.loads(each)["kind"] for each in messages]
+    assert kinds == ["begun", "ended", "judged", "noted"]
+    (found,) = episodes_of(messages)
+    assert (found.outcome, found.note) == (EpisodeOutcome.FAILURE, "spilled")
+
+
+def test_interrupted_episode_is_finished_while_others_are_recorded(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.ask(do="start", task="long")
+    bench.move(60)
+    bench.ring.sync()
+    may_finish, cut_out = threading.Event(), interrupted.cut_out
+
+    def slow(*given: Any) -> Episode:
+        assert may_finish.wait(20.0)
+        return cut_out(*given)
+
+    monkeypatch.setattr(interrupted, "cut_out", slow)
+    run = bench.header.metadata["utc_offset_ns"]
+    bench.keeper = EpisodeKeeper(bench.folder, bench.ring, bench.ring_folder, run, lambda: bench.t)
+    # It has returned although the first episode is not saved yet, and still holds its files.
+    first = bench.ring.held
+    monkeypatch.setattr(interrupted, "cut_out", cut_out)
+    assert bench.ask(do="start", task="next")["number"] == 2
+    assert bench.ring.held == first
+    may_finish.set()
+    bench.keeper.finishing.join(20.0)
+    bench.move(40)
+    bench.ask(do="stop")
+    assert numbers(bench) == ([1, 2], [])
+    assert bench.folder.find(1).episode.outcome is EpisodeOutcome.UNFINISHED
+    assert bench.ring.held is None
+
+
+def test_connection_that_fails_does_not_end_the_listener(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    accept, failing = Listener.accept, [True, True]
+
+    def accept_later(listener: Any) -> Any:
+        if failing:
+            failing.pop()
+            raise OSError("Too many open files")
+        return accept(listener)
+
+    monkeypatch.setattr(Listener, "accept", accept_later)
+    monkeypatch.setattr(link, "ACCEPT_SECONDS", 0.05)
+    folder = bench.folder.folder
+    EpisodeListener(bench.keeper, folder, pipe_address(folder, "test"), PORT, b"salt")
+    done = request_episode(folder, PORT, '{"do": "start", "task": "pour"}', ADA)
+    assert done["number"] == 1
+    assert caplog.text.count("Too many open files") == 1
+
+
+def test_people_who_only_watch_do_not_learn_where_files_are(tmp_path: Path) -> None:
+    (tmp_path / "episode-0001.mcap").write_bytes(b"broken")
+    hub = SimpleNamespace(shown={})
+    context = RouteContext(hub, None, None)  # type: ignore[arg-type]
+    routes = EpisodeRoutes(context, tmp_path, PORT)
+    for paths in (True, False):
+        told = json.dumps(routes._listed(paths=paths))
+        assert "episode-0001.mcap" in told
+        assert (str(tmp_path) in told) is paths
+
+
+def test_problem_of_the_folder_is_shown_without_its_path(bench: Bench) -> None:
+    bench.ask(do="start", task="pour")
+    bench.move(40)
+    bench.folder.path(1).mkdir()
+    with pytest.raises(InputError, match=str(bench.folder.folder)):
+        bench.ask(do="stop")
+    problem = bench.keeper.status()["problem"]
+    assert "episode-0001.mcap cannot be written" in problem
+    assert str(bench.folder.folder) not in problem
+    bench.folder.path(1).rmdir()
+
+
+@contextmanager
+def answering(content: bytes) -> Iterator[str]:
+    """Serve ``content`` in answer to every request, and yield the address."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(content)
+
+        do_POST = do_GET  # noqa: N815 - the name that the class calls
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.mark.parametrize("content", [b"{}", b"[1]", b"not JSON", b'{"number": "x"}', b"\xff"])
+def test_answer_that_is_not_understood_is_an_error_of_this_project(content: bytes) -> None:
+    with answering(content) as url:
+        client = EpisodeClient(Site(url))
+        for act in (client.start, client.list, client.folder):
+            with pytest.raises(LostError, match="is not understood"):
+                act()
+
+
+def test_folder_is_refused_to_those_who_watch() -> None:
+    content = json.dumps({"episodes": [], "discarded": [], "folder": ""}).encode()
+    with answering(content) as url, pytest.raises(RefusedError, match="may watch"):
+        EpisodeClient(Site(url)).folder()
+
+
+def test_folder_of_markers_of_earlier_versions_is_read(tmp_path: Path, bench: Bench) -> None:
+    bench.ask(do="start", task="pour")
+    (path,) = bench.folder.folder.glob("*.running.json")
+    found = json.loads(path.read_bytes())
+    del found["replaces"]
+    (tmp_path / path.name).write_text(json.dumps(found))
+    (marker,) = EpisodeFolder(tmp_path).markers()
+    assert marker.replaces == ()
