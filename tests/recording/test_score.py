@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,10 +22,26 @@ from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.script import parse
-from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.codec import json_text
+from katana450.extensions.recording.episodes.episode import (
+    Episode,
+    EpisodeGiver,
+    EpisodeOutcome,
+    message_of,
+)
+from katana450.extensions.recording.episodes.episode_file import (
+    shown_part,
+    with_episode,
+    write_episode,
+)
+from katana450.extensions.recording.files.appending import append_message
+from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.scoring.leaderboard import Leaderboard, shown
+from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEASURES, Scored, scored
 from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
+from katana450.extensions.recording.state_message import nanoseconds
+from katana450.extensions.recording.topics import EPISODES
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from tests.recording.recorded import PERIOD, described
@@ -155,7 +172,51 @@ def test_placing_error_is_the_distance_from_the_target(line: Path) -> None:
     assert score(line, targets={"cup": np.array((x, y, z + 0.01))}).values[
         "placing_error_mm"
     ] == pytest.approx(10.0)
-    assert score(line, targets={"stone": np.zeros(3)}).values["placing_error_mm"] is None
+    # One of two objects is missing: nobody knows how far from its place it is.
+    both = score(line, targets={"stone": np.zeros(3), "cup": np.array((x, y, z))})
+    assert both.values["placing_error_mm"] is None
+    assert both.missing == ("stone",)
+    board = Leaderboard.of((both,))
+    assert "placing_error_mm" in board.measures
+    assert board.notes == [
+        "line.mcap has no object stone, so its placing error is unknown.",
+    ]
+    assert board.json[0]["missing_objects"] == ["stone"]
+
+
+def test_trimmed_episode_is_scored_and_run_again_in_its_range(
+    line: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "episode-0001.mcap"
+    with RecordingFile.open(line) as file:
+        begin, end = file.start, file.end
+    by = EpisodeGiver("Ada", "operator", "")
+    episode = Episode(1, "lift", begin, end, EpisodeOutcome.SUCCESS, "", by)
+    write_episode([line], path, episode)
+    whole = score_file(path).values["tool_path_mm"] or 0.0
+    assert whole == pytest.approx(score_file(line).values["tool_path_mm"])
+    middle = 0.4 * (end - begin)
+    with_episode(path, replace(episode, end=begin + middle), "trimmed")
+    trimmed = score_file(path).values["tool_path_mm"] or 0.0
+    assert 0.0 < trimmed < 0.9 * whole
+    assert score_file(path, 0.0, middle).values["tool_path_mm"] == trimmed
+    assert score_file(path, 0.0, math.inf).values["tool_path_mm"] == pytest.approx(whole)
+    run = katana450.open(path)
+    assert run.script() == run.script(0.0, middle)
+    script = tmp_path / "again.yaml"
+    capsys.readouterr()
+    assert main(["record", "again", str(path), "--out", str(script)]) == 0
+    assert script.read_text(encoding="utf-8") == run.script()
+    # A recording in which an episode took place is no file of that episode.
+    with_episode(path, replace(episode, begin=begin + 0.1, end=end - 0.1), "trimmed")
+    with RecordingFile.open(path) as file:
+        assert shown_part(file, None, None) == pytest.approx((0.1, end - begin - 0.1))
+    longer = tmp_path / "longer.mcap"
+    shutil.copy(line, longer)
+    text = json_text(message_of(replace(episode, begin=begin + 0.1), end, "ended"))
+    append_message(longer, Message(EPISODES, 0, nanoseconds(end), text))
+    with RecordingFile.open(longer) as file:
+        assert shown_part(file, None, None) == (0.0, math.inf)
 
 
 def test_leaderboard_is_sorted_and_marks_the_best(line: Path, stopped: Path) -> None:
@@ -223,7 +284,8 @@ def test_useless_input_is_refused(line: Path, capsys: pytest.CaptureFixture[str]
     assert main(["score", str(line), "--target", "stone=1,2"]) == 1
     assert "no object 'stone'. Known objects: basin, cup" in capsys.readouterr().err
     assert main(["score", str(line), "--from", "100"]) == 1
-    assert main(["score", str(line), "--sort", "beauty"]) == 1
+    # Before any file is simulated, or even found.
+    assert main(["score", str(line.with_name("missing.mcap")), "--sort", "beauty"]) == 1
     assert "no measure 'beauty'" in capsys.readouterr().err
     for target in ("cup", "cup=1", "cup=1,x", "=1,2"):
         with pytest.raises(SystemExit):

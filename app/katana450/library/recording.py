@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ import numpy.typing as npt
 from katana450.arm.control.commands import Command
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.recording.episodes.episode import Episode
-from katana450.extensions.recording.episodes.episode_file import episodes_in
+from katana450.extensions.recording.episodes.episode_file import episodes_in, shown_part
 from katana450.extensions.recording.files.checking import (
     MissingMessage,
     TickReader,
@@ -181,16 +180,17 @@ class Recording:
 
     def script(
         self,
-        start: float = 0.0,
-        end: float = math.inf,
+        start: float | None = None,
+        end: float | None = None,
         *,
         urdf: str | os.PathLike[str] | None = None,
     ) -> str:
         """Return the script that runs this motion again, as ``katana450 record again`` does.
 
         Args:
-            start: begin of the part [s] after that of the recording.
-            end: its end [s].
+            start: begin of the part [s] after that of the recording; None for that of the episode
+                if the file is one, which may be trimmed, or else of the recording.
+            end: its end [s]; None as for ``start``.
             urdf: file of the recorded robot, if it is not the Katana450 of this package.
 
         Raises:
@@ -204,8 +204,8 @@ class Recording:
     def run_again(
         self,
         client: Client,
-        start: float = 0.0,
-        end: float = math.inf,
+        start: float | None = None,
+        end: float | None = None,
         *,
         speed: float = 1.0,
         urdf: str | os.PathLike[str] | None = None,
@@ -217,8 +217,9 @@ class Recording:
 
         Args:
             client: a connection, from `katana450.connect`.
-            start: begin of the part [s] after that of the recording.
-            end: its end [s].
+            start: begin of the part [s] after that of the recording; None for that of the episode
+                if the file is one, which may be trimmed, or else of the recording.
+            end: its end [s]; None as for ``start``.
             speed: fraction of the recorded speed, up to 1.
             urdf: file of the recorded robot, if it is not the Katana450 of this package.
 
@@ -237,8 +238,8 @@ class Recording:
 
     def score(
         self,
-        start: float = 0.0,
-        end: float = math.inf,
+        start: float | None = None,
+        end: float | None = None,
         *,
         targets: Mapping[str, npt.ArrayLike] | None = None,
         urdf: str | os.PathLike[str] | None = None,
@@ -249,8 +250,9 @@ class Recording:
         of objects, and the ``tool`` point and its ``speed`` at the times ``t``.
 
         Args:
-            start: begin of the part [s] after that of the recording.
-            end: its end [s].
+            start: begin of the part [s] after that of the recording; None for that of the episode
+                if the file is one, which may be trimmed, or else of the recording.
+            end: its end [s]; None as for ``start``.
             targets: places (3,) [m] in the base frame where objects should stand at the end, by
                 name, such as the ``places`` of another run; NaN for a number that is free.
             urdf: file of the recorded robot, if it is not the Katana450 of this package.
@@ -265,8 +267,8 @@ class Recording:
     def replay(
         self,
         speed: float = 1.0,
-        start: float = 0.0,
-        end: float = math.inf,
+        start: float | None = None,
+        end: float | None = None,
         *,
         port: int = 8090,
         host: str = "127.0.0.1",
@@ -278,8 +280,9 @@ class Recording:
 
         Args:
             speed: factor on the recorded time, above 0.
-            start: begin of the part [s] after that of the recording.
-            end: its end [s].
+            start: begin of the part [s] after that of the recording; None for that of the episode
+                if the file is one, which may be trimmed, or else of the recording.
+            end: its end [s]; None as for ``start``.
             port: TCP port of the scene, or the next free one above it.
             host: address to listen on, without a password.
             urdf: file of the recorded robot, if it is not the Katana450 of this package.
@@ -295,7 +298,8 @@ class Recording:
         check_speed(speed)
         with RecordingFile.open(self.path) as file:
             robot = session_for(file, None if urdf is None else Path(urdf))
-        frames = RecordedFrames(self.path, robot, start, end)
+            part = shown_part(file, start, end)
+        frames = RecordedFrames(self.path, robot, *part)
         viewer = Viewer(load(None if urdf is None else Path(urdf), frame="base"), port, host)
         viewer.replay(frames, speed)
         return viewer

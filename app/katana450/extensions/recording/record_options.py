@@ -104,27 +104,32 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         each.add_argument(
             "--out", type=Path, required=True, metavar="FILE", help="new file or folder"
         )
-    for each in (again, trim, export):
+    for each in (trim, export):
         add_part_options(each)
+    add_part_options(again, episode=True)
 
 
-def add_part_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that choose a part of a recording to ``parser``."""
+def add_part_options(parser: argparse.ArgumentParser, *, episode: bool = False) -> None:
+    """Add the options that choose a part of a recording to ``parser``.
+
+    ``episode``: whether the default is None, for the episode of a file that is one.
+    """
+    whole = "that of the episode, or else of the recording" if episode else "that of the recording"
     parser.add_argument(
         "--from",
         dest="start",
         type=_seconds,
-        default=0.0,
+        default=None if episode else 0.0,
         metavar="S",
-        help="begin of the part, in seconds after the begin of the recording",
+        help=f"begin of the part, in seconds after the begin of the recording (default: {whole})",
     )
     parser.add_argument(
         "--to",
         dest="end",
         type=_seconds,
-        default=math.inf,
+        default=None if episode else math.inf,
         metavar="S",
-        help="end of the part (default: that of the recording)",
+        help=f"end of the part, in seconds after the begin of the recording (default: {whole})",
     )
 
 

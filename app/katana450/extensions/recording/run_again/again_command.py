@@ -23,6 +23,7 @@ from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.trajectory_path import TrajectoryPath
+from katana450.extensions.recording.episodes.episode_file import shown_part
 from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recorded_states import at_rest, recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
@@ -69,13 +70,13 @@ def again(options: Namespace) -> int:
 
 
 def part_and_script(
-    file: RecordingFile, found: DescribedRobot, start: float, end: float
+    file: RecordingFile, found: DescribedRobot, start: float | None, end: float | None
 ) -> tuple[RecordedPart, str]:
     """Return the part of ``file`` from ``start`` to ``end`` [s] after its begin, and its script.
 
-    Raises InputError as ``read_part`` and ``again_script``.
+    None: see ``shown_part``. Raises InputError as ``read_part`` and ``again_script``.
     """
-    part = read_part(file, start, end, name=file.path.name)
+    part = read_part(file, *shown_part(file, start, end), name=file.path.name)
     gripper = found.session.require_arm().gripper
     bare = bool(json.loads(file.metadata["settings"])["bare"])
     return part, again_script(part, gripper, bare=bare)

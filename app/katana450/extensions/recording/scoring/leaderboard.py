@@ -9,7 +9,12 @@ from typing import Any
 
 from katana450.errors import InputError
 from katana450.extensions.programs.measures import title_of, unit_of
-from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEASURES, Scored
+from katana450.extensions.recording.scoring.scored import (
+    HIGHER_IS_BETTER,
+    MEASURES,
+    PLACING,
+    Scored,
+)
 
 BEST = "*"
 """Mark of the best value of a measure."""
@@ -36,8 +41,7 @@ class Leaderboard:
 
         Scores to which it does not apply come last.
         """
-        if by not in MEASURES:
-            raise InputError(f"There is no measure {by!r}. Known: {', '.join(MEASURES)}.")
+        check_measure(by)
         sign = -1.0 if by in HIGHER_IS_BETTER else 1.0
 
         def place(score: Scored) -> float:
@@ -45,7 +49,10 @@ class Leaderboard:
             return math.inf if value is None else sign * value
 
         measures = tuple(
-            name for name in MEASURES if any(each.values[name] is not None for each in scores)
+            name
+            for name in MEASURES
+            if any(each.values[name] is not None for each in scores)
+            or (name == PLACING and any(each.missing for each in scores))
         )
         return Leaderboard(tuple(sorted(scores, key=place)), measures)
 
@@ -77,12 +84,22 @@ class Leaderboard:
         ]
 
     @property
+    def notes(self) -> list[str]:
+        """A sentence about each recording that lacks objects with a target."""
+        return [
+            f"{each.name} has no object {', '.join(each.missing)}, so its placing error is unknown."
+            for each in self.rows
+            if each.missing
+        ]
+
+    @property
     def json(self) -> list[dict[str, Any]]:
         """The scores as JSON values, with units in the names, in their order."""
         return [
             {
                 "name": each.name,
                 **each.values,
+                "missing_objects": list(each.missing),
                 "places_mm": {
                     name: [round(1e3 * number, 3) for number in place.tolist()]
                     for name, place in each.places.items()
@@ -90,6 +107,12 @@ class Leaderboard:
             }
             for each in self.rows
         ]
+
+
+def check_measure(name: str) -> None:
+    """Raise InputError unless ``name`` is that of a measure."""
+    if name not in MEASURES:
+        raise InputError(f"There is no measure {name!r}. Known: {', '.join(MEASURES)}.")
 
 
 def name_of(measure: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from argparse import Namespace
 from collections.abc import Mapping
 from datetime import datetime
@@ -14,15 +13,17 @@ import numpy as np
 from katana450.assembly.log_lines import printable
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
+from katana450.extensions.recording.episodes.episode_file import shown_part
 from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.scoring.leaderboard import BEST, Leaderboard
+from katana450.extensions.recording.scoring.leaderboard import BEST, Leaderboard, check_measure
 from katana450.extensions.recording.scoring.score_page import score_page
 from katana450.extensions.recording.scoring.scored import Places, Scored, scored
 
 
 def score_files(options: Namespace) -> int:
     """Run ``katana450 score`` and return the exit status. Raises InputError."""
+    check_measure(options.sort)
     targets: dict[str, np.ndarray] = {}
     if options.like is not None:
         targets |= score_file(options.like, urdf=options.urdf).places
@@ -41,6 +42,8 @@ def score_files(options: Namespace) -> int:
     else:
         for line in board.lines:
             print(printable(line))
+        for line in board.notes:
+            print(printable(line))
         if len(found) > 1:
             print(f"Sorted by {options.sort}; {BEST} marks the best.")
     if options.html is not None:
@@ -53,15 +56,15 @@ def score_files(options: Namespace) -> int:
 
 def score_file(
     path: Path,
-    start: float = 0.0,
-    end: float = math.inf,
+    start: float | None = None,
+    end: float | None = None,
     targets: Mapping[str, np.ndarray] | Places | None = None,
     urdf: Path | None = None,
 ) -> Scored:
-    """Return the score of the recording at ``path``; see ``scored``.
+    """Return the score of the recording at ``path``; see ``scored``, and for None ``shown_part``.
 
     ``urdf``: file of the recorded robot, if it is not that of this program. Raises InputError.
     """
     with RecordingFile.open(path) as file:
         robot = session_for(file, urdf)
-        return scored(file, robot, start, end, targets, name=path.name)
+        return scored(file, robot, *shown_part(file, start, end), targets, name=path.name)

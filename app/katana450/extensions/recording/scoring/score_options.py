@@ -12,7 +12,7 @@ from katana450.extensions.recording.record_options import add_part_options
 def add_score_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 score`` to ``parser``."""
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="recordings")
-    add_part_options(parser)
+    add_part_options(parser, episode=True)
     parser.add_argument(
         "--target",
         action="append",

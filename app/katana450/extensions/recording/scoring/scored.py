@@ -31,6 +31,9 @@ from katana450.maths.collision.contact import Contact
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.batch import forward_batch
 
+PLACING: Final = "placing_error_mm"
+"""Name of the measure that needs targets."""
+
 MEASURES: Final = {
     "duration_s": "from the first motion to the end of the last",
     "tool_path_mm": "length of the path of the tool point",
@@ -45,7 +48,7 @@ MEASURES: Final = {
     "emptied_percent": REPORTED["emptied_percent"],
     "spilled_ml": REPORTED["spilled_ml"],
     "cup_peak_jerk_m_s3": REPORTED["cup_peak_jerk_m_s3"],
-    "placing_error_mm": "maximum distance of an object's final place from its target",
+    PLACING: "maximum distance of an object's final place from its target",
     "stops": "number of times that the arm was stopped",
     "contacts": "number of times that the arm waited before a contact",
 }
@@ -80,6 +83,8 @@ class Scored:
         t: (N,) times from the first motion [s], at equal steps.
         tool: (N, 3) the tool point in the base frame [m].
         speed: (N,) its speed [m/s].
+        missing: names of the objects that have a target and are not in the recording. The placing
+            error is then unknown.
     """
 
     name: str
@@ -88,6 +93,7 @@ class Scored:
     t: FloatArray
     tool: FloatArray
     speed: FloatArray
+    missing: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         known = {name: value for name, value in self.values.items() if value is not None}
@@ -113,8 +119,7 @@ def scored(
         robot: the recorded robot and its rules.
         start: begin of the part [s].
         end: end of the part [s].
-        targets: places at which objects should stand at the end; those that it does not have are
-            left out.
+        targets: places at which objects should stand at the end.
         name: name of the recording.
 
     Raises:
@@ -152,14 +157,15 @@ def scored(
         "sparc": sparc(speed) if moved else None,
         "nearest_clearance_mm": _clearance(session, run),
         **joints,
-        "placing_error_mm": _placing_error(places, targets or {}),
+        PLACING: _placing_error(places, targets or {}),
         "stops": float(_begins([state.stopped is not None for state in states])),
         "contacts": float(_begins([_waits_before_contact(state) for state in states])),
     }
     water = states[-1].poured
     if water is not None and water.water.total:
         values |= water_measures(water)
-    return Scored(name, values, places, frozen(t), frozen(tool), frozen(speed))
+    missing = tuple(sorted((targets or {}).keys() - places.keys()))
+    return Scored(name, values, places, frozen(t), frozen(tool), frozen(speed), missing)
 
 
 def _check_same(file: RecordingFile, states: Sequence[State], first: float, last: float) -> None:
@@ -235,13 +241,16 @@ def _places(session: Session, state: State) -> dict[str, FloatArray]:
 
 
 def _placing_error(places: Places, targets: Places) -> float | None:
-    """Return the maximum distance [mm] of an object from its target; None without a target."""
-    apart = [
+    """Return the maximum distance [mm] of an object from its target.
+
+    Returns None without a target, and if an object with a target is missing.
+    """
+    if not targets or targets.keys() - places.keys():
+        return None
+    return 1e3 * max(
         float(np.linalg.norm(np.nan_to_num(places[name] - target)))
         for name, target in targets.items()
-        if name in places
-    ]
-    return 1e3 * max(apart) if apart else None
+    )
 
 
 def _waits_before_contact(state: State) -> bool:
