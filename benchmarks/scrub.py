@@ -20,8 +20,7 @@ import zstandard
 
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from katana450.extensions.recording.playback.run import PlaybackRun
-from katana450.extensions.recording.playback.store import opened
+from katana450.extensions.recording.playback.store import AnyRun, opened
 from tests.recording.recorded import header, run
 
 TICKS = 2000
@@ -74,7 +73,7 @@ def floors(path: Path, count: int) -> list[float]:
     return found
 
 
-def scrubs(played: PlaybackRun, count: int) -> list[float]:
+def scrubs(played: AnyRun, count: int) -> list[float]:
     """Return the times [s] from a request to the state at random moments."""
     rng, found = random.Random(6), []
     start, end = played.spans[0].start, played.spans[-1].end

@@ -21,5 +21,5 @@ export const hide = (page) => post(`${API}/hide?page=${page}`);
 // Return {t, joints, tool} of two recordings.
 export const difference = (query) => answered(`${API}/difference?${new URLSearchParams(query)}`);
 
-// Send a file and return the name of its recording.
-export const open = (file) => post(API, file).then(({ name }) => name);
+// Send a file and return {name, note} of its recording.
+export const open = (file) => post(API, file);

@@ -80,11 +80,11 @@ export class Timeline {
   async open(file, use = (name) => this.#choose(name)) {
     this.#page.toast(`Opening ${file.name} …`);
     try {
-      const name = await api.open(file);
+      const { name, note } = await api.open(file);
       this.#names.set(name, file.name);
       this.#list();
       await use(name);
-      this.#page.toast(`${file.name} is open.`);
+      this.#page.toast(note || `${file.name} is open.`);
     } catch (error) {
       this.#page.toast(error.message);
       this.#list();

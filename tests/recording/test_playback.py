@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import random
+import signal
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -28,7 +31,7 @@ from katana450.extensions.recording.files.recording_file import checked_size, ut
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.places import recordings_in
-from katana450.extensions.recording.playback import chunks
+from katana450.extensions.recording.playback import chunks, opened_run
 from katana450.extensions.recording.playback import run as run_module
 from katana450.extensions.recording.playback.chunks import ChunkIndex
 from katana450.extensions.recording.playback.difference import difference
@@ -61,7 +64,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[TickR
 
 def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]) -> None:
     path, records = recorded
-    run = opened(path)
+    run = read(path)
     shift = run.spans[0].start - records[0].t
     assert run.spans[-1].end == pytest.approx(records[-1].t + shift, abs=1e-6)
     for each in random.Random(1).sample(records, 40):
@@ -74,7 +77,7 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
             if not wanted.carried and wanted.name in poses:
                 np.testing.assert_allclose(poses[wanted.name], wanted.T, atol=2e-6)
         assert {"cup", "basin"} <= poses.keys()
-        row = run.row_at(each.t + shift + 1e-6)
+        (row,) = run.rows_at([each.t + shift + 1e-6])
         assert row is not None
         assert row.q == moment.row.q
         if each.state.poured is not None and moment.water is not None:
@@ -103,13 +106,24 @@ def test_file_that_grows_is_read_as_far_as_it_is_written(
     assert ends[-1] > ends[0]
 
 
+def read(path: Path) -> PlaybackRun:
+    """Return the run in the file ``path``, decoded in this process."""
+    run = PlaybackRun(lambda: [path])
+    run.update()
+    return run
+
+
 def test_broken_files_are_refused(recorded: tuple[Path, list[TickRecord]], tmp_path: Path) -> None:
     content = bytearray(recorded[0].read_bytes())
     path = tmp_path / "broken.mcap"
     for broken in (b"", b"no recording at all", bytes(content[:40])):
         path.write_bytes(broken)
-        with pytest.raises(InputError):
-            opened(path)
+        try:
+            assert not read(path).spans
+        except InputError:
+            continue
+    with pytest.raises(InputError, match="The file is"):
+        opened(path)
     rng = random.Random(2)
     for _ in range(20):
         damaged = bytearray(content)
@@ -117,7 +131,7 @@ def test_broken_files_are_refused(recorded: tuple[Path, list[TickRecord]], tmp_p
             damaged[rng.randrange(len(damaged))] = rng.randrange(256)
         path.write_bytes(damaged)
         try:
-            run = opened(path)
+            run = read(path)
             for t in (run.spans[0].start, run.spans[-1].end):
                 run.at(t)
             run.marks()
@@ -132,13 +146,34 @@ def test_files_that_would_fill_the_memory_are_refused(
         checked_size(Chunk("", bytes(100), 0, 0, 0, 10))
     with monkeypatch.context() as patched:
         patched.setattr(chunks, "MAX_RECORDS", 3)
-        with pytest.raises(InputError, match="more than 3 records") as caught:
-            opened(recorded[0])
-        assert str(caught.value).startswith("The file is")
-    run = opened(recorded[0])
+        with pytest.raises(InputError, match="more than 3 records"):
+            read(recorded[0])
+    run = read(recorded[0])
     monkeypatch.setattr(run_module, "MAX_BLOCK_BYTES", 20_000)
     with pytest.raises(InputError, match="more than 20000 bytes"):
         run.at(run.spans[0].start)
+
+
+def test_file_that_its_process_cannot_decode_is_refused(
+    recorded: tuple[Path, list[TickRecord]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = opened(recorded[0])
+    begin = run.spans[0].start
+    before = run.at(begin)
+    assert run._process is not None
+    assert before is not None
+    # As at the limit of its memory.
+    run._process.kill()
+    with pytest.raises(InputError, match="could not be decoded"):
+        run.at(begin)
+    after = run.at(begin)
+    assert after is not None
+    assert after.row == before.row
+    if sys.platform != "win32":
+        os.kill(run._process.pid, signal.SIGSTOP)
+    monkeypatch.setattr(opened_run, "TIMEOUT", 0.2)
+    with pytest.raises(InputError, match=r"could not be decoded within 0\.2 s"):
+        run.at(begin)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +252,7 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
             if number % 20 == 19:
                 writer.flush()
         writer.close()
-    run = opened(path)
+    run = read(path)
     shift = run.spans[0].start - 1000.0
     assert max(len(each.poured.water.parcels) for each in states if each.poured) > 10
     for wanted in states[::7]:

@@ -10,10 +10,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from katana450.errors import InputError
-from katana450.platform_support import claim_file
-
-CLAIM = ".claim"
-"""Name of the file that a running export has claimed in its temporary folder."""
+from katana450.extensions.recording.claimed_folder import (
+    CLAIM,
+    claimed_folder,
+    remove_abandoned,
+)
 
 
 @contextmanager
@@ -27,17 +28,16 @@ def new_folder(path: Path) -> Iterator[Path]:
         raise InputError(f"{path} exists already. Name a new folder; nothing is replaced.")
     if not path.parent.is_dir():
         raise InputError(f"There is no directory {path.parent}; create it, or name another folder.")
-    _remove_abandoned(path)
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    remove_abandoned(path.parent.glob(f".{_escaped(path.name)}.????????/{CLAIM}"))
     try:
-        temporary.mkdir()
+        temporary, claim = claimed_folder(lambda: _made_beside(path))
         try:
-            with (temporary / CLAIM).open("wb") as claim:
-                with suppress(OSError):
-                    # Some file systems have no claims.
-                    claim_file(claim.fileno())
+            with claim:
                 yield temporary
-            (temporary / CLAIM).unlink()
+                with suppress(PermissionError):
+                    # While it is claimed; Windows removes no open file.
+                    (temporary / CLAIM).unlink()
+            (temporary / CLAIM).unlink(missing_ok=True)
             _sync(temporary)
             temporary.rename(path)
         finally:
@@ -46,16 +46,10 @@ def new_folder(path: Path) -> Iterator[Path]:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
-def _remove_abandoned(path: Path) -> None:
-    """Remove the temporary folders of exports to ``path`` that were killed."""
-    for claim in path.parent.glob(f".{_escaped(path.name)}.????????/{CLAIM}"):
-        try:
-            with claim.open("rb+") as file:
-                claim_file(file.fileno())
-        except OSError:
-            # Its export still runs, or it is not ours to remove.
-            continue
-        shutil.rmtree(claim.parent, ignore_errors=True)
+def _made_beside(path: Path) -> Path:
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    temporary.mkdir()
+    return temporary
 
 
 def _escaped(name: str) -> str:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import math
+import shutil
 import sys
-import tempfile
 from asyncio.subprocess import PIPE
 from collections.abc import Mapping
 from http import HTTPStatus
 from pathlib import Path
 
+from starlette.background import BackgroundTask
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import FileResponse, Response
 from starlette.routing import Route
+from starlette.types import Receive, Scope, Send
 
 from katana450.errors import InputError
 from katana450.extensions.recording.playback.store import RING, RecordingStore
@@ -35,7 +37,7 @@ def recording_routes(context: RouteContext, store: RecordingStore) -> list[Route
     urdf = getattr(context.options, "urdf", None)
     described = () if urdf is None else ("--urdf", str(urdf))
 
-    async def made(request: Request, *, script: bool) -> bytes:
+    async def made(request: Request, *, script: bool) -> Response:
         if not context.identity(request).role.may_drive:
             raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not record.")
         command = _command(store, request.query_params)
@@ -44,22 +46,44 @@ def recording_routes(context: RouteContext, store: RecordingStore) -> list[Route
                 HTTPStatus.TOO_MANY_REQUESTS, "Another recording is being made. Wait a moment."
             )
         async with working:
-            with tempfile.TemporaryDirectory(prefix="katana450-") as temporary:
-                kept, again = Path(temporary) / "kept.mcap", Path(temporary) / "again.yaml"
+            temporary = await asyncio.to_thread(store.new_folder)
+            remove = BackgroundTask(shutil.rmtree, temporary, ignore_errors=True)
+            kept, again = temporary / "katana450.mcap", temporary / "again.yaml"
+            try:
                 await _record(*command, "--out", str(kept))
                 if script:
-                    await _record("again", str(kept), *described, "--out", str(again))
-                return await asyncio.to_thread((again if script else kept).read_bytes)
+                    # All that was chosen, also of an episode that is trimmed.
+                    part = ("--from", "0", "--to", "inf")
+                    await _record("again", str(kept), *part, *described, "--out", str(again))
+                    text = await asyncio.to_thread(again.read_bytes)
+                    return Response(text, media_type="application/yaml", background=remove)
+            except BaseException:
+                await remove()
+                raise
+            # Sent in parts: up to 200 MB.
+            return _Download(kept, remove)
 
     async def recording(request: Request) -> Response:
-        headers = {"Content-Disposition": 'attachment; filename="katana450.mcap"'}
-        content = await made(request, script=False)
-        return Response(content, media_type="application/octet-stream", headers=headers)
+        return await made(request, script=False)
 
     async def script(request: Request) -> Response:
-        return Response(await made(request, script=True), media_type="application/yaml")
+        return await made(request, script=True)
 
     return [Route(f"{ROOT}/recording", recording), Route(f"{ROOT}/recording/script", script)]
+
+
+class _Download(FileResponse):
+    """The answer with a recording, whose folder is removed however the sending ends."""
+
+    def __init__(self, path: Path, remove: BackgroundTask) -> None:
+        super().__init__(path, filename=path.name, media_type="application/octet-stream")
+        self._remove = remove
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            await self._remove()
 
 
 def _command(store: RecordingStore, query: Mapping[str, str]) -> tuple[str, ...]:

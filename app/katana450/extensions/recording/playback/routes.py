@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import math
 from collections.abc import Callable
 from http import HTTPStatus
@@ -21,14 +22,15 @@ from katana450.extensions.recording.playback.difference import difference, times
 from katana450.extensions.recording.playback.drawing import PlaybackWindows
 from katana450.extensions.recording.playback.folder import CONTEXTS
 from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
-from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.spans import at_place, length_of, place_of
 from katana450.extensions.recording.playback.store import (
     MAX_FILE_BYTES,
     RING,
+    AnyRun,
     RecordingStore,
     opened,
 )
+from katana450.resources import URDF_PATH
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
@@ -44,8 +46,16 @@ AT_ONCE, WAITING = 2, 8
 UPLOAD_TIMEOUT = 120.0
 """[s] Timeout of receiving a file."""
 
+STALL_TIMEOUT = 10.0
+"""[s] Timeout of the next bytes of a file, so that a lost connection does not keep others out."""
+
 WRITTEN_BYTES = 1_000_000
 """Bytes of a file that are received before they are written."""
+
+OTHER = (
+    "It is a recording of another robot, or of another version of its description. It is drawn as "
+    "the arm of this server, so links and tool may be elsewhere than they were."
+)
 
 T = TypeVar("T")
 
@@ -149,13 +159,15 @@ class PlaybackRoutes:
         path = self._store.new_path()
         async with self._receiving:
             try:
-                async with asyncio.timeout(UPLOAD_TIMEOUT):
-                    await _received(request, path)
-                    run = await self._in_thread(lambda: opened(path))
+                async with asyncio.timeout(STALL_TIMEOUT) as timeout:
+                    await _received(request, path, timeout)
+                run = await self._in_thread(lambda: opened(path))
             except TimeoutError as error:
                 await asyncio.to_thread(path.unlink, missing_ok=True)
                 raise HTTPException(
-                    TOO_SLOW, f"The file took more than {UPLOAD_TIMEOUT:g} s."
+                    TOO_SLOW,
+                    f"The file took more than {UPLOAD_TIMEOUT:g} s, or nothing of it came for "
+                    f"{STALL_TIMEOUT:g} s.",
                 ) from error
             except OSError as error:
                 path.unlink(missing_ok=True)
@@ -164,9 +176,16 @@ class PlaybackRoutes:
             except BaseException:
                 path.unlink(missing_ok=True)
                 raise
-            return _json({"name": self._store.add(path, run)})
+            other = await asyncio.to_thread(self._is_of_another_robot, run)
+            return _json({"name": self._store.add(path, run), "note": OTHER if other else ""})
 
-    def _run(self, request: Request, name: str) -> PlaybackRun:
+    def _is_of_another_robot(self, run: AnyRun) -> bool:
+        """Return whether ``run`` is that of another robot than the server's."""
+        urdf = getattr(self._context.options, "urdf", None) or URDF_PATH
+        here = hashlib.sha256(Path(urdf).read_bytes()).hexdigest()
+        return run.metadata.get("urdf_sha256") != here
+
+    def _run(self, request: Request, name: str) -> AnyRun:
         """Return the recording ``name`` for the sender of ``request``. Raises HTTPException."""
         sender = self._context.identity(request)
         if name != RING and not sender.role.may_drive:
@@ -210,12 +229,18 @@ def windows_of(hub: Hub) -> PlaybackWindows | None:
     return PlaybackWindows(view.server, view.robot, view.gestures, lambda: hub.present().session)
 
 
-async def _received(request: Request, path: Path) -> None:
-    """Write the body of ``request`` to ``path``. Raises HTTPException for a file too large."""
+async def _received(request: Request, path: Path, timeout: asyncio.Timeout) -> None:
+    """Write the body of ``request`` to ``path``. Raises HTTPException for a file too large.
+
+    ``timeout`` is put off with each part of the body.
+    """
     size, part = 0, bytearray()
+    now = asyncio.get_running_loop().time
+    end = now() + UPLOAD_TIMEOUT
     file = await asyncio.to_thread(path.open, "wb")
     try:
         async for chunk in request.stream():
+            timeout.reschedule(min(now() + STALL_TIMEOUT, end))
             size += len(chunk)
             if size > MAX_FILE_BYTES:
                 raise HTTPException(TOO_LONG, f"The file is larger than {MAX_FILE_BYTES} bytes.")
@@ -228,9 +253,9 @@ async def _received(request: Request, path: Path) -> None:
         await asyncio.to_thread(file.close)
 
 
-def _rows(run: PlaybackRun, place: float, times: list[float]) -> list[StateRow | None]:
+def _rows(run: AnyRun, place: float, times: list[float]) -> list[StateRow | None]:
     spans = run.spans
-    return [run.row_at(at_place(spans, place + t)) for t in times]
+    return run.rows_at([at_place(spans, place + t) for t in times])
 
 
 def _said(moment: RecordedMoment | None) -> dict[str, Any] | None:

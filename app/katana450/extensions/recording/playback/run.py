@@ -159,11 +159,14 @@ class PlaybackRun:
                 first = block
             return None if first is None else first.at(first.start)
 
-    def row_at(self, t: float) -> StateRow | None:
-        """Return the joints and the tool at ``t`` [s], without objects; None before the first.
+    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
+        """Return joints and tool at each of ``times`` [s], without objects; None before the first.
 
-        This reads a second of the file at most, and keeps nothing.
+        This reads a second of the file at most for each, and keeps nothing.
         """
+        return [self._row_at(t) for t in times]
+
+    def _row_at(self, t: float) -> StateRow | None:
         with self._lock:
             t -= self._offset
             for file in reversed(self._files):

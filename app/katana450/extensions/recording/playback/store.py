@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import secrets
+import shutil
 import tempfile
 import weakref
 from collections import OrderedDict
 from pathlib import Path
+from typing import BinaryIO
 
 from katana450.errors import InputError
+from katana450.extensions.recording.claimed_folder import (
+    CLAIM,
+    claimed_folder,
+    remove_abandoned,
+)
 from katana450.extensions.recording.places import SUFFIX, recordings_in
+from katana450.extensions.recording.playback.opened_run import OpenedRun
 from katana450.extensions.recording.playback.run import PlaybackRun
 
 RING = "ring"
@@ -17,6 +25,12 @@ RING = "ring"
 
 MAX_FILE_BYTES = 200_000_000
 """Maximum size of a file: three hours of motion without a pause."""
+
+PREFIX = "katana450-opened-"
+"""Begin of the names of the temporary folders of servers."""
+
+AnyRun = PlaybackRun | OpenedRun
+"""The last minutes, or an opened file."""
 
 MAX_FILES = 4
 """Number of opened files that are kept; the one that was opened first is closed."""
@@ -26,14 +40,18 @@ class RecordingStore:
     """Runs by their names. For use in one thread, except for the runs themselves."""
 
     def __init__(self, ring: Path | None) -> None:
-        """Offer the ring in the folder ``ring``, if there is one."""
-        self.ring = ring
-        self._temporary = tempfile.TemporaryDirectory(prefix="katana450-")
-        weakref.finalize(self, self._temporary.cleanup)
-        self._ring = None if ring is None else PlaybackRun(lambda: recordings_in(ring))
-        self._files: OrderedDict[str, tuple[Path, PlaybackRun]] = OrderedDict()
+        """Offer the ring in the folder ``ring``, if there is one.
 
-    def run(self, name: str) -> PlaybackRun:
+        Files that a killed server has left are removed.
+        """
+        self.ring = ring
+        remove_abandoned(Path(tempfile.gettempdir()).glob(f"{PREFIX}*/{CLAIM}"))
+        self._temporary, claim = claimed_folder(lambda: Path(tempfile.mkdtemp(prefix=PREFIX)))
+        weakref.finalize(self, _remove, self._temporary, claim)
+        self._ring = None if ring is None else PlaybackRun(lambda: recordings_in(ring))
+        self._files: OrderedDict[str, tuple[Path, OpenedRun]] = OrderedDict()
+
+    def run(self, name: str) -> AnyRun:
         """Return the run ``name``. Raises InputError if there is none."""
         if name == RING:
             if self._ring is None:
@@ -52,20 +70,30 @@ class RecordingStore:
 
     def new_path(self) -> Path:
         """Return the path for a file that is being received."""
-        return Path(self._temporary.name) / f"{secrets.token_hex(8)}{SUFFIX}"
+        return self._temporary / f"{secrets.token_hex(8)}{SUFFIX}"
 
-    def add(self, path: Path, run: PlaybackRun) -> str:
+    def new_folder(self) -> Path:
+        """Return a new folder for a file that is being made."""
+        return Path(tempfile.mkdtemp(dir=self._temporary))
+
+    def add(self, path: Path, run: OpenedRun) -> str:
         """Keep ``run`` of the file ``path``, and return its name."""
         self._files[path.stem] = path, run
         while len(self._files) > MAX_FILES:
-            _, (old, _run) = self._files.popitem(last=False)
+            _, (old, run) = self._files.popitem(last=False)
+            run.close()
             old.unlink(missing_ok=True)
         return path.stem
 
 
-def opened(path: Path) -> PlaybackRun:
+def _remove(folder: Path, claim: BinaryIO) -> None:
+    claim.close()
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def opened(path: Path) -> OpenedRun:
     """Return the run in the file ``path``. Raises InputError if it is not a recording."""
-    run = PlaybackRun(lambda: [path])
+    run = OpenedRun(path)
     try:
         run.update()
     except InputError as error:

@@ -1,0 +1,142 @@
+"""A run in a file that somebody has opened, decoded in a process of its own.
+
+So a file of anybody neither stops the page's server for a moment nor fills its memory.
+"""
+
+from __future__ import annotations
+
+import json
+import pickle
+import subprocess
+import sys
+import threading
+import weakref
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from katana450.errors import InputError
+from katana450.extensions.recording.playback.decoder import LENGTH
+from katana450.extensions.recording.playback.marks import Mark
+from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
+from katana450.extensions.recording.playback.spans import Span
+from katana450.platform_support import without_interrupts
+
+TIMEOUT = 30.0
+"""[s] Timeout of a request to the process."""
+
+MAX_ANSWER_BYTES = 64_000_000
+"""Maximum size of an answer; a moment has some kilobytes, and 2 MB with many solids."""
+
+DECODER = "katana450.extensions.recording.playback.decoder"
+
+
+class OpenedRun:
+    """The run in one file, with the methods of ``PlaybackRun``. For any thread.
+
+    The process is started with the first request, and again after one that it did not survive.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read the file at ``path``, which does not change."""
+        self._path = path
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self.spans: tuple[Span, ...] = ()
+        """The times with records; empty before ``update``."""
+        self.metadata: dict[str, str] = {}
+        """Texts about the file."""
+
+    def update(self) -> None:
+        """Read the index of the file, once. Raises InputError if it cannot be read."""
+        if not self.spans:
+            self.spans, self.metadata = self._ask("update")
+
+    def marks(self) -> list[Mark]:
+        """See ``PlaybackRun.marks``."""
+        found: list[Mark] = self._ask("marks")
+        return found
+
+    def at(self, t: float) -> RecordedMoment | None:
+        """See ``PlaybackRun.at``."""
+        found: RecordedMoment | None = self._ask("at", t)
+        return found
+
+    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
+        """See ``PlaybackRun.rows_at``."""
+        found: list[StateRow | None] = self._ask("rows_at", list(times))
+        return found
+
+    def close(self) -> None:
+        """End the process, without waiting for a request that it works on."""
+        process = self._process
+        if process is not None:
+            process.kill()
+
+    def _ask(self, method: str, *arguments: Any) -> Any:
+        """Return the result of ``method`` in the process. Raises InputError with the reason."""
+        with self._lock:
+            again = self._process is None and method != "update"
+            process = self._started()
+            # A process that hangs ends, and its pipe with it.
+            watch = threading.Timer(TIMEOUT, process.kill)
+            watch.start()
+            try:
+                if again:
+                    _request(process, "update", ())
+                successful, found = _request(process, method, arguments)
+            except (OSError, EOFError) as error:
+                self._end()
+                raise InputError(
+                    f"The file could not be decoded within {TIMEOUT:g} s and the memory that one "
+                    "file may take."
+                ) from error
+            finally:
+                watch.cancel()
+        if not successful:
+            raise InputError(found)
+        return found
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                (sys.executable, "-P", "-m", DECODER, str(self._path)),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                **without_interrupts(),
+            )
+            weakref.finalize(self, _end, self._process)
+        return self._process
+
+    def _end(self) -> None:
+        if self._process is not None:
+            _end(self._process)
+            self._process = None
+
+
+def _request(process: subprocess.Popen[bytes], method: str, arguments: Sequence[Any]) -> Any:
+    """Return the answer of ``process``. Raises EOFError or OSError if it has ended."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(json.dumps((method, arguments)).encode() + b"\n")
+    process.stdin.flush()
+    head = process.stdout.read(LENGTH.size)
+    length = LENGTH.unpack(head)[0] if len(head) == LENGTH.size else MAX_ANSWER_BYTES + 1
+    if length > MAX_ANSWER_BYTES:
+        raise EOFError
+    content = process.stdout.read(length)
+    if len(content) != length:
+        raise EOFError
+    return pickle.loads(content)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Kill ``process`` and close its pipes."""
+    process.kill()
+    for each in (process.stdin, process.stdout):
+        with suppress(OSError):
+            if each is not None:
+                each.close()
+    process.wait()

@@ -1,0 +1,177 @@
+"""Files that people send to a server or take from it: bounded in time, and removed in the end."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import json
+import tempfile
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+
+from katana450.arm.control.lease import Role
+from katana450.extensions.recording import claimed_folder as claims
+from katana450.extensions.recording.claimed_folder import CLAIM, remove_abandoned
+from katana450.extensions.recording.datasets.new_folder import new_folder
+from katana450.extensions.recording.live.route import recording_routes
+from katana450.extensions.recording.playback import routes as routes_module
+from katana450.extensions.recording.playback.routes import OTHER, PlaybackRoutes
+from katana450.extensions.recording.playback.store import PREFIX, RecordingStore
+from katana450.platform_support import claim_file
+from katana450.resources import URDF_PATH
+from katana450.server.service.identity import Identity
+from katana450.server.web.bodies import TOO_SLOW
+from katana450.server.web.http_api import RouteContext
+from tests.recording.recorded import record
+
+Receive = Callable[[], Awaitable[dict[str, Any]]]
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    record(path, 120)
+    return path.read_bytes()
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of temporary files, which is empty."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def context(urdf: Path | None = None) -> RouteContext:
+    who = Identity("session", "Ada", Role.OPERATOR)
+    hub = SimpleNamespace(recorder=SimpleNamespace(note=lambda *_: None))
+    options = SimpleNamespace(urdf=urdf)
+    return RouteContext(hub, None, lambda _: who, options)  # type: ignore[arg-type]
+
+
+def uploaded(store: RecordingStore, receive: Receive, urdf: Path | None = None) -> dict[str, Any]:
+    """Return the answer to a file whose parts ``receive`` returns."""
+    upload = PlaybackRoutes(context(urdf), store).routes()[0].endpoint  # type: ignore[attr-defined]
+    scope = {
+        "type": "http", "method": "POST", "path": "/api/v1/playback", "query_string": b"",
+        "headers": [], "server": ("127.0.0.1", 8080), "client": ("127.0.0.1", 5),
+    }  # fmt: skip
+    answer: dict[str, Any] = json.loads(asyncio.run(upload(Request(scope, receive))).body)
+    return answer
+
+
+def parts(*bodies: bytes, then: float = 0.0) -> Receive:
+    """Return a function that returns ``bodies``, and waits ``then`` [s] before the end."""
+    left = list(bodies)
+
+    async def receive() -> dict[str, Any]:
+        if left:
+            return {"type": "http.request", "body": left.pop(0), "more_body": True}
+        await asyncio.sleep(then)
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    return receive
+
+
+def test_upload_that_stalls_ends_and_leaves_nothing(
+    temporary: Path, tmp_path: Path, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(routes_module, "STALL_TIMEOUT", 0.2)
+    store = RecordingStore(tmp_path)
+    began = time.monotonic()
+    with pytest.raises(HTTPException) as caught:
+        uploaded(store, parts(content[:1000], then=30.0))
+    assert caught.value.status_code == TOO_SLOW
+    assert time.monotonic() - began < 10.0
+    assert not list(temporary.rglob("*.mcap"))
+    # One that is slow but continues is received.
+    monkeypatch.setattr(routes_module, "STALL_TIMEOUT", 1.0)
+    assert uploaded(store, parts(content[:1000], content[1000:], then=0.5))["name"]
+
+
+def test_file_of_another_robot_is_opened_with_a_note(
+    temporary: Path, tmp_path: Path, content: bytes
+) -> None:
+    del temporary
+    store, other = RecordingStore(tmp_path), tmp_path / "other.urdf"
+    assert uploaded(store, parts(content))["note"] == ""
+    other.write_bytes(URDF_PATH.read_bytes() + b"<!-- longer links -->")
+    assert uploaded(store, parts(content), other)["note"] == OTHER
+
+
+def test_files_of_a_killed_server_are_removed_by_the_next(temporary: Path, tmp_path: Path) -> None:
+    killed = temporary / f"{PREFIX}killed"
+    killed.mkdir()
+    (killed / CLAIM).touch()
+    (killed / "opened.mcap").write_bytes(b"left")
+    first = RecordingStore(tmp_path)
+    assert not killed.exists()
+    first.new_path().write_bytes(b"in use")
+    second = RecordingStore(tmp_path)
+    assert len(list(temporary.glob("*/*.mcap"))) == 1
+    del first, second
+    gc.collect()
+    assert not list(temporary.iterdir())
+
+
+def test_download_is_sent_in_parts_and_removed(
+    temporary: Path, tmp_path: Path, content: bytes
+) -> None:
+    ring = tmp_path / "ring"
+    ring.mkdir()
+    (ring / "1.mcap").write_bytes(content)
+    store = RecordingStore(ring)
+    download = recording_routes(context(), store)[0].endpoint
+    scope = {"type": "http", "method": "GET", "query_string": b"", "headers": []}
+    sent: list[dict[str, Any]] = []
+
+    async def send(message: dict[str, Any]) -> None:
+        sent.append(message)
+
+    async def fetch() -> None:
+        answer = await download(Request(scope))
+        assert len(list(temporary.rglob("katana450.mcap"))) == 1
+        await answer(scope, parts(), send)
+
+    asyncio.run(fetch())
+    assert b"".join(each.get("body", b"") for each in sent).startswith(b"\x89MCAP")
+    assert not list(temporary.rglob("katana450.mcap"))
+
+    async def lost(_: dict[str, Any]) -> None:
+        raise OSError("The client has left.")
+
+    async def broken() -> None:
+        answer = await download(Request(scope))
+        await answer(scope, parts(), lost)
+
+    with pytest.raises(OSError, match="has left"):
+        asyncio.run(broken())
+    assert not list(temporary.rglob("katana450.mcap"))
+
+
+def test_folder_that_another_process_takes_for_abandoned_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "set"
+    raced: list[Path] = []
+
+    def claim_late(number: int) -> None:
+        if not raced:
+            # Just before the claim, another export looks for abandoned folders.
+            raced.extend(tmp_path.glob(f".set.*/{CLAIM}"))
+            remove_abandoned(raced)
+        claim_file(number)
+
+    monkeypatch.setattr(claims, "claim_file", claim_late)
+    with new_folder(out) as folder:
+        (folder / "content").write_text("whole")
+    assert len(raced) == 1
+    assert [each.name for each in out.iterdir()] == ["content"]
