@@ -45,7 +45,7 @@ export class Arm {
       "Reply time": `${Math.round(1000 * trip)} ms`,
       ...(stop && { "Last stop, measured": `${stop[0].toFixed(2)} s, ${signed(stop[1])}°` }),
     };
-    this.#facts.hidden = mode === "disconnected";
+    this.#facts.hidden = !follows;
     if (this.#facts.children.length !== Object.keys(facts).length)
       this.#facts.replaceChildren(...Object.keys(facts).map((name) => html("div", {}, html("dt", {}, name), html("dd", {}))));
     Object.values(facts).forEach((value, i) => write(this.#facts.children[i].lastChild, value));
