@@ -63,6 +63,7 @@ BUILT_IN = (
     "recording",
     "kinematics",
     "real_arm",
+    "touch",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 

@@ -1,0 +1,77 @@
+"""The load of a held object: its weight and its inertia, against the friction of the fingers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from katana450.arm.control.pouring import CUP
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import State
+from katana450.arm.control.support import SUPPORT_GAP, surface_below
+from katana450.extensions.touch.solid_body import body_of
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.units import FEMTOLITRE
+
+FRICTION = 0.8
+"""[1] Coefficient of friction between a pad and an object: rubber on smooth plastic. Assumed."""
+
+DENSITY = 500.0
+"""[kg/m^3] Density of an object of unknown mass: light wood, or a printed part that is not solid.
+Assumed."""
+
+STEP = 1e-3
+"""[s] Step of the difference that gives the acceleration."""
+
+
+def mass(scene_object: SceneObject, state: State, masses: Mapping[str, float]) -> float:
+    """Return the mass of ``scene_object`` [kg], for the cup with what is in it.
+
+    ``masses``: known masses [kg] by name; another object has DENSITY.
+    """
+    found = masses.get(scene_object.name)
+    if found is None:
+        return DENSITY * body_of(scene_object).volume
+    if scene_object.name == CUP and state.poured is not None:
+        water = state.poured.water
+        return found + water.liquid.density * FEMTOLITRE * water.kept
+    return found
+
+
+def acceleration(
+    state: State, point: FloatArray, palm: Callable[[FloatArray], FloatArray]
+) -> FloatArray:
+    """Return the acceleration (3,) of a point of the hand by the setpoints [m/s^2].
+
+    Args:
+        state: the state.
+        point: (3,) in the frame of the palm [m].
+        palm: returns the pose (4, 4) of the palm in the base frame at x (k,).
+    """
+    motion = state.motion
+    if motion.at_rest:
+        return np.zeros(3)
+
+    def place(t: float) -> FloatArray:
+        q = motion.q + t * motion.qd + 0.5 * t * t * motion.qdd
+        T = palm(np.append(q, state.gripper_setpoint))
+        return np.asarray(T[:3, :3] @ point + T[:3, 3])
+
+    return (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2
+
+
+def shear(load: FloatArray, axis: FloatArray) -> float:
+    """Return the part of ``load`` (3,) [N] across ``axis`` (3,), the unit closing direction.
+
+    The other part presses the object against a finger and needs no friction.
+    """
+    return float(np.linalg.norm(load - (load @ axis) * axis))
+
+
+def is_supported(state: State, held: SceneObject, T_base_object: FloatArray) -> bool:
+    """Return whether the ``held`` object still stands on what is below it."""
+    standing = replace(held, T=T_base_object, held=False)
+    surface = surface_below(state.objects, standing)
+    return bool(T_base_object[2, 3] - surface <= SUPPORT_GAP)

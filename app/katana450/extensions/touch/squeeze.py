@@ -1,0 +1,209 @@
+"""An object that two fingers squeeze: its place between them, and the forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.extensions.touch.foundation import (
+    STIFFNESS,
+    THICKNESS,
+    PadPressure,
+    pressed,
+    pressure_at,
+)
+from katana450.extensions.touch.pad import Pad
+from katana450.extensions.touch.solid_body import SolidBody
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+
+FORCE_LIMIT = 10.0
+"""[N] Greatest force of a finger, as the current of its motor allows. Assumed: the 0.5 N m that the
+robot description states for a finger, at the 50 mm from its pivot to the middle of its pad."""
+
+REACH = 2.0 * THICKNESS
+"""[m] Distance from the object up to which a point of a pad can come into it by squeezing."""
+
+MAX_GAP = 2e-3
+"""[m] Gap to both pads up to which the fingers have stopped because the pads touch: half of
+TOUCH_DISTANCE and CENTRING_DISTANCE of the grip, and some more."""
+
+CENTRING_STEPS, BALANCE_STEPS, LIMIT_STEPS = 4, 8, 16
+"""Greatest numbers of steps of the searches."""
+
+FIRST_SQUEEZE, GROWTH = 4e-3, 2.0
+"""[rad, 1] Begin of the search for a force, and the growth of its steps."""
+
+POWER = 2.0 / 3.0
+"""[1] Power of the force that grows about as the squeeze does."""
+
+FORCE_TOLERANCE = 1e-4
+"""[N] Difference of two forces that count as equal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Squeeze:
+    """An object under the forces of two fingers.
+
+    Attributes:
+        pads: the pressures on both pads.
+        used: the part of the squeeze that the force limit allows [rad].
+        axis: (3,) unit direction in the frame of the palm along which the fingers close.
+    """
+
+    pads: tuple[PadPressure, PadPressure]
+    used: float
+    axis: FloatArray
+
+    @property
+    def force(self) -> float:
+        """The greater of the forces of the fingers [N]."""
+        return max(pad.force for pad in self.pads)
+
+    @property
+    def normal_force(self) -> float:
+        """The sum of the normal forces on both pads [N], which friction is proportional to."""
+        return sum(pad.force for pad in self.pads)
+
+
+class _Points(NamedTuple):
+    """The points of one pad that can come into the object, with their numbers in the pad."""
+
+    numbers: npt.NDArray[np.intp]
+    points: FloatArray
+    normals: FloatArray
+    areas: FloatArray
+
+
+class SqueezedBody:
+    """An object between two fingers that stopped when they touched it.
+
+    It is free along the direction in which the fingers close, so it lies where both press with the
+    same force. Depth counts from where the fingers stopped.
+
+    Attributes:
+        axis: (3,) unit direction in the frame of the palm along which the fingers close.
+        on_pads: whether the pads of both fingers touch it. Elsewhere no forces are known.
+    """
+
+    def __init__(
+        self,
+        pads: tuple[Pad, Pad],
+        body: SolidBody,
+        T_palm_body: FloatArray,
+        fingers: Callable[[float], tuple[FloatArray, FloatArray]],
+        grip: float,
+    ) -> None:
+        """Place the object between the fingers.
+
+        Args:
+            pads: the pads of both fingers.
+            body: the object.
+            T_palm_body: (4, 4) pose of its middle in the palm.
+            fingers: returns the poses (4, 4) of both fingers in the palm for a finger joint [rad].
+            grip: finger joint at which the fingers stopped [rad].
+        """
+        self._pads, self._body, self._fingers, self._grip = pads, body, fingers, grip
+        self._T_body_palm = se3.inverse(T_palm_body)
+        near, far = (
+            T[:3, :3] @ pad.points.mean(axis=0) + T[:3, 3]
+            for pad, T in zip(pads, fingers(grip), strict=True)
+        )
+        self.axis = frozen((far - near) / np.linalg.norm(far - near))
+        self._along = self._T_body_palm[:3, :3] @ self.axis
+        self._near = [self._reachable(pad, T) for pad, T in zip(pads, fingers(grip), strict=True)]
+        self._gap = self._shift = 0.0
+        self.on_pads = all(len(each.points) > 0 for each in self._near)
+        if self.on_pads:
+            self._shift, self._gap = self._centred()
+            self.on_pads = self._gap <= MAX_GAP
+
+    def squeezed(self, squeeze: float, limit: float = FORCE_LIMIT) -> Squeeze:
+        """Return the object under ``squeeze`` [rad], or the part that ``limit`` [N] allows."""
+        if not self.on_pads:
+            first, second = (pressed(pad, np.zeros(len(pad.points))) for pad in self._pads)
+            return Squeeze((first, second), squeeze, self.axis)
+        used, shift = self._limited(squeeze, limit)
+        pads = []
+        for pad, near, depth in zip(self._pads, self._near, self._depths(used, shift), strict=True):
+            whole = np.zeros(len(pad.points))
+            whole[near.numbers] = depth
+            pads.append(pressed(pad, whole))
+        return Squeeze((pads[0], pads[1]), used, self.axis)
+
+    def _reachable(self, pad: Pad, T_palm_finger: FloatArray) -> _Points:
+        T = self._T_body_palm @ T_palm_finger
+        numbers = np.flatnonzero(self._body.depth(pad.points @ T[:3, :3].T + T[:3, 3]) > -REACH)
+        # The normals are needed only along the closing direction, so their turn is neglected.
+        normals = pad.normals[numbers] @ T[:3, :3].T
+        return _Points(numbers, pad.points[numbers], normals, pad.areas[numbers])
+
+    def _depths(self, squeeze: float, shift: float) -> list[FloatArray]:
+        """Return the depth of the near points of each pad [m], with the object moved by ``shift``.
+
+        ``shift``: along the closing direction, from the first pad to the second [m].
+        """
+        found = []
+        for near, T_palm_finger in zip(
+            self._near, self._fingers(self._grip - squeeze), strict=True
+        ):
+            T = self._T_body_palm @ T_palm_finger
+            points = near.points @ T[:3, :3].T + (T[:3, 3] - shift * self._along)
+            found.append(self._body.depth(points) + self._gap)
+        return found
+
+    def _centred(self) -> tuple[float, float]:
+        """Return the shift [m] with the same gap to both fingers where they stopped, and the gap.
+
+        The gap is negative if they stopped inside the object, as after rounding.
+        """
+        shift = gap = 0.0
+        for _ in range(CENTRING_STEPS):
+            first, second = (-float(depth.max()) for depth in self._depths(0.0, shift))
+            shift += 0.5 * (second - first)
+            gap = 0.5 * (first + second)
+        return shift, gap
+
+    def _forces(self, squeeze: float, shift: float) -> tuple[float, float]:
+        """Return the greater force of a finger [N], and the shift [m] at which they are equal."""
+        for _ in range(BALANCE_STEPS):
+            greatest = total = stiffness = 0.0
+            for near, depth in zip(self._near, self._depths(squeeze, shift), strict=True):
+                forces = pressure_at(depth) * near.areas
+                closing = near.normals @ self._along
+                greatest = max(greatest, float(forces.sum()))
+                total += float(forces @ closing)
+                inside = (depth > 0.0) & (depth < THICKNESS)
+                stiffness += STIFFNESS * float(near.areas[inside] @ closing[inside] ** 2)
+            if abs(total) <= FORCE_TOLERANCE or stiffness <= 0.0:
+                break
+            shift += total / stiffness
+        return greatest, shift
+
+    def _limited(self, squeeze: float, limit: float) -> tuple[float, float]:
+        """Return the part of ``squeeze`` that ``limit`` [N] allows, and the shift there."""
+        low, low_force, shift = 0.0, 0.0, self._shift
+        high = min(FIRST_SQUEEZE, squeeze)
+        while True:
+            high_force, shift = self._forces(high, shift)
+            if high_force >= limit or high >= squeeze:
+                break
+            low, low_force, high = high, high_force, min(GROWTH * high, squeeze)
+        if high_force <= limit:
+            return high, shift
+        for _ in range(LIMIT_STEPS):
+            # A round contact grows as the power 3/2, so this power of the force is nearly a line.
+            below, above, wanted = (each**POWER for each in (low_force, high_force, limit))
+            middle = low + (high - low) * (wanted - below) / (above - below)
+            force, shift = self._forces(middle, shift)
+            if abs(force - limit) <= FORCE_TOLERANCE:
+                return middle, shift
+            if force > limit:
+                high, high_force = middle, force
+            else:
+                low, low_force = middle, force
+        return low, shift

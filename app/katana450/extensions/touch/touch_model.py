@@ -1,0 +1,218 @@
+"""The model of touch of one arm: forces, slip and sensor values of a state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from katana450.arm.control.scene_objects import Hand, SceneObject
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.touch.foundation import PadPressure
+from katana450.extensions.touch.gripper_sensors import (
+    GripperSensors,
+    distance_value,
+    force_value,
+)
+from katana450.extensions.touch.held_load import (
+    FRICTION,
+    acceleration,
+    is_supported,
+    mass,
+    shear,
+)
+from katana450.extensions.touch.infrared import InfraredRays
+from katana450.extensions.touch.pad import Pad, pads_of
+from katana450.extensions.touch.solid_body import body_of
+from katana450.extensions.touch.squeeze import FORCE_LIMIT, Squeeze, SqueezedBody
+from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.units import GRAVITY
+
+UP = np.array((0.0, 0.0, 1.0))
+"""Direction against gravity in the base frame."""
+
+MAX_SQUEEZE = 1.0
+"""[rad] Squeeze above that of every finger joint."""
+
+CLOSED_ANGLE = -0.43
+"""[rad] Finger joint of the Katana450 below which the fingers touch each other."""
+
+
+class TouchModel:
+    """Forces, slip and sensors of a gripper with known pads. It implements ``GripModel``.
+
+    Its results depend on their arguments alone. The last grip is kept, because it lasts for many
+    states.
+    """
+
+    def __init__(
+        self,
+        world: CollisionWorld,
+        hand: Hand,
+        pads: tuple[Pad, Pad],
+        masses: Mapping[str, float],
+        force_limit: float = FORCE_LIMIT,
+    ) -> None:
+        """Model the fingers of ``hand``.
+
+        Args:
+            world: the bodies of the arm.
+            hand: the palm and the fingers.
+            pads: the pads of the fingers.
+            masses: known masses of objects by name [kg].
+            force_limit: greatest force of a finger [N].
+        """
+        self.pads, self.force_limit = pads, force_limit
+        self._linkage, self._palm, self._masses = world.linkage, hand.palm, masses
+        groups = {part.name: part.mover for part in world.parts}
+        self._fingers = tuple(groups[pad.finger] for pad in pads)
+        self._rays = InfraredRays(hand.palm, {pad.finger: groups[pad.finger] for pad in pads})
+        self._zero = np.zeros(int(world.linkage.variable.max()))
+        # Each is replaced as a whole, because several threads may ask.
+        self._last_body: tuple[SceneObject, float, SqueezedBody] | None = None
+        self._last_squeeze: tuple[SqueezedBody, float, Squeeze] | None = None
+
+    def overload(self, state: State) -> float | None:
+        """Return the load [N] that pulls the held object out of the fingers; None if they hold.
+
+        The load is the weight and the inertia of the object across the closing direction. They hold
+        it by friction: up to FRICTION times the sum of both forces. An object that still stands on
+        its support does not slip, and neither does one that is held beside the pads.
+        """
+        body, squeeze, held = self._held(state), self.squeeze(state), state.held
+        if body is None or squeeze is None or held is None or not body.on_pads:
+            return None
+        x = state.x_setpoint
+        T = self._pose(x)
+        middle = held.T_collision_shape[:3, 3]
+        force = acceleration(state, middle, self._pose) + GRAVITY * UP
+        load = shear(mass(held, state, self._masses) * force, T[:3, :3] @ squeeze.axis)
+        if load <= FRICTION * squeeze.normal_force or is_supported(state, held, T @ held.T):
+            return None
+        return load
+
+    def squeeze(self, state: State) -> Squeeze | None:
+        """Return the forces on the object that the fingers hold; None with an empty hand."""
+        body = self._held(state)
+        if body is None:
+            return None
+        last = self._last_squeeze
+        if last is None or last[0] is not body or last[1] != state.squeeze:
+            last = (body, state.squeeze, body.squeezed(state.squeeze, self.force_limit))
+            self._last_squeeze = last
+        return last[2]
+
+    def squeeze_for(self, state: State, force: float) -> float:
+        """Return the squeeze [rad] at which the fingers of ``state`` press with ``force`` [N].
+
+        Raises InputError with an empty hand, and for a force that the fingers cannot have.
+        """
+        body = self._held(state)
+        if body is None or state.held is None:
+            raise InputError("The fingers hold nothing.")
+        if not body.on_pads:
+            raise InputError(
+                f"The fingers hold {state.held.name} beside their pads, which measure the force. "
+                "Grasp it at another height or pitch."
+            )
+        if force > self.force_limit:
+            raise InputError(
+                f"The motor of the gripper presses with at most {self.force_limit:g} N, "
+                f"not {force:g} N."
+            )
+        found = body.squeezed(MAX_SQUEEZE, force)
+        if found.force < 0.99 * force:
+            raise InputError(
+                f"The pads press on it with at most {found.force:.1f} N, not {force:g} N: they "
+                "touch too little of it."
+            )
+        return found.used
+
+    def sensors(self, state: State) -> GripperSensors:
+        """Return the simulated values of the 16 sensors."""
+        poses = self._linkage.poses(state.x)
+        bodies = [
+            (
+                body_of(each),
+                (poses[self._palm] if each.carried else np.eye(4)) @ each.T_collision_shape,
+            )
+            for each in state.objects
+        ]
+        distances = self._rays.distances(poses, bodies).tolist()
+        values = {
+            name: distance_value(distance)
+            for name, distance in zip(self._rays.names, distances, strict=True)
+        }
+        squeeze = self.squeeze(state)
+        for pad in () if squeeze is None else squeeze.pads:
+            side = pad.finger.split("_")[1]
+            values[f"{side}_rear_force"] = force_value(pad.rear)
+            values[f"{side}_front_force"] = force_value(pad.front)
+        # Objects count as insulators, so a current flows only from finger to finger.
+        values["conductivity"] = 255 if state.gripper <= CLOSED_ANGLE else 0
+        return GripperSensors(**values)
+
+    def report(self, state: State) -> dict[str, Any]:
+        """Return squeeze, force limit, pads and sensors of ``state`` for the answer to a query.
+
+        Each pad has its finger, its ``force`` [N], its ``centre`` [m] and, while it is pressed, its
+        16 by 8 pressures [Pa], row by row from the palm.
+        """
+        squeeze = self.squeeze(state)
+        pads = (
+            [_untouched(pad) for pad in self.pads]
+            if squeeze is None
+            else [_pad_report(pad) for pad in squeeze.pads]
+        )
+        return {
+            "squeeze": state.squeeze,
+            "force_limit": self.force_limit,
+            "pads": pads,
+            "sensors": self.sensors(state).named(),
+        }
+
+    def _held(self, state: State) -> SqueezedBody | None:
+        held, grip = state.held, state.grip
+        if held is None or grip is None:
+            return None
+        last = self._last_body
+        if last is None or last[0] is not held or last[1] != grip:
+            pose = held.T_collision_shape
+            body = SqueezedBody(self.pads, body_of(held), pose, self._finger_poses, grip)
+            last = self._last_body = (held, grip, body)
+        return last[2]
+
+    def _pose(self, x: FloatArray) -> FloatArray:
+        return np.asarray(self._linkage.poses(x)[self._palm])
+
+    def _finger_poses(self, angle: float) -> tuple[FloatArray, FloatArray]:
+        """Return the poses (4, 4) of both fingers in the palm at the finger joint ``angle``."""
+        poses = self._linkage.poses(np.append(self._zero, angle))
+        T_palm_base = se3.inverse(poses[self._palm])
+        right, left = self._fingers
+        return T_palm_base @ poses[right], T_palm_base @ poses[left]
+
+
+def touch_model(
+    world: CollisionWorld, hand: Hand, masses: Mapping[str, float]
+) -> TouchModel | None:
+    """Return the model of the fingers of ``hand``; None if their pads are not known."""
+    pads = pads_of(hand.fingers)
+    return TouchModel(world, hand, (pads[0], pads[1]), masses) if len(pads) == 2 else None
+
+
+def _untouched(pad: Pad) -> dict[str, Any]:
+    return {"finger": pad.finger, "force": 0.0, "centre": None, "pressure": []}
+
+
+def _pad_report(pad: PadPressure) -> dict[str, Any]:
+    return {
+        "finger": pad.finger,
+        "force": pad.force,
+        "centre": pad.centre,
+        "pressure": np.round(pad.pressure.ravel()).tolist() if pad.force else [],
+    }

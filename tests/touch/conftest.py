@@ -1,0 +1,62 @@
+"""The arm of the project with the cup between its fingers, and the model of its touch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.assembly.robot_session import DescribedRobot, describe_robot
+from katana450.extensions.touch.touch_model import TouchModel
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+from tests.control.test_grip import AT, BEFORE, OPEN, before_cup, run
+
+
+@pytest.fixture(scope="session")
+def described() -> DescribedRobot:
+    return describe_robot(Settings(), URDF_PATH, None)
+
+
+@pytest.fixture(scope="session")
+def session(described: DescribedRobot) -> Session:
+    return described.session
+
+
+@pytest.fixture(scope="session")
+def arm(described: DescribedRobot) -> MountedArm:
+    return described.robot.require_arm()
+
+
+@pytest.fixture(scope="session")
+def model(session: Session) -> TouchModel:
+    hand = session.environment.hand
+    assert hand is not None
+    assert isinstance(hand.grip_model, TouchModel)
+    return hand.grip_model
+
+
+@pytest.fixture(scope="session")
+def around(session: Session, arm: MountedArm) -> State:
+    """The state with open fingers around the cup, on the table."""
+    state = session.begin(session.ready, 0.0, 0.0)
+    commands: tuple[Any, ...] = (cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
+    state = run(session, state, *commands)
+    for back in (BEFORE, AT):
+        q = before_cup(session, arm, state, back)
+        plan = plan_to(arm, session.world_at(state), state, q)
+        state = run(session, state, cmd.Follow(plan))
+    assert np.isclose(state.gripper, OPEN)
+    return state
+
+
+@pytest.fixture(scope="session")
+def holding(session: Session, around: State) -> State:
+    """The state after the fingers were closed with all their force."""
+    return run(session, around, cmd.SetGripper(-0.44))

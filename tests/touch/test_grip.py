@@ -1,0 +1,210 @@
+"""The squeeze in the state, the forces that follow from it, and the object that slips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.event_log import entries_between
+from katana450.arm.control.messages import sentence
+from katana450.arm.control.restart import restarted
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, State
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.errors import InputError
+from katana450.extensions.touch.held_load import DENSITY, FRICTION, mass
+from katana450.extensions.touch.pad import pads_of
+from katana450.extensions.touch.squeeze import FORCE_LIMIT
+from katana450.extensions.touch.touch_model import TouchModel
+from katana450.maths.geometry import se3
+from katana450.maths.water.units import GRAVITY
+from tests.control.test_grip import OPEN, lifted, run
+
+
+def gripped_with(session: Session, model: TouchModel, holding: State, force: float) -> State:
+    """Return the state after a command that presses with ``force`` [N]."""
+    assert holding.grip is not None
+    wanted = holding.grip - model.squeeze_for(holding, force)
+    return run(session, holding, cmd.SetGripper(wanted))
+
+
+def test_pads_lie_on_the_inner_surface_of_the_fingers(session: Session, model: TouchModel) -> None:
+    world = session.environment.world(())
+    assert world is not None
+    x = np.zeros(6)
+    poses = world.linkage.poses(x)
+    groups = {part.name: part.mover for part in world.parts}
+    for pad in model.pads:
+        T = poses[groups[pad.finger]]
+        for at, normal in zip(
+            pad.middles[::5, ::3].reshape(-1, 3), pad.normals[::640], strict=False
+        ):
+            point = T[:3, :3] @ at + T[:3, 3]
+            ball = SceneObject("ball", Shape.SPHERE, (1e-3,), np.eye(4))
+            moved = se3.from_rotation_translation(np.eye(3), point - (0.0, 0.0, 1e-3))
+            near = session.environment.world([replace(ball, T=moved)])
+            assert near is not None
+            # A ball of 1 mm about the point is as deep in the finger as its radius, to 0.1 mm.
+            assert near.gap(x, pad.finger, "ball") == pytest.approx(-1e-3, abs=2e-4)
+            assert np.linalg.norm(normal) == pytest.approx(1.0)
+
+
+def test_other_fingers_have_no_pads() -> None:
+    assert pads_of(("finger_left_link", "thumb")) == ()
+
+
+def test_wish_beyond_the_stop_is_kept_as_squeeze(session: Session, holding: State) -> None:
+    assert holding.grip is not None
+    assert holding.squeeze == holding.grip + 0.44
+    softer = run(session, holding, cmd.SetGripper(holding.grip - 0.01))
+    assert softer.squeeze == pytest.approx(0.01)
+    assert softer.gripper_goal == softer.gripper_setpoint == holding.grip
+    assert softer.findings == ()
+    beyond = run(session, holding, cmd.SetGripper(-1.0))
+    assert beyond.squeeze == holding.squeeze
+    assert [each.reason for each in beyond.findings] == [Reason.GRIPPER_LIMIT]
+
+
+def test_stop_and_restart_keep_the_squeeze_and_opening_clears_it(
+    session: Session, holding: State
+) -> None:
+    stopped = run(session, holding, cmd.Stop())
+    assert stopped.held is not None
+    assert stopped.squeeze == holding.squeeze
+    begun = session.begin(holding.q, holding.gripper, 0.0)
+    assert restarted(begun, holding).squeeze == holding.squeeze
+    opened = run(session, holding, cmd.SetGripper(OPEN))
+    assert opened.squeeze == 0.0
+    assert opened.grip is None
+
+
+def test_both_fingers_press_with_the_same_force_up_to_the_limit(
+    model: TouchModel, holding: State
+) -> None:
+    found = model.squeeze(holding)
+    assert found is not None
+    right, left = found.pads
+    assert right.force == pytest.approx(FORCE_LIMIT, rel=1e-3)
+    assert left.force == pytest.approx(right.force, rel=1e-3)
+    # The cup touches the bend of the fingers with the faces towards their tips.
+    assert right.front == pytest.approx(right.force)
+    assert right.centre is not None
+    assert right.centre[1] == pytest.approx(0.0, abs=1e-3)
+    np.testing.assert_allclose(found.axis, (0.0, -1.0, 0.0), rtol=0, atol=1e-6)
+
+
+def test_an_object_beside_the_middle_is_pressed_by_both_fingers_alike(
+    model: TouchModel, holding: State
+) -> None:
+    objects = tuple(
+        replace(each, T=se3.from_rotation_translation(np.eye(3), (0.0, 1e-3, 0.0)) @ each.T)
+        if each.held
+        else each
+        for each in holding.objects
+    )
+    assert holding.grip is not None
+    found = model.squeeze(replace(holding, objects=objects, squeeze=0.02))
+    centred = model.squeeze(replace(holding, squeeze=0.02))
+    assert found is not None
+    assert centred is not None
+    assert found.pads[0].force == pytest.approx(found.pads[1].force, rel=1e-3)
+    assert found.force == pytest.approx(centred.force, rel=0.05)
+
+
+@pytest.mark.parametrize("force", [0.5, 3.0, 9.0])
+def test_squeeze_for_a_force_gives_that_force(
+    session: Session, model: TouchModel, holding: State, force: float
+) -> None:
+    found = model.squeeze(gripped_with(session, model, holding, force))
+    assert found is not None
+    assert found.force == pytest.approx(force, rel=1e-3)
+
+
+def test_impossible_forces_are_refused(session: Session, model: TouchModel, holding: State) -> None:
+    with pytest.raises(InputError, match="at most 10 N, not 11 N"):
+        model.squeeze_for(holding, 11.0)
+    with pytest.raises(InputError, match="hold nothing"):
+        model.squeeze_for(run(session, holding, cmd.SetGripper(OPEN)), 1.0)
+
+
+def test_weak_grip_lets_the_cup_slip_when_it_is_lifted(
+    session: Session, arm: MountedArm, model: TouchModel, holding: State
+) -> None:
+    (cup,) = (each for each in holding.objects if each.held)
+    weight = mass(cup, holding, {"cup": 0.0614}) * GRAVITY
+    needed = weight / (2.0 * FRICTION)
+    firm = lifted(session, arm, gripped_with(session, model, holding, 1.1 * needed), 0.04)
+    assert firm.held is not None
+    weak = gripped_with(session, model, holding, 0.9 * needed)
+    # The table carries the cup until the arm lifts it.
+    assert weak.held is not None
+    states = [weak]
+    after = lifted(session, arm, weak, 0.04)
+    assert after.held is None
+    assert (after.grip, after.squeeze) == (None, 0.0)
+    (slipped,) = after.findings
+    assert slipped.reason is Reason.SLIPPED
+    assert slipped.amount == pytest.approx(weight, rel=0.05)
+    assert sentence(after).startswith("Cup slipped out of the fingers under a load of 0.6 N")
+    (stands,) = (each for each in after.objects if each.name == "cup")
+    assert stands.T[2, 3] == 0.0
+    (logged,) = entries_between(states[0], after)
+    assert logged.began
+    assert logged.finding is slipped
+    opened = run(session, after, cmd.SetGripper(OPEN))
+    assert opened.findings == ()
+
+
+def test_acceleration_pulls_a_held_cup_out_of_the_fingers(
+    session: Session, arm: MountedArm, model: TouchModel, holding: State
+) -> None:
+    (cup,) = (each for each in holding.objects if each.held)
+    weight = mass(cup, holding, {"cup": 0.0614}) * GRAVITY
+    up = lifted(session, arm, gripped_with(session, model, holding, 0.65 * weight), 0.06)
+    assert up.held is not None
+    shaken = session.step(up, [cmd.SetJoint(3, up.q[3] + 0.5)], up.t + 0.01)
+    while shaken.moving and shaken.held is not None:
+        shaken = session.step(shaken, (), shaken.t + 0.01)
+    assert shaken.held is None
+    assert shaken.findings[0].amount > 1.02 * weight
+
+
+def test_mass_follows_from_the_cup_with_its_water_or_from_the_volume(
+    session: Session, holding: State
+) -> None:
+    (cup,) = (each for each in holding.objects if each.name == "cup")
+    filled = run(session, holding, cmd.Fill(100e-6))
+    assert mass(cup, filled, {"cup": 0.06}) == pytest.approx(0.06 + 0.09982, rel=1e-6)
+    box = SceneObject("box", Shape.BOX, (0.1, 0.1, 0.1), np.eye(4))
+    assert mass(box, filled, {"cup": 0.06}) == pytest.approx(1e-3 * DENSITY)
+
+
+def test_simulated_sensors_see_what_is_between_the_fingers(
+    session: Session, model: TouchModel, around: State, holding: State
+) -> None:
+    empty = session.begin(session.ready, OPEN, 0.0)
+    far, near, held = (model.sensors(each) for each in (empty, around, holding))
+    assert far.centre_distance < near.centre_distance <= held.centre_distance
+    assert far.right_far_distance < near.right_far_distance < held.right_far_distance == 255
+    assert (near.right_front_force, near.holding) == (0, False)
+    assert held.right_front_force == held.left_front_force == 255
+    assert held.holding
+    assert held.right_rear_force == 0
+    assert model.sensors(replace(empty, gripper=-0.44)).conductivity == 255
+    assert held.conductivity == 0
+
+
+def test_report_has_pressures_only_while_something_is_pressed(
+    model: TouchModel, around: State, holding: State
+) -> None:
+    free, tight = model.report(around), model.report(holding)
+    assert [each["pressure"] for each in free["pads"]] == [[], []]
+    assert free["squeeze"] == 0.0
+    for pad in tight["pads"]:
+        assert len(pad["pressure"]) == 128
+        assert pad["force"] == pytest.approx(FORCE_LIMIT, rel=1e-3)
+    assert tight["sensors"]["left_front_force"] == 255
