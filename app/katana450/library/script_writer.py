@@ -227,6 +227,13 @@ class ScriptWriter:
         """
         self._add("gripper", where if holding is None else {"to": where, "holding": holding})
 
+    def grip(self, until: Number, *, holding: str | None = None) -> None:
+        """Close the fingers until they press with a force [N].
+
+        With ``holding`` they must hold this object then.
+        """
+        self._add("grip", {"until": until, **given(holding=holding)})
+
     def wait(self, seconds: Number) -> None:
         """Wait [s]."""
         self._add("wait", seconds)

@@ -32,7 +32,9 @@ def gripped(environment: Environment, world: CollisionWorld | None, state: State
         opened = RELEASE_SLIDE if hand.slides else RELEASE_TURN
         if state.gripper_setpoint > state.grip + opened:
             return _let_go(environment, state)
-        load = None if hand.grip_model is None else hand.grip_model.overload(state)
+        # Fingers that open to let the object go need no force.
+        opening = state.gripper_goal > state.grip + opened
+        load = None if opening or hand.grip_model is None else hand.grip_model.overload(state)
         if load is None or state.held is None:
             return state
         slipped = Finding(Reason.SLIPPED, load, parts=(state.held.name, hand.fingers[0]))

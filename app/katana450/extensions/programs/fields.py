@@ -10,7 +10,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.programs.expression import ANGLE, LENGTH, PLAIN, TIME, with_article
+from katana450.extensions.programs.expression import (
+    ANGLE,
+    FORCE,
+    LENGTH,
+    PLAIN,
+    TIME,
+    with_article,
+)
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
@@ -25,7 +32,13 @@ MAX_ANGLE = 3600.0
 
 XYZ = ("x", "y", "z")
 
-KINDS = {"mm": (LENGTH,), "deg": (ANGLE,), "s": (TIME,), "deg or mm": (ANGLE, LENGTH)}
+KINDS = {
+    "mm": (LENGTH,),
+    "deg": (ANGLE,),
+    "s": (TIME,),
+    "N": (FORCE,),
+    "deg or mm": (ANGLE, LENGTH),
+}
 """The kinds of quantities that can be given where a number in a unit is expected."""
 
 

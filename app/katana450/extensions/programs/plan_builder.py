@@ -332,7 +332,7 @@ class PlanBuilder:
         before, closed = self.taken.before, self.plan_context.arm.gripper.lower
         objects = tuple(before if each.name == before.name else each for each in self.state.objects)
         missed = replace(
-            self.state, objects=objects, grip=None,
+            self.state, objects=objects, grip=None, squeeze=0.0,
             gripper=closed, gripper_setpoint=closed, gripper_goal=closed,
         )  # fmt: skip
         self.state = self._with_still_water(missed)

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import part
+from katana450.arm.control.messages import finding_text, part
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan, SetSpeed, Wait
 from katana450.extensions.programs.conditional_jump import ConditionalJump
+from katana450.extensions.programs.grip_until import CloseUntil
 from katana450.extensions.programs.program import Program
 
 FULL_SPEED = SetSpeed(1.0)
@@ -44,6 +45,7 @@ class Run:
         speed: the last speed that a task has set.
         elapsed: time since the run began, with pauses [s].
         choices: index of each step ``if`` so far, and whether its condition held.
+        held: whether the fingers held an object at the last step.
     """
 
     t: float
@@ -59,6 +61,7 @@ class Run:
     speed: SetSpeed = FULL_SPEED
     elapsed: float = 0.0
     choices: tuple[tuple[int, bool], ...] = ()
+    held: bool = False
 
 
 @dataclass(frozen=True)
@@ -112,12 +115,18 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     try:
         if run.blocked > ACTION_TIMEOUT:
             raise InputError(f"The path is still blocked: {_met(state)} would collide.")
+        if run.held and state.held is None:
+            _check_slip(state)
         done = task.action.done(state, run.waited)
+        more: tuple[cmd.Command, ...] = ()
+        if not done and isinstance(task.action, CloseUntil):
+            more = task.action.correction(state)
     except InputError as error:
         why = f"Line {task.line}, {task.name}: {error}"
         return replace(run, phase=Phase.FAILED, why=why), (cmd.Hold(),)
+    run = replace(run, held=state.held is not None)
     if not done:
-        return run, ()
+        return run, more
     number = program.next_in(run.number, state, run.elapsed)
     if isinstance(task.action, ConditionalJump):
         run = replace(run, choices=(*run.choices, (task.number, number == task.action.then)))
@@ -175,6 +184,13 @@ def skipped(program: Program, run: Run) -> tuple[int, ...]:
         if number in held
         for step in (range(otherwise, end) if held[number] else range(number + 1, otherwise))
     )
+
+
+def _check_slip(state: State) -> None:
+    """Raise InputError if the object that the fingers held has slipped out of them."""
+    for finding in state.findings:
+        if finding.reason is Reason.SLIPPED:
+            raise InputError(f"{finding_text(finding)}.")
 
 
 def _met(state: State) -> str:

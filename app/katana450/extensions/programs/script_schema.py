@@ -7,6 +7,7 @@ from katana450.extensions.programs.attached_files import MAX_FILES
 from katana450.extensions.programs.blocks import MAX_REPETITIONS, MAX_STEPS
 from katana450.extensions.programs.fields import XYZ
 from katana450.extensions.programs.grasp import ABOVE, FRONT
+from katana450.extensions.programs.grip_until import MAX_FORCE, MIN_FORCE
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.moves import MAX_VIAS
 from katana450.extensions.programs.scene_schema import SCENE
@@ -170,6 +171,14 @@ STEP_VALUES: dict[str, Schema] = {
             "to",
             {"to": FINGERS, "holding": OBJECT},
         ),
+    ),
+    "grip": mapping(
+        "Close the fingers until they press with a force",
+        "until",
+        {
+            "until": number_or_text(MIN_FORCE, MAX_FORCE, "Force of a finger, N, such as 3 N"),
+            "holding": OBJECT,
+        },
     ),
     "trajectory": mapping(
         "Move through postures at given times, on a smooth path, slower where limits require it",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from katana450.extensions.programs import (
     grasp,
+    grip_until,
     moves,
     pick,
     place,
@@ -26,6 +27,7 @@ STEPS: dict[str, type[Step]] = {
     **settings_steps.STEPS,
     **table.STEPS,
     **grasp.STEPS,
+    **grip_until.STEPS,
     **pouring.STEPS,
     **pick.STEPS,
     **place.STEPS,

@@ -1,0 +1,122 @@
+"""The step ``grip``: close the fingers until they press with a force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.actions import MoveFingers
+from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.source import YamlValue
+from katana450.extensions.programs.step import Step
+from katana450.extensions.touch.touch_model import TouchModel
+
+MIN_FORCE, MAX_FORCE = 0.1, 100.0
+"""[N] Bounds of a force in a script. The gripper may allow less."""
+
+FORCE_TOLERANCE = 0.02
+"""[1] Relative difference from the force that counts as reached."""
+
+
+@dataclass(frozen=True)
+class CloseUntil(MoveFingers):
+    """Close the fingers until they press with ``force`` [N].
+
+    The angle is that which the plan predicts. An object that is thicker or thinner than predicted
+    changes it.
+    """
+
+    force: float = 0.0
+    model: TouchModel | None = None
+
+    def done(self, state: State, waited: float) -> bool:
+        """Return whether the fingers press with the force.
+
+        Raises InputError after the timeout of a motion of the fingers, and if they hold nothing or
+        something else than they must.
+        """
+        if not super().done(state, waited):
+            return False
+        if state.held is None:
+            raise InputError(
+                f"The fingers have closed without an object between them, so they cannot press "
+                f"with {self.force:g} N."
+            )
+        assert self.model is not None
+        found = self.model.squeeze(state)
+        return found is not None and abs(found.force - self.force) <= FORCE_TOLERANCE * self.force
+
+    def correction(self, state: State) -> tuple[cmd.Command, ...]:
+        """Return the command that gives the force on what the fingers hold; none before they do.
+
+        Raises InputError for a force that they cannot have there.
+        """
+        assert self.model is not None
+        if state.held is None or state.grip is None:
+            return ()
+        return (cmd.SetGripper(state.grip - self.model.squeeze_for(state, self.force)),)
+
+
+@dataclass(frozen=True)
+class GripUntil:
+    """Close the fingers until they press with a force.
+
+    Attributes:
+        force: [N].
+        holding: name of the object that they must hold then; "" for any.
+    """
+
+    force: float
+    holding: str = ""
+
+    @classmethod
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
+        """Read {until, holding}. Raises ScriptError."""
+        fields = Fields(value, "a grip")
+        force = fields.need("until", read.number(MIN_FORCE, MAX_FORCE, "N"), MIN_FORCE)
+        holding = fields.take("holding", read.text, "")
+        fields.done()
+        return cls(force, holding)
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the motion of the fingers.
+
+        Raises InputError without an object between the fingers, and for a force that they cannot
+        have on it.
+        """
+        fingers = builder.plan_context.arm.gripper
+        hand = builder.plan_context.session.environment.hand
+        model = None if hand is None else hand.grip_model
+        if not isinstance(model, TouchModel):
+            raise InputError("The pads of this gripper are not known, so its force is not either.")
+        before = builder.state
+        closed = before if before.grip is not None else builder.after(cmd.SetGripper(fingers.lower))
+        if closed.held is None or closed.grip is None:
+            raise InputError(
+                "The fingers would close without an object between them. Move the open gripper "
+                "over an object that can be held, or use `grasp`."
+            )
+        if self.holding and closed.held.name != self.holding:
+            raise InputError(
+                f"The fingers would hold {closed.held.name} instead of {self.holding}, which has "
+                "to stand where they close."
+            )
+        angle = closed.grip - model.squeeze_for(closed, self.force)
+        if angle < fingers.lower:
+            raise InputError(
+                f"{closed.held.name} is too thin: the fingers reach the end of their range before "
+                f"they press with {self.force:g} N."
+            )
+        action = CloseUntil(angle, closed.held.name, self.force, model)
+        builder.state = closed
+        builder.note(f"grip until {self.force:g} N", action, builder.after(cmd.SetGripper(angle)))
+
+
+STEPS: dict[str, type[Step]] = {"grip": GripUntil}
+"""Steps of this module, by their names in a script."""
