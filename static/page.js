@@ -11,6 +11,8 @@
   const OPEN = "katana450.instruments.open";
   const WELCOMED = "katana450.welcome";
   const PAST = "katana450.timeline.open";
+  const RUMBLE = "katana450.rumble";
+  const RUMBLE_RATE = 20; // Hz
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
@@ -344,6 +346,7 @@
 
   worker.onmessage = ({ data }) => {
     panel?.hear(data);
+    if (data.heard?.is === "state") rumble?.take(data.heard);
     if (data.link === "up") [up, silent] = [true, 0];
     else if (data.link === "down") {
       if (up) since = performance.now();
@@ -467,6 +470,24 @@
     people.show();
   });
 
+  // The rates at which parts of the page want states [Hz]; the highest counts.
+  const rates = {};
+  function see(part, hz) {
+    rates[part] = hz;
+    worker.postMessage({ watch: Math.max(...Object.values(rates)) });
+  }
+
+  // The vibration of gamepad and phone, loaded on first use.
+  let rumble = null;
+  async function vibrate(on) {
+    byId("rumble-button").setAttribute("aria-pressed", String(on));
+    kept?.setItem(RUMBLE, on ? "yes" : "no");
+    rumble = on ? new (await import("./touch/rumble.js")).Rumble() : null;
+    see("rumble", on ? RUMBLE_RATE : 0);
+  }
+  byId("rumble-button").addEventListener("click", () => vibrate(!rumble));
+  if (kept?.getItem(RUMBLE) === "yes") vibrate(true);
+
   // The instruments, which are loaded on first use
 
   let panel = null;
@@ -498,7 +519,7 @@
     kept?.setItem(OPEN, shown ? "yes" : "no");
     if (shown && !panel) {
       const { Panel } = await import("./instruments/panel.js");
-      const watch = (hz) => worker.postMessage({ watch: hz });
+      const watch = (hz) => see("panel", hz);
       panel = new Panel(byId("instruments"), { say, watch, kept, quietly: QUIETLY });
     }
     panel?.show(button.getAttribute("aria-expanded") === "true");

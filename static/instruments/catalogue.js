@@ -5,6 +5,7 @@ import { Bars, Gauge } from "./gauge.js";
 import { Knob } from "./knob.js";
 import { Plot } from "./plot.js";
 import { signed } from "./shape.js";
+import { PressureMaps } from "../touch/maps.js";
 
 const MS = 1000;
 const AXES = ["base turn", "shoulder", "elbow", "wrist bend", "wrist roll"];
@@ -14,7 +15,8 @@ const BIG = ["broad", "large", "wide"];
 
 // Return [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}].
 export function instruments(arm, gripper, { say, history, groups, view }) {
-  return [...knobs(arm, gripper, say), ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
+  const touch = gripper && !arm.joints_only ? [pads()] : [];
+  return [...knobs(arm, gripper, say), ...touch, ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
 }
 
 function knobs(arm, gripper, say) {
@@ -55,6 +57,12 @@ function knobs(arm, gripper, say) {
     (state) => [state.speed * 100, state.speed * 100],
   );
   return [...joints, ...(fingers ? [fingers] : []), speed];
+}
+
+function pads() {
+  const maps = new PressureMaps();
+  const draw = ({ touch }) => maps.show(touch);
+  return { id: "pads", title: "Pressure on the pads", sizes: ["large", "broad"], shown: true, element: maps.element, draw };
 }
 
 function gauges(arm) {
@@ -153,6 +161,7 @@ function plots(arm, gripper, history, groups, view) {
     plot("joint-loads", "Weight on the joints [N m]", "loads", 1, 2, true),
     ...joints.slice(2),
     ...(gripper ? [plot("gripper-opening", "Gripper [%]", "gripper", 2, 1, false)] : []),
+    ...(gripper ? [plot("grip-forces", "Grip force [N]", "forces", 1, 2, false)] : []),
     plot("clearances", "Clearance [mm]", "clearance", 2, 1, false),
     plot("tool-speeds", "Tool speed [mm/s]", "speed", 2, 1, false),
   ];

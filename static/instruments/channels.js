@@ -25,11 +25,14 @@ export function channelsOf(arm, gripper) {
   group("tool", ...["x", "y", "z"].map((label, i) => ({ label, unit: "mm", of: ({ T }) => T[i][3] * MM })));
   group("clearance", { label: "Nearest", unit: "mm", of: ({ margins }) => (margins.clearance ?? NaN) * MM });
   group("speed", { label: "Tool", unit: "mm/s", of: ({ tool_speed: speed }) => speed * MM });
-  if (gripper)
+  if (gripper) {
     group(
       "gripper",
       { label: "Now", unit: "%", of: ({ gripper: angle }) => gripper.percent(angle) },
       { label: "Goal", unit: "%", of: ({ gripper_goal: angle }) => gripper.percent(angle) },
     );
+    const pads = ["Right", "Left"]; // in the order of the state
+    group("forces", ...pads.map((label, i) => ({ label, unit: "N", of: ({ touch }) => touch?.pads[i].force })));
+  }
   return { channels, groups };
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -196,6 +197,37 @@ def test_simulated_sensors_see_what_is_between_the_fingers(
     assert held.right_rear_force == 0
     assert model.sensors(replace(empty, gripper=-0.44)).conductivity == 255
     assert held.conductivity == 0
+
+
+def test_map_takes_less_than_five_percent_of_a_processor_at_30_hertz(
+    model: TouchModel, holding: State
+) -> None:
+    model.report(holding)
+    took = []
+    for number in range(40):
+        # Another force in each state, which is the most work.
+        state = replace(holding, squeeze=0.01 + 2e-4 * number)
+        begun = time.process_time()
+        model.report(state)
+        took.append(time.process_time() - begun)
+    assert sorted(took)[len(took) // 2] < 0.05 / 30.0
+
+
+def test_object_beside_the_pads_has_no_force_and_does_not_slip(
+    session: Session, model: TouchModel, holding: State
+) -> None:
+    away = se3.from_rotation_translation(np.eye(3), (-0.2, 0.0, 0.0))
+    objects = tuple(
+        replace(each, T=away @ each.T) if each.held else each for each in holding.objects
+    )
+    beside = replace(holding, objects=objects)
+    found = model.squeeze(beside)
+    assert found is not None
+    assert found.normal_force == 0.0
+    assert model.overload(beside) is None
+    with pytest.raises(InputError, match="hold cup beside their pads"):
+        model.squeeze_for(beside, 1.0)
+    assert session.step(beside, (), beside.t + 0.01).held is not None
 
 
 def test_report_has_pressures_only_while_something_is_pressed(

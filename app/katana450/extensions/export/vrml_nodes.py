@@ -10,6 +10,7 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,10 @@ from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import WIDTHS, Type
+from katana450.extensions.touch.foundation import PadPressure
+from katana450.extensions.touch.gripper_sensors import INDICES
+from katana450.extensions.touch.pad import COLUMNS, ROWS
+from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
@@ -171,6 +176,9 @@ class VrmlNodes(Nodes):
             if link.shapes:
                 dressed = self._names.dressed[link.name]
                 nodes |= _dress(link.name, f"link {link.name}", dressed, link.colour)
+        hand = self._surroundings.hand
+        if hand is not None and isinstance(hand.grip_model, TouchModel):
+            nodes |= _touch(hand.grip_model)
         return nodes
 
     def _joint(self, joint: Joint) -> _Node:
@@ -230,6 +238,36 @@ class VrmlNodes(Nodes):
                 "rotation": _Field(Type.ROTATION, rotation, turn),
             },
         )
+
+
+def _touch(model: TouchModel) -> dict[str, _Node]:
+    """Return the nodes of the pads and of the sensors of the gripper, which the files lack."""
+
+    def pad(number: int) -> _Node:
+        def value(state: State, of: Callable[[PadPressure], FieldValue], none: FieldValue) -> Any:
+            squeeze = model.squeeze(state)
+            return none if squeeze is None else of(squeeze.pads[number])
+
+        nothing = [0.0] * (ROWS * COLUMNS)
+        fields = {
+            "force": _Field(Type.FLOAT, lambda state: value(state, lambda at: at.force, 0.0)),
+            "centre": _Field(
+                Type.PAIR,
+                lambda state: value(state, lambda at: [*(at.centre or (0.0, 0.0))], [0.0, 0.0]),
+            ),
+            "pressure": _Field(
+                Type.FLOAT_LIST,
+                lambda state: value(state, lambda at: at.pressure.ravel().tolist(), nothing),
+            ),
+        }
+        return _Node("Touch", f"link {model.pads[number].finger}", fields)
+
+    def sensor(name: str) -> _Field:
+        return _Field(Type.INT, lambda state: float(model.sensors(state).named()[name]))
+
+    sensors = {name: sensor(name) for name in INDICES}
+    pads = {f"touch_{each.finger.split('_')[1]}": pad(n) for n, each in enumerate(model.pads)}
+    return {**pads, "gripper_sensors": _Node("Sensors", "gripper", sensors)}
 
 
 def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, _Node]:

@@ -32,8 +32,14 @@ MAX_GAP = 2e-3
 """[m] Gap to both pads up to which the fingers have stopped because the pads touch: half of
 TOUCH_DISTANCE and CENTRING_DISTANCE of the grip, and some more."""
 
-CENTRING_STEPS, BALANCE_STEPS, LIMIT_STEPS = 4, 8, 16
+CENTRING_STEPS, BALANCE_STEPS, SEARCH_STEPS = 4, 8, 16
 """Greatest numbers of steps of the searches."""
+
+MAX_SQUEEZE = 0.25
+"""[rad] Squeeze beyond which the pads have no more to yield: they are THICKNESS deep everywhere."""
+
+MARGIN = 1e-3
+"""[m] Distance from the object at the greatest force up to which a point counts as near."""
 
 FIRST_SQUEEZE, GROWTH = 4e-3, 2.0
 """[rad, 1] Begin of the search for a force, and the growth of its steps."""
@@ -78,6 +84,11 @@ class _Points(NamedTuple):
     normals: FloatArray
     areas: FloatArray
 
+    def only(self, kept: npt.NDArray[np.bool_]) -> _Points:
+        """Return those of the points for which ``kept`` (n,) is true."""
+        numbers, points, normals, areas = self
+        return _Points(numbers[kept], points[kept], normals[kept], areas[kept])
+
 
 class SqueezedBody:
     """An object between two fingers that stopped when they touched it.
@@ -97,6 +108,7 @@ class SqueezedBody:
         T_palm_body: FloatArray,
         fingers: Callable[[float], tuple[FloatArray, FloatArray]],
         grip: float,
+        force_limit: float = FORCE_LIMIT,
     ) -> None:
         """Place the object between the fingers.
 
@@ -106,6 +118,7 @@ class SqueezedBody:
             T_palm_body: (4, 4) pose of its middle in the palm.
             fingers: returns the poses (4, 4) of both fingers in the palm for a finger joint [rad].
             grip: finger joint at which the fingers stopped [rad].
+            force_limit: greatest force of a finger [N].
         """
         self._pads, self._body, self._fingers, self._grip = pads, body, fingers, grip
         self._T_body_palm = se3.inverse(T_palm_body)
@@ -117,23 +130,39 @@ class SqueezedBody:
         self._along = self._T_body_palm[:3, :3] @ self.axis
         self._near = [self._reachable(pad, T) for pad, T in zip(pads, fingers(grip), strict=True)]
         self._gap = self._shift = 0.0
+        self._greatest = MAX_SQUEEZE
         self.on_pads = all(len(each.points) > 0 for each in self._near)
         if self.on_pads:
             self._shift, self._gap = self._centred()
             self.on_pads = self._gap <= MAX_GAP
+        if self.on_pads:
+            self._greatest, self._shift = self._squeeze_at(force_limit)
+            depths = self._depths(self._greatest, self._shift)
+            # With less force the pads touch less of it, so the other points are never needed.
+            self._near = [
+                near.only(depth > -MARGIN) for near, depth in zip(self._near, depths, strict=True)
+            ]
 
-    def squeezed(self, squeeze: float, limit: float = FORCE_LIMIT) -> Squeeze:
-        """Return the object under ``squeeze`` [rad], or the part that ``limit`` [N] allows."""
+    def squeezed(self, squeeze: float) -> Squeeze:
+        """Return the object under ``squeeze`` [rad], or the part that the force limit allows."""
+        used = min(squeeze, self._greatest)
         if not self.on_pads:
             first, second = (pressed(pad, np.zeros(len(pad.points))) for pad in self._pads)
-            return Squeeze((first, second), squeeze, self.axis)
-        used, shift = self._limited(squeeze, limit)
+            return Squeeze((first, second), used, self.axis)
+        shift = self._forces(used, self._shift)[1]
         pads = []
         for pad, near, depth in zip(self._pads, self._near, self._depths(used, shift), strict=True):
             whole = np.zeros(len(pad.points))
             whole[near.numbers] = depth
             pads.append(pressed(pad, whole))
         return Squeeze((pads[0], pads[1]), used, self.axis)
+
+    def squeeze_for(self, force: float) -> float:
+        """Return the squeeze [rad] at which the fingers press with ``force`` [N].
+
+        It is the greatest one if the fingers never press as much.
+        """
+        return self._squeeze_at(force)[0]
 
     def _reachable(self, pad: Pad, T_palm_finger: FloatArray) -> _Points:
         T = self._T_body_palm @ T_palm_finger
@@ -184,25 +213,25 @@ class SqueezedBody:
             shift += total / stiffness
         return greatest, shift
 
-    def _limited(self, squeeze: float, limit: float) -> tuple[float, float]:
-        """Return the part of ``squeeze`` that ``limit`` [N] allows, and the shift there."""
+    def _squeeze_at(self, wanted: float) -> tuple[float, float]:
+        """Return the squeeze [rad] with the force ``wanted`` [N], and the shift there [m]."""
         low, low_force, shift = 0.0, 0.0, self._shift
-        high = min(FIRST_SQUEEZE, squeeze)
+        high = FIRST_SQUEEZE
         while True:
             high_force, shift = self._forces(high, shift)
-            if high_force >= limit or high >= squeeze:
+            if high_force >= wanted or high >= self._greatest:
                 break
-            low, low_force, high = high, high_force, min(GROWTH * high, squeeze)
-        if high_force <= limit:
+            low, low_force, high = high, high_force, min(GROWTH * high, self._greatest)
+        if high_force <= wanted:
             return high, shift
-        for _ in range(LIMIT_STEPS):
+        for _ in range(SEARCH_STEPS):
             # A round contact grows as the power 3/2, so this power of the force is nearly a line.
-            below, above, wanted = (each**POWER for each in (low_force, high_force, limit))
-            middle = low + (high - low) * (wanted - below) / (above - below)
+            below, above, between = (each**POWER for each in (low_force, high_force, wanted))
+            middle = low + (high - low) * (between - below) / (above - below)
             force, shift = self._forces(middle, shift)
-            if abs(force - limit) <= FORCE_TOLERANCE:
+            if abs(force - wanted) <= FORCE_TOLERANCE:
                 return middle, shift
-            if force > limit:
+            if force > wanted:
                 high, high_force = middle, force
             else:
                 low, low_force = middle, force

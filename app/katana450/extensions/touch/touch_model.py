@@ -35,9 +35,6 @@ from katana450.maths.water.units import GRAVITY
 UP = np.array((0.0, 0.0, 1.0))
 """Direction against gravity in the base frame."""
 
-MAX_SQUEEZE = 1.0
-"""[rad] Squeeze above that of every finger joint."""
-
 CLOSED_ANGLE = -0.43
 """[rad] Finger joint of the Katana450 below which the fingers touch each other."""
 
@@ -75,6 +72,7 @@ class TouchModel:
         # Each is replaced as a whole, because several threads may ask.
         self._last_body: tuple[SceneObject, float, SqueezedBody] | None = None
         self._last_squeeze: tuple[SqueezedBody, float, Squeeze] | None = None
+        self._last_sensors: tuple[State, GripperSensors] | None = None
 
     def overload(self, state: State) -> float | None:
         """Return the load [N] that pulls the held object out of the fingers; None if they hold.
@@ -102,7 +100,7 @@ class TouchModel:
             return None
         last = self._last_squeeze
         if last is None or last[0] is not body or last[1] != state.squeeze:
-            last = (body, state.squeeze, body.squeezed(state.squeeze, self.force_limit))
+            last = (body, state.squeeze, body.squeezed(state.squeeze))
             self._last_squeeze = last
         return last[2]
 
@@ -124,16 +122,23 @@ class TouchModel:
                 f"The motor of the gripper presses with at most {self.force_limit:g} N, "
                 f"not {force:g} N."
             )
-        found = body.squeezed(MAX_SQUEEZE, force)
-        if found.force < 0.99 * force:
+        wanted = body.squeeze_for(force)
+        found = body.squeezed(wanted).force
+        if found < 0.99 * force:
             raise InputError(
-                f"The pads press on it with at most {found.force:.1f} N, not {force:g} N: they "
-                "touch too little of it."
+                f"The pads press on {state.held.name} with at most {found:.1f} N, not {force:g} N: "
+                "they touch too little of it."
             )
-        return found.used
+        return wanted
 
     def sensors(self, state: State) -> GripperSensors:
         """Return the simulated values of the 16 sensors."""
+        last = self._last_sensors
+        if last is None or last[0] is not state:
+            last = self._last_sensors = (state, self._sensors(state))
+        return last[1]
+
+    def _sensors(self, state: State) -> GripperSensors:
         poses = self._linkage.poses(state.x)
         bodies = [
             (
@@ -182,7 +187,9 @@ class TouchModel:
         last = self._last_body
         if last is None or last[0] is not held or last[1] != grip:
             pose = held.T_collision_shape
-            body = SqueezedBody(self.pads, body_of(held), pose, self._finger_poses, grip)
+            body = SqueezedBody(
+                self.pads, body_of(held), pose, self._finger_poses, grip, self.force_limit
+            )
             last = self._last_body = (held, grip, body)
         return last[2]
 

@@ -1,0 +1,67 @@
+"""The coloured patches on the fingers in viser's scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.extensions.touch.pad_patches import HIDDEN, PadPatches, pressure_colours
+from tests.browser.server import free_port
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(port=free_port(), verbose=False)
+    yield server
+    server.stop()
+
+
+def test_patches_show_what_is_pressed_and_vanish(
+    server: viser.ViserServer,
+    described: DescribedRobot,
+    session: Session,
+    around: State,
+    holding: State,
+) -> None:
+    shown = [around]
+    arm = SimpleNamespace(environment=session.environment)
+    context: Any = SimpleNamespace(
+        server=server, robot=described.robot, state=lambda: shown[-1], hub=SimpleNamespace(arm=arm)
+    )
+    patches = PadPatches(context)
+    patches.follow()
+    assert patches._pads == []
+    shown.append(holding)
+    patches.follow()
+    for pad in patches._pads:
+        node = pad._node
+        assert node.visible
+        assert node.name.endswith("_link/touch")
+        drawn = np.asarray(node.batched_scales)[:, 0] > 2.0 * HIDDEN
+        # Some taxels and their rims on both sides are pressed, most are not.
+        assert 16 <= drawn[:128].sum() < 64
+        assert drawn[128:144].sum() == drawn[144:].sum() > 0
+        assert len(np.unique(np.asarray(node.batched_colors)[drawn], axis=0)) > 1
+    colours = np.asarray(patches._pads[0]._node.batched_colors)
+    patches.follow()
+    assert (
+        np.asarray(patches._pads[0]._node.batched_colors) is colours
+        or (np.asarray(patches._pads[0]._node.batched_colors) == colours).all()
+    )
+    shown.append(around)
+    patches.follow()
+    assert not any(pad._node.visible for pad in patches._pads)
+
+
+def test_colours_rise_with_the_pressure() -> None:
+    blue, *_, red = pressure_colours(np.array((0.0, 25e3, 1e9)))
+    assert blue[2] > blue[0]
+    assert red[0] > red[2]
