@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import threading
 import time
 import urllib.request
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +30,9 @@ from katana450.server.api import answers
 from katana450.server.api.arm_answers import MeasuredArm
 from katana450.server.api.motion_requests import OperateArm
 from tests.browser.server import APP, AppServer
-from tests.real_arm.emulated import ROOT, TIMEOUT, emulator
+from tests.real_arm.emulated import ROOT, TIMEOUT, emulator, linked
+
+KATANA450 = (sys.executable, "-m", "katana450")
 
 
 @pytest.fixture
@@ -40,7 +45,7 @@ def server() -> Iterator[EmulatorServer]:
 
 def katana450(*options: str, text: str = "") -> subprocess.CompletedProcess[str]:
     done = subprocess.run(
-        [sys.executable, "-m", "katana450", *options],
+        [*KATANA450, *options],
         input=text,
         capture_output=True,
         text=True,
@@ -106,6 +111,67 @@ def test_calibrate_and_release_do_what_they_say(server: EmulatorServer) -> None:
     assert {axis.flag for axis in server.arm.axes} == {0}
 
 
+def in_terminal(*options: str, answers_to_give: str) -> tuple[int, str]:
+    """Run a command in a terminal, type answers, and return its exit status and output."""
+    terminal, inner = pytest.importorskip("pty").openpty()
+    process = subprocess.Popen([*KATANA450, *options], stdin=inner, stdout=inner, stderr=inner)
+    os.close(inner)
+    os.write(terminal, answers_to_give.encode())
+    output = b""
+    # Linux reports the end of the other side as an error.
+    with suppress(OSError):
+        while data := os.read(terminal, 4096):
+            output += data
+    os.close(terminal)
+    return process.wait(TIMEOUT), output.decode()
+
+
+@pytest.mark.parametrize(
+    ("typed", "done"),
+    [
+        ("yes\nno\n", False),
+        pytest.param("no\n", False, marks=pytest.mark.long),
+        pytest.param("yes\nyes\n", True, marks=pytest.mark.long),
+    ],
+)
+def test_both_questions_must_be_answered_by_yes(
+    server: EmulatorServer, typed: str, *, done: bool
+) -> None:
+    for axis in server.arm.axes:
+        axis.freeze()
+    url = f"tcp://127.0.0.1:{server.port}"
+    # The option does not count where a person can be asked.
+    options = ("arm", "release", url, "--yes-i-hold-the-arm")
+    status, output = in_terminal(*options, answers_to_give=typed)
+    assert "Motors off means the arm falls" in output
+    assert status == int(not done)
+    assert ({axis.flag for axis in server.arm.axes} == {0}) is done
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is another thing there")
+def test_interrupted_calibration_leaves_the_arm_frozen() -> None:
+    with emulator("--plant", "stiff") as port:
+        url = f"tcp://127.0.0.1:{port}"
+        process = subprocess.Popen(
+            [*KATANA450, "arm", "calibrate", url, "--yes-i-hold-the-arm"],
+            stdin=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        time.sleep(4.0)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=TIMEOUT)
+        assert process.returncode == 130, errors
+        assert "frozen" in errors
+        with linked(port) as link:
+            states = link.exchange(req.ReadStates()).states  # type: ignore[attr-defined]
+            assert set(states) == {8}
+            before = link.exchange(req.ReadPositions())
+            time.sleep(0.3)
+            assert link.exchange(req.ReadPositions()) == before
+
+
 def test_log_shows_the_exchanges_in_words(server: EmulatorServer, tmp_path: Path) -> None:
     file = tmp_path / "exchanges.log"
     log = ExchangeLog(file)
@@ -131,7 +197,7 @@ def test_log_is_followed_line_by_line(tmp_path: Path) -> None:
     file = tmp_path / "exchanges.log"
     file.write_text("1.5 =\n")
     process = subprocess.Popen(
-        [sys.executable, "-m", "katana450", "arm", "log", str(file), "--follow"],
+        [*KATANA450, "arm", "log", str(file), "--follow"],
         stdout=subprocess.PIPE,
         text=True,
         cwd=ROOT,

@@ -1,4 +1,4 @@
-"""The emulated arm answers anything that a client sends, and goes on moving by its rules."""
+"""The emulated arm answers anything that a client sends, and moves within its stops."""
 
 from __future__ import annotations
 
