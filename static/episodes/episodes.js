@@ -120,8 +120,8 @@ export class Episodes {
     const done = await this.#ask(request);
     if (!done) return;
     // The next key may come before the next state.
-    const { number, outcome, begin, end } = done;
-    const last = { number, outcome, seconds: end - begin };
+    const { number, outcome, start, end } = done;
+    const last = { number, outcome, seconds: end - start };
     const judged = act in OUTCOMES && (running || saving || before?.outcome !== act);
     const undoable = act === "undo" ? null : judged || act === "discard" || act === "rerecord" ? { number } : this.#state?.undo;
     this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: undoable };
@@ -166,8 +166,8 @@ export class Episodes {
   }
 
   #row(each) {
-    const { number, outcome, begin, end, recorded, bytes, task, note, file } = each;
-    const length = `${(end - begin).toFixed(1)} s`;
+    const { number, outcome, start, end, recorded, bytes, task, note, file } = each;
+    const length = `${(end - start).toFixed(1)} s`;
     const summary = html("summary", { "data-key": number }, html("b", {}, `${number}`), html("span", {}, length), html("i", { class: outcome }, OUTCOMES[outcome]), html("span", {}, task));
     const row = html("details", this.#open.has(number) ? { open: "" } : {}, summary);
     row.addEventListener("toggle", () => this.#open[row.open ? "add" : "delete"](number));
@@ -187,8 +187,8 @@ export class Episodes {
       html("label", {}, "Outcome", select),
       field("Task", { maxlength: 200, value: task }, (value) => ask({ do: "describe", task: value })),
       field("Note", { maxlength: 500, value: note }, (value) => ask({ do: "describe", note: value })),
-      field("From, s", seconds(begin), (value) => ask({ do: "trim", begin: Number(value), end })),
-      field("To, s", seconds(end), (value) => ask({ do: "trim", begin, end: Number(value) })),
+      field("From, s", seconds(start), (value) => ask({ do: "trim", start: Number(value), end })),
+      field("To, s", seconds(end), (value) => ask({ do: "trim", start, end: Number(value) })),
       html("div", {}, discard, html("a", { href: `api/v1/episodes/${number}`, download: file }, `Download, ${size(bytes)}`)),
     );
     return html("li", {}, row);

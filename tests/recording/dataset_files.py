@@ -60,7 +60,7 @@ def episode(
 ) -> dict[str, Any]:
     """Return the message of an episode of the ``part`` [s] of ``file``."""
     begin, end = (file.start + each for each in part)
-    about = {"number": number, "task": task, "begin": begin, "end": end, "outcome": outcome}
+    about = {"number": number, "task": task, "start": begin, "end": end, "outcome": outcome}
     return {"t": file.end, "kind": "judged", **about, "note": "", "by": BY}
 
 

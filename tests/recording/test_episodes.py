@@ -57,7 +57,7 @@ def attempt(path: Path, number: int = 1, **changes: object) -> Episode:
     """Return an episode in the middle of the recording ``path``."""
     with RecordingFile.open(path) as file:
         begin, end = file.start + 1.0, file.start + 2.5
-    fields = {"task": "pour", "begin": begin, "end": end, "note": "", **changes}
+    fields = {"task": "pour", "start": begin, "end": end, "note": "", **changes}
     return Episode(number=number, outcome=EpisodeOutcome.UNJUDGED, by=ADA, **fields)  # type: ignore[arg-type]
 
 
@@ -67,8 +67,8 @@ def test_episode_is_cut_out_of_a_recording(recorded: Path, tmp_path: Path) -> No
     assert episode_in(path) == episode
     opened = katana450.open(path)
     assert opened.episodes == (episode,)
-    assert (opened.start, opened.end) == (episode.begin, episode.end)
-    assert opened.t[0] >= episode.begin
+    assert (opened.start, opened.end) == (episode.start, episode.end)
+    assert opened.t[0] >= episode.start
     with RecordingFile.open(path) as file:
         assert file.counts()[STATE] > 50
         assert verify_recording(file, session_for(file).session).identical
@@ -98,7 +98,7 @@ def test_description_is_appended_without_changing_the_rest(recorded: Path, tmp_p
 
 def test_episode_without_motion_in_its_time_is_refused(recorded: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="There is nothing"):
-        write_episode([recorded], tmp_path / "x.mcap", attempt(recorded, begin=1.0, end=2.0))
+        write_episode([recorded], tmp_path / "x.mcap", attempt(recorded, start=1.0, end=2.0))
     assert not list(tmp_path.iterdir())
 
 
@@ -132,11 +132,11 @@ def test_last_description_of_each_number_counts(found: list[Episode]) -> None:
         ("[]", "no JSON object"),
         ('{"number": 0}', "not a whole number"),
         ('{"number": 1, "outcome": "won"}', "not one of running"),
-        ('{"number": 1, "outcome": "success", "begin": "x"}', "not a number of seconds"),
-        ('{"number": 1, "outcome": "success", "begin": 1e400}', "not a number of seconds"),
-        ('{"number": 1, "outcome": "success", "begin": 1}', "no end"),
-        ('{"number": 1, "outcome": "success", "begin": 2, "end": 1}', "before its begin"),
-        ('{"number": 1, "outcome": "running", "begin": 2, "task": 3}', "not a text"),
+        ('{"number": 1, "outcome": "success", "start": "x"}', "not a number of seconds"),
+        ('{"number": 1, "outcome": "success", "start": 1e400}', "not a number of seconds"),
+        ('{"number": 1, "outcome": "success", "start": 1}', "no end"),
+        ('{"number": 1, "outcome": "success", "start": 2, "end": 1}', "before its start"),
+        ('{"number": 1, "outcome": "running", "start": 2, "task": 3}', "not a text"),
         ("[" * 100_000, "is no JSON"),
     ],
 )
@@ -152,14 +152,14 @@ def test_episode_is_begun_judged_and_undone(bench: Bench) -> None:
     bench.move(100)
     running = bench.keeper.status()["running"]
     assert running["number"] == 1
-    assert running["seconds"] == int(bench.t - 1000.0 - (begun["begin"] - 1000.0))  # type: ignore[operator]
+    assert running["seconds"] == int(bench.t - 1000.0 - (begun["start"] - 1000.0))  # type: ignore[operator]
     with pytest.raises(InputError, match="runs already"):
         bench.ask(do="start", task="again")
     bench.ask(do="judge", outcome="success")
     (kept,) = bench.folder.kept()
     assert kept.episode.outcome is EpisodeOutcome.SUCCESS
     assert kept.episode.task == "pour"
-    assert kept.episode.begin == begun["begin"]
+    assert kept.episode.start == begun["start"]
     assert kept.episode.end == bench.t
     # All ticks between are there, and nothing is held any more.
     assert len(katana450.open(kept.path).t) > 50
@@ -211,21 +211,21 @@ def test_episode_is_trimmed_described_and_widened_again(bench: Bench) -> None:
     bench.ask(do="stop")
     (kept,) = bench.folder.kept()
     size = kept.size
-    bench.ask(do="trim", number=1, begin=0.2, end=0.9)
+    bench.ask(do="trim", number=1, start=0.2, end=0.9)
     trimmed = bench.folder.find(1)
     assert trimmed.episode.length == pytest.approx(0.7)
     assert trimmed.size > size
     bench.ask(do="describe", number=1, note="spilled", task="pour more")
     described = bench.folder.find(1).episode
     assert (described.note, described.task) == ("spilled", "pour more")
-    bench.ask(do="trim", number=1, begin=0.0, end=kept.stop - kept.start)
+    bench.ask(do="trim", number=1, start=0.0, end=kept.end - kept.start)
     assert bench.folder.find(1).episode.length == pytest.approx(kept.episode.length)
     # Each description makes another file, of which the newest alone is remembered.
     assert len(bench.folder._known) == 1
-    length = kept.stop - kept.start
+    length = kept.end - kept.start
     for begin, end in ((1.0, 1.0), (0.0, 1000.0), (length + 0.02, length + 0.05)):
-        with pytest.raises(InputError, match="choose a begin"):
-            bench.ask(do="trim", number=1, begin=begin, end=end)
+        with pytest.raises(InputError, match="choose a start"):
+            bench.ask(do="trim", number=1, start=begin, end=end)
 
 
 def test_episode_longer_than_the_ring_is_whole(

@@ -79,7 +79,7 @@ def test_client_and_command_record_episodes(
     client.stop("success")
     (episode,) = client.list()
     assert (episode.number, episode.task, episode.outcome) == (1, "pour", "success")
-    assert episode.end - episode.begin > 1.0
+    assert episode.end - episode.start > 1.0
     capsys.readouterr()
     url = ("--url", server.url)
     for arguments, words in (

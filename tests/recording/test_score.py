@@ -208,12 +208,12 @@ def test_trimmed_episode_is_scored_and_run_again_in_its_range(
     assert main(["record", "again", str(path), "--out", str(script)]) == 0
     assert script.read_text(encoding="utf-8") == run.script()
     # A recording in which an episode took place is no file of that episode.
-    with_episode(path, replace(episode, begin=begin + 0.1, end=end - 0.1), "trimmed")
+    with_episode(path, replace(episode, start=begin + 0.1, end=end - 0.1), "trimmed")
     with RecordingFile.open(path) as file:
         assert shown_part(file, None, None) == pytest.approx((0.1, end - begin - 0.1))
     longer = tmp_path / "longer.mcap"
     shutil.copy(line, longer)
-    text = json_text(message_of(replace(episode, begin=begin + 0.1), end, "ended"))
+    text = json_text(message_of(replace(episode, start=begin + 0.1), end, "ended"))
     append_message(longer, Message(EPISODES, 0, nanoseconds(end), text))
     with RecordingFile.open(longer) as file:
         assert shown_part(file, None, None) == (0.0, math.inf)

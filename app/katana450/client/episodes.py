@@ -24,7 +24,7 @@ class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
         task: What is to be done.
         outcome: ``success``, ``failure``, ``unjudged``, or ``unfinished`` after a crash.
         note: Remarks.
-        begin: First moment [s] after the begin of its file.
+        start: First moment [s] after the begin of its file.
         end: Last moment [s] after the begin of its file.
         recorded: Length of its file [s], which bounds both.
         bytes: Length of its file [bytes].
@@ -35,7 +35,7 @@ class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
     task: str
     outcome: str
     note: str
-    begin: float
+    start: float
     end: float
     recorded: float
     bytes: int
@@ -129,12 +129,12 @@ class EpisodeClient:
         """Change the texts of the episode ``number``; None keeps one. Return ``number``."""
         return self._number({"do": "describe", "number": number, "task": task, "note": note})
 
-    def trim(self, number: int, begin: float, end: float) -> int:
-        """Give the episode ``number`` another begin and end [s after the begin of its file].
+    def trim(self, number: int, start: float, end: float) -> int:
+        """Give the episode ``number`` another start and end [s after the begin of its file].
 
         Nothing is deleted. Returns ``number``.
         """
-        return self._number({"do": "trim", "number": number, "begin": begin, "end": end})
+        return self._number({"do": "trim", "number": number, "start": start, "end": end})
 
     def download(self, number: int, out: Path) -> None:
         """Write the file of the kept episode ``number`` to ``out``."""

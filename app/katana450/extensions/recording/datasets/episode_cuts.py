@@ -89,15 +89,15 @@ def cuts_in(
         )
     for each in episodes:
         if each.outcome.value in outcomes and each.end is not None:
-            if not file.start - MAX_OUTSIDE <= each.begin < each.end <= file.end + MAX_OUTSIDE:
+            if not file.start - MAX_OUTSIDE <= each.start < each.end <= file.end + MAX_OUTSIDE:
                 raise InputError(
-                    f"Episode {each.number} of {file.path} is from {each.begin:.3f} to "
+                    f"Episode {each.number} of {file.path} is from {each.start:.3f} to "
                     f"{each.end:.3f} s, but the recording is from {file.start:.3f} to "
                     f"{file.end:.3f} s. The file was changed or is damaged."
                 )
             success = each.outcome is EpisodeOutcome.SUCCESS if each.outcome in JUDGED else None
             task_text = _task(each.task or task, file, each.number)
-            yield EpisodeCut(file.path, each.begin, each.end, task_text, success)
+            yield EpisodeCut(file.path, each.start, each.end, task_text, success)
 
 
 def _task(task: str, file: RecordingFile, number: int | None = None) -> str:

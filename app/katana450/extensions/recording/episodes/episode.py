@@ -58,7 +58,7 @@ class Episode:
     Attributes:
         number: number in its folder, from 1.
         task: what is to be done, in words; may be empty.
-        begin, end: first and last moment [s] on the clock of the recording; ``end`` is None while
+        start, end: first and last moment [s] on the clock of the recording; ``end`` is None while
             it runs.
         outcome: the result.
         note: remarks; may be empty.
@@ -67,7 +67,7 @@ class Episode:
 
     number: int
     task: str
-    begin: float
+    start: float
     end: float | None
     outcome: EpisodeOutcome
     note: str
@@ -76,7 +76,7 @@ class Episode:
     @property
     def length(self) -> float:
         """Time from begin to end [s]; 0 while it has no end."""
-        return 0.0 if self.end is None else self.end - self.begin
+        return 0.0 if self.end is None else self.end - self.start
 
 
 def message_of(episode: Episode, t: float, kind: str) -> dict[str, Any]:
@@ -94,7 +94,7 @@ def message_of(episode: Episode, t: float, kind: str) -> dict[str, Any]:
         "kind": kind,
         "number": episode.number,
         "task": episode.task,
-        "begin": episode.begin,
+        "start": episode.start,
         "end": episode.end,
         "outcome": episode.outcome.value,
         "note": episode.note,
@@ -122,19 +122,19 @@ def episode_of(data: bytes | str) -> Episode:
         raise InputError(
             f"The outcome of episode {number} is {found.get('outcome')!r}, not one of {known}."
         ) from error
-    begin = _time(found, "begin", number)
+    start = _time(found, "start", number)
     end = None if found.get("end") is None else _time(found, "end", number)
     if end is None and outcome is not EpisodeOutcome.RUNNING:
         raise InputError(f"Episode {number} has the outcome {outcome.value} and no end.")
-    if end is not None and end < begin:
-        raise InputError(f"Episode {number} ends at {end:g} s, before its begin at {begin:g} s.")
+    if end is not None and end < start:
+        raise InputError(f"Episode {number} ends at {end:g} s, before its start at {start:g} s.")
     giver = EpisodeGiver(
         _text(by, "name", number), _text(by, "role", number), _text(by, "key", number)
     )
     return Episode(
         number,
         _text(found, "task", number),
-        begin,
+        start,
         end,
         outcome,
         _text(found, "note", number),

@@ -31,7 +31,7 @@ def _ask(options: Namespace, server: EpisodeClient) -> int:
     match options.episode_act:
         case "list":
             for each in server.list():
-                length = each.end - each.begin
+                length = each.end - each.start
                 _show(each.number, length, each.outcome, each.task, each.note)
             return 0
         case "start":

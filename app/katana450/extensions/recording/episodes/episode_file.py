@@ -55,7 +55,7 @@ def shown_part(file: RecordingFile, start: float | None, end: float | None) -> t
     first, last = 0.0, math.inf
     found = episodes_in(file)
     if len(found) == 1 and found[0].end is not None and _is_cut_out(file):
-        first, last = (max(t - file.start, 0.0) for t in (found[0].begin, found[0].end))
+        first, last = (max(t - file.start, 0.0) for t in (found[0].start, found[0].end))
     return first if start is None else start, last if end is None else end
 
 
@@ -66,7 +66,7 @@ def _is_cut_out(file: RecordingFile) -> bool:
     """
     whole = episode_of(next(file.messages(EPISODES)).data)
     ended = whole.end is not None and file.end <= whole.end + SAME
-    return ended and whole.begin <= file.start + SAME
+    return ended and whole.start <= file.start + SAME
 
 
 def write_episode(
@@ -80,7 +80,7 @@ def write_episode(
     if episode.end is None:
         raise InputError(f"Episode {episode.number} has no end yet.")
     text = json_text(message_of(episode, episode.end, kind))
-    trim(sources, out, episode.begin, episode.end, text)
+    trim(sources, out, episode.start, episode.end, text)
 
 
 def with_episode(path: Path, episode: Episode, kind: str) -> None:

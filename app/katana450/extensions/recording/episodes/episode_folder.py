@@ -39,7 +39,7 @@ class KeptEpisode:
     Attributes:
         path: its file.
         episode: its description.
-        start, stop: first and last moment of the file [s], which bound begin and end.
+        start, end: first and last moment of the file [s], which bound those of the episode.
         size: length of the file [bytes].
         discarded: whether the file is in the folder of discarded ones.
     """
@@ -47,7 +47,7 @@ class KeptEpisode:
     path: Path
     episode: Episode
     start: float
-    stop: float
+    end: float
     size: int
     discarded: bool
 
@@ -213,7 +213,7 @@ class EpisodeFolder:
         episode = marker.episode
         text = json_text(
             {
-                "episode": message_of(episode, episode.begin, "begun"),
+                "episode": message_of(episode, episode.start, "begun"),
                 "ring": str(marker.ring),
                 "first": marker.first,
                 "run": marker.run,

@@ -34,7 +34,7 @@ def add_episode_options(parser: argparse.ArgumentParser) -> None:
         help="begin the last episode again; when the new one is kept, the old one is discarded",
     )
     describe = acts.add_parser("describe", help="change task or note of an episode")
-    trim = acts.add_parser("trim", help="give an episode another begin and end")
+    trim = acts.add_parser("trim", help="give an episode another start and end")
     for each in (restore, describe, trim):
         each.add_argument("number", type=int, metavar="NUMBER")
     describe.add_argument("--task", metavar="TEXT")

@@ -119,16 +119,16 @@ class DescribeEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="describe")
 
 
 class TrimEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="trim"):
-    """Give an episode another begin and end. Nothing is deleted, so it can be widened again.
+    """Give an episode another start and end. Nothing is deleted, so it can be widened again.
 
     Attributes:
         number: The episode.
-        begin: First moment, in seconds after the begin of its file.
+        start: First moment, in seconds after the begin of its file.
         end: Last moment, in seconds after the begin of its file.
     """
 
     number: Number
-    begin: Annotated[float, Meta(ge=0.0)]
+    start: Annotated[float, Meta(ge=0.0)]
     end: Annotated[float, Meta(ge=0.0)]
 
 

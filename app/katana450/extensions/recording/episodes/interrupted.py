@@ -44,8 +44,8 @@ def cut_out(folder: EpisodeFolder, marker: EpisodeMarker, kind: str) -> Episode:
         episode = marker.episode
         if episode.end is None:
             outcome = EpisodeOutcome.UNFINISHED
-            episode = replace(episode, end=max(end, episode.begin), outcome=outcome)
-        episode = replace(episode, begin=min(max(episode.begin, start), episode.end or end))
+            episode = replace(episode, end=max(end, episode.start), outcome=outcome)
+        episode = replace(episode, start=min(max(episode.start, start), episode.end or end))
         write_episode(sources, folder.path(episode.number), episode, kind)
     return episode
 

@@ -197,8 +197,8 @@ class EpisodeKeeper:
                 texts = {"task": task, "note": note}
                 changes = {name: text for name, text in texts.items() if text is not None}
                 episode = self._change(number, "noted", **changes)
-            case TrimEpisode(number=number, begin=begin, end=end):
-                episode = self._trim(number, begin, end)
+            case TrimEpisode(number=number, start=start, end=end):
+                episode = self._trim(number, start, end)
             case _:
                 raise AssertionError(f"{type(request).__name__} is not handled.")
         return {**message_of(episode, t, ""), "kind": kind}
@@ -331,17 +331,17 @@ class EpisodeKeeper:
             return self._described(self._folder.find(undo.number).episode, "restored")
         return self._change(undo.number, "judged", outcome=undo.before)
 
-    def _trim(self, number: int, begin: float, end: float) -> Episode:
+    def _trim(self, number: int, start: float, end: float) -> Episode:
         found = self._folder.find(number)
-        length = found.stop - found.start
-        start, stop = found.start + begin, min(found.start + end, found.stop)
+        length = found.end - found.start
+        first, last = found.start + start, min(found.start + end, found.end)
         # The page shows tenths of a second.
-        if not start < stop or end > length + 0.1:
+        if not first < last or end > length + 0.1:
             raise InputError(
-                f"Episode {number} lasts {length:.1f} s: choose a begin from 0 s, and an end after "
+                f"Episode {number} lasts {length:.1f} s: choose a start from 0 s, and an end after "
                 "it up to there."
             )
-        return self._change(number, "trimmed", begin=start, end=stop)
+        return self._change(number, "trimmed", start=first, end=last)
 
     # Over time
 
@@ -357,7 +357,7 @@ class EpisodeKeeper:
                 with suppress(InputError):
                     self._replacing(self._running.save(), replaces)
                     self._note_change(f"Episode {episode.number} is saved now.")
-            elif episode.end is None and self._clock() - episode.begin >= MAX_SECONDS:
+            elif episode.end is None and self._clock() - episode.start >= MAX_SECONDS:
                 notice = f"Episode {episode.number} ended after {MAX_SECONDS / 60:g} minutes."
                 with suppress(InputError):
                     self._stop(EpisodeOutcome.UNJUDGED, self._clock())

@@ -133,16 +133,16 @@ def giver_of(actor: Actor) -> EpisodeGiver:
 def described(kept: KeptEpisode) -> dict[str, Any]:
     """Return an episode for a list, with times in seconds after the begin of its file."""
     episode = kept.episode
-    end = kept.stop if episode.end is None else episode.end
+    end = kept.end if episode.end is None else episode.end
     return {
         **{
             name: value
-            for name, value in message_of(episode, kept.stop, "").items()
+            for name, value in message_of(episode, kept.end, "").items()
             if name in ("number", "task", "outcome", "note", "by")
         },
-        "begin": round(episode.begin - kept.start, 3),
+        "start": round(episode.start - kept.start, 3),
         "end": round(end - kept.start, 3),
-        "recorded": round(kept.stop - kept.start, 3),
+        "recorded": round(kept.end - kept.start, 3),
         "bytes": kept.size,
         "file": kept.path.name,
     }

@@ -85,7 +85,7 @@ class RunningEpisode:
         if marker is None or marker.episode.end is not None:
             return None
         episode = marker.episode
-        length = t - episode.begin
+        length = t - episode.start
         left = MAX_SECONDS - length
         return {
             "number": episode.number,
@@ -127,7 +127,7 @@ class RunningEpisode:
         """Begin ``episode``. Raises InputError if there is another, or nothing can be written."""
         if self.episode is not None:
             raise InputError(f"Episode {self.episode.number} runs already. End it first.")
-        number, t = episode.number, episode.begin
+        number, t = episode.number, episode.start
         with self._ring.lock:
             first = self._ring.newest
             marker = EpisodeMarker(episode, self._ring_folder, first, self._run)
@@ -147,7 +147,7 @@ class RunningEpisode:
         marker = self._marker
         if marker is None or marker.episode.end is not None:
             raise InputError("No episode runs.")
-        episode = replace(marker.episode, end=max(t, marker.episode.begin), outcome=outcome)
+        episode = replace(marker.episode, end=max(t, marker.episode.start), outcome=outcome)
         self._marker = replace(marker, episode=episode)
         self._saving = True
         self._changed()
