@@ -339,9 +339,7 @@ class Jog(BaseCommand):
     def __post_init__(self) -> None:
         object.__setattr__(self, "rates", vector("The jog", self.rates, 5))
         if not isinstance(self.frame, JogFrame):
-            raise InputError(
-                f"The frame of a jog must be JogFrame.BASE or JogFrame.TOOL, not {self.frame!r}."
-            )
+            raise InputError(f"The frame of a jog must be a JogFrame, not {self.frame!r}.")
 
 
 @dataclass(frozen=True, eq=False)
