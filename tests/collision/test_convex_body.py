@@ -49,7 +49,7 @@ def test_random_points_are_contained(
     check_holds(convex_body(points), points)
 
 
-@pytest.mark.parametrize("count", [300, 30_000])
+@pytest.mark.parametrize("count", [300, pytest.param(30_000, marks=pytest.mark.long)])
 def test_points_on_a_sphere_are_contained(count: int) -> None:
     """Every point is a corner of the true hull, and there are more than the search takes."""
     points = np.random.default_rng(3).normal(size=(count, 3))

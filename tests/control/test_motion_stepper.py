@@ -185,10 +185,11 @@ def test_invalid_speed_is_refused(fraction: float) -> None:
         cmd.SpeedScale(fraction)
 
 
-def test_tool_keeps_its_maximum_speed(session: Session, state: State) -> None:
+@pytest.mark.parametrize("goals", [12, pytest.param(40, marks=pytest.mark.long)])
+def test_tool_keeps_its_maximum_speed(session: Session, state: State, goals: int) -> None:
     rng = np.random.default_rng(7)
     chain, fastest = session.require_arm().chain, 0.0
-    for number in range(40):
+    for number in range(goals):
         goal = rng.uniform(chain.lower, chain.upper)
         ticks = int(rng.integers(20, 200))
         command: cmd.Command = cmd.SetJoints(goal)

@@ -125,7 +125,7 @@ def test_sine_inside_the_limits_keeps_its_amplitude(
 
 
 @pytest.mark.parametrize("rates", [False, True])
-@pytest.mark.parametrize("period", [0.8, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("period", [0.8, 1.0, pytest.param(1.5, marks=pytest.mark.long), 2.0])
 def test_sine_beyond_the_limits_is_clipped_without_overshoot(
     session: Session, period: float, rates: bool
 ) -> None:

@@ -216,6 +216,7 @@ def test_stop_signals_are_those_of_the_system(monkeypatch: pytest.MonkeyPatch) -
     assert 21 in platform_support.stop_signals()
 
 
+@pytest.mark.long
 def test_the_collision_engine_of_windows_works_without_coal() -> None:
     """Build and measure the arm's world in a process without coal."""
     program = """

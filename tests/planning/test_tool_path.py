@@ -27,6 +27,7 @@ from katana450.maths.planning.curve import Linear, ToolArc, ToolLine
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
 from katana450.maths.planning.tool_path import ToolPath
+from tests.conftest import LONG
 from tests.kinematics.family import random_member
 
 FRONT_UP = Branch("front", "up")
@@ -75,7 +76,7 @@ def test_arc_without_a_feasible_pitch_is_refused(arm: ArmModel, circle: ToolArc)
         roomiest(arm.chain, FRONT_UP, replace(circle, start=np.array([0.15, 0.0, 0.9])))
 
 
-@settings(max_examples=25)
+@settings(max_examples=25 if LONG else 8)
 @given(st.integers(0, 2**32 - 1))
 def test_lines_of_any_member_are_straight_and_keep_their_branch(seed: int) -> None:
     rng = np.random.default_rng(seed)

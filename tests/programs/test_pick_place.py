@@ -91,6 +91,7 @@ def test_cylinder_is_placed_in_the_frame_of_the_shoulder(stage: Stage) -> None:
     assert place(states[-1].objects[0]) == pytest.approx([300.0, -120.0, 0.0], abs=1e-6)
 
 
+@pytest.mark.long
 def test_three_boxes_are_stacked(stage: Stage) -> None:
     steps = "- stack: {object: b, on: a}\n- stack: {object: c, on: b}\n- home\n"
     end = played(

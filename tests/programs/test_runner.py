@@ -149,7 +149,7 @@ def test_a_pause_stays_on_the_path_and_does_not_count_as_waiting(
     assert np.array_equal(state.q, whole[-1].q)
 
 
-@pytest.mark.parametrize("cleared", [False, True])
+@pytest.mark.parametrize("cleared", [pytest.param(False, marks=pytest.mark.long), True])
 def test_the_timeout_begins_when_the_path_is_blocked(stage: Stage, cleared: bool) -> None:
     script = parse("steps:\n  - joints: [60, -68, 85, 8, 0]")
     program = compiled(script, stage.plan_context, stage.begin(), speed=0.03)
