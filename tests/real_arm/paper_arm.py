@@ -47,7 +47,8 @@ class PaperArm:
         requests: All requests with their times.
         refusals: Errors for the next requests of a class, each used once.
         starved: Whether its buffer ran empty before the end of a motion.
-        largest_buffer, smallest_buffer: Segments that waited at the arrival of each packet.
+        buffers: Segments that waited at the arrival of each packet.
+        largest_jump: Largest distance from the arm to the begin of a polynomial [encoders].
     """
 
     def __init__(self) -> None:
@@ -56,6 +57,7 @@ class PaperArm:
         self.requests: list[tuple[float, ArmRequest]] = []
         self.refusals: dict[type[ArmRequest], FirmwareError] = {}
         self.starved = False
+        self.largest_jump = 0.0
         self.buffers: list[float] = []
         self.calibrated_at = np.inf
         self._packets: list[SendSplines] = []
@@ -87,6 +89,10 @@ class PaperArm:
         return request.REPLY.read(request.REPLY.HEAD + bytes([1]) * length)
 
     def _take(self, packet: SendSplines, t: float) -> None:
+        before = self._packets[-1].segments if self._packets else None
+        at = self.place if before is None else [segment.target for segment in before]
+        jumps = [abs(s.p0 - place) for s, place in zip(packet.segments[:5], at, strict=False)]
+        self.largest_jump = max(self.largest_jump, *jumps)
         self._packets.append(packet)
         if self._began is None and packet.more != More.STORE:
             self._began = t

@@ -137,18 +137,20 @@ def test_thread_that_hangs_is_reported_by_send() -> None:
         loop.wait(ArmMode.HOLDING)
 
 
-def test_no_arm_at_the_address_is_reported_and_tried_again() -> None:
+def test_no_arm_at_the_address_is_reported_until_a_person_connects_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", port), ENDS, JOINTS))
     try:
+        loop.driver.perform(ArmAct.CONNECT, 0.0)
+        time.sleep(0.3)
         assert loop.report.mode is ArmMode.DISCONNECTED
-        loop.act(ArmAct.CONNECT, ArmMode.LOST)
-        time.sleep(0.1)
         assert f"no connection to an arm at 127.0.0.1, port {port}" in loop.report.note
         paper = PaperServer()
-        with SmallFirmware(paper.answer, port):
-            loop.wait(ArmMode.UNCALIBRATED)
+        with SmallFirmware(paper.answer, port) as firmware:
+            time.sleep(0.5)
+            assert firmware.connections == 0
+            loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
             loop.act(ArmAct.DISCONNECT, ArmMode.DISCONNECTED)
     finally:
         loop.end()

@@ -91,12 +91,12 @@ class ArmMachine:
         self._has_sensors = variant.has_gripper
         self._round_trip = 0.0
         self._measured_stop: MeasuredStop | None = None
-        self._was_connected = False
+        self._wants_link = self._was_connected = False
 
     @property
     def wants_link(self) -> bool:
         """True if there is to be a connection."""
-        return self.mode is not ArmMode.DISCONNECTED
+        return self._wants_link
 
     @property
     def moves(self) -> bool:
@@ -121,11 +121,15 @@ class ArmMachine:
         self._resume_at = -np.inf
 
     def lost(self, problem: str) -> None:
-        """Note that the connection is lost, or that an attempt to connect failed."""
-        if self.mode is not ArmMode.DISCONNECTED:
+        """Note that the connection is lost, or that an attempt to connect failed.
+
+        Only an arm that has answered before is connected to again without an act of a person.
+        """
+        if self._was_connected:
             self.mode = ArmMode.LOST
-            danger = " The arm may still move." if self._was_connected else ""
-            self.note = f"{problem}{danger} Trying to connect again."
+            self.note = f"{problem} The arm may still move. Trying to connect again."
+        elif self._wants_link:
+            self._wants_link, self.note = False, problem
         self._clear()
 
     def perform(self, act: ArmAct) -> None:
@@ -133,10 +137,10 @@ class ArmMachine:
         if act not in self.mode.acts:
             return
         if act is ArmAct.CONNECT:
-            self.mode, self.note = ArmMode.LOST, "Connecting to the arm."
+            self._wants_link, self.note = True, "Connecting to the arm."
         elif act is ArmAct.DISCONNECT:
             self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
-            self._was_connected = False
+            self._wants_link = self._was_connected = False
             self._clear()
         else:
             self._acts.append(act)
@@ -191,7 +195,7 @@ class ArmMachine:
                 self._halt(now, error.sentence)
 
     def _note_answer(self) -> None:
-        if self.mode is ArmMode.LOST:
+        if self.mode in (ArmMode.DISCONNECTED, ArmMode.LOST):
             # Only a reply proves that there is an arm: systems accept connections in its place.
             self.mode, self.note = ArmMode.CONNECTED, "Reading the arm."
             self._was_connected = True

@@ -92,5 +92,6 @@ class ArmReadings:
 
 def collision_sentence(axes: tuple[int, ...]) -> str:
     """Return the sentence about a collision of ``axes``, of which there is at least one."""
-    names = " and ".join(map(str, axes))
-    return f"A collision stopped axis {names}. Clear the space around the arm, then unblock it."
+    *others, last = map(str, axes)
+    names = f"axes {', '.join(others)} and {last}" if others else f"axis {last}"
+    return f"A collision stopped {names}. Clear the space around the arm, then unblock it."
