@@ -77,6 +77,8 @@ class ArmMotion:
         Returns a sentence if it cannot be followed, otherwise an empty text.
         """
         self._finger.add(encoders[FINGER])
+        if self._motions and self._motions[-1].is_late:
+            return ""
         if not self._motions or not self._motions[-1].takes_setpoints:
             start = self._motions[-1].target if self._motions else self._arm.held
             away = np.abs(encoders - start)[:FINGER]
