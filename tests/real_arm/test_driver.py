@@ -17,6 +17,7 @@ from katana450.extensions.real_arm.codec import replies, requests
 from katana450.extensions.real_arm.codec.firmware_codec import refusal_bytes, reply_bytes
 from katana450.extensions.real_arm.codec.replies import FirmwareError
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
+from katana450.extensions.real_arm.driver.machine import ArmMachine
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from katana450.extensions.real_arm.link.transport import LinkLostError
 from tests.real_arm.control_loop import SmallLoop, swing
@@ -180,6 +181,25 @@ def test_inputs_and_outputs_are_asked_for_beside_the_motion() -> None:
         loop.act(ArmAct.DISCONNECT, ArmMode.DISCONNECTED)
         with pytest.raises(LinkLostError):
             driver.ask(requests.ReadInputs()).result(1.0)
+
+
+def test_internal_error_is_a_loss_and_does_not_end_the_thread(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with served() as (_, _, loop):
+        loop.engage()
+        broken = iter([True])
+
+        def urgent(machine: ArmMachine, now: float) -> requests.ArmRequest | None:
+            if next(broken, False):
+                raise ArithmeticError("a fault of the test")
+            return found(machine, now)
+
+        found = ArmMachine.urgent
+        monkeypatch.setattr(ArmMachine, "urgent", urgent)
+        loop.wait(ArmMode.LOST)
+        assert "internal error: a fault of the test" in loop.report.note
+        loop.wait(ArmMode.UNCALIBRATED)
 
 
 def test_setpoint_that_is_not_finite_is_refused() -> None:

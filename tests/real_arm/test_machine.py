@@ -23,7 +23,7 @@ from katana450.extensions.real_arm.codec.requests import (
     SetCollisionDetection,
 )
 from katana450.maths.geometry.arrays import FloatArray
-from tests.real_arm.paper_arm import HOME, JOINTS, Conversation
+from tests.real_arm.paper_arm import ENDS, HOME, JOINTS, MAP, Conversation
 
 COLLISION = FirmwareError(ord("H"), -10, 3, "StopperThread: collision on axis: 3")
 
@@ -82,12 +82,12 @@ def test_engage_freezes_each_axis_where_it_is(talk: Conversation) -> None:
     assert talk.sent(SetCollisionDetection) == [SetCollisionDetection(1)]
 
 
-def test_engage_of_an_arm_that_does_not_hold_is_a_fault(talk: Conversation) -> None:
+def test_engage_that_is_refused_leaves_the_arm_uncalibrated(talk: Conversation) -> None:
     talk.connect()
     talk.arm.refusals[CommandMotor] = FirmwareError(ord("C"), -3, 0, "not calibrated")
     talk.machine.perform(ArmAct.ENGAGE)
     talk.run(1.0)
-    assert talk.mode() is ArmMode.FAULT
+    assert talk.mode() is ArmMode.UNCALIBRATED
     assert "not in the right state ('not calibrated')" in talk.machine.note
 
 
@@ -110,7 +110,7 @@ def test_refused_calibration_switches_collision_detection_on_again(talk: Convers
     talk.arm.refusals[CommandMotor] = FirmwareError(ord("C"), -1, 0, "")
     talk.machine.perform(ArmAct.CALIBRATE)
     talk.run(1.0)
-    assert talk.mode() is ArmMode.FAULT
+    assert talk.mode() is ArmMode.UNCALIBRATED
     assert talk.sent(SetCollisionDetection)[-1] == SetCollisionDetection(1)
 
 
@@ -348,3 +348,24 @@ def test_silent_control_loop_is_braked_before_the_arm_runs_dry(talk: Conversatio
     assert isinstance(last, SendSplines)
     assert last.more == More.LAST
     assert all(segment.speed_at(8) == 0.0 for segment in last.segments)
+
+
+def test_setpoint_beyond_the_limits_ends_at_them(talk: Conversation) -> None:
+    talk.engage()
+    begun = talk.now
+    talk.setpoint = lambda t: JOINTS + np.array([-1.0, 0, 0, 0, 0, 0]) * min(t - begun, 4.0)
+    talk.run(6.0)
+    assert talk.mode() is ArmMode.HOLDING
+    assert talk.arm.place[0] == MAP.upper[0]
+    assert talk.reports[-1][2][0] == pytest.approx(ENDS[0][0], abs=1e-9)
+
+
+def test_end_of_the_program_stops_what_moves(talk: Conversation) -> None:
+    talk.engage()
+    talk.setpoint = sway(talk.now)
+    talk.run(1.0)
+    talk.machine.freeze(talk.now)
+    talk._tick = np.inf
+    talk.run(0.5)
+    assert not talk.machine.moves
+    assert talk.mode() is ArmMode.HOLDING

@@ -51,6 +51,9 @@ FINGER_PERIOD = 0.1
 NOISE = np.radians(0.5)
 """[rad] Distance beyond a limit that calibration and play leave possible."""
 
+UNPROVEN = (ArmMode.CONNECTED, ArmMode.UNCALIBRATED, ArmMode.CALIBRATING)
+"""Modes of an arm whose encoders may be wrong."""
+
 MAX_REFUSALS = 3
 """Measurements that may be refused one after another."""
 
@@ -330,7 +333,9 @@ class ArmMachine:
     def _finish(self, end: ProcedureEnd) -> None:
         self._procedure = self._step = None
         self._motion.clear()
-        self.mode, self.note = end.mode, end.note
+        # Nothing leads past an act that failed: the arm may not be calibrated.
+        failed = end.mode is ArmMode.FAULT and self.mode in UNPROVEN
+        self.mode, self.note = ArmMode.UNCALIBRATED if failed else end.mode, end.note
         if end.measured_stop is not None:
             self._measured_stop = end.measured_stop
 
