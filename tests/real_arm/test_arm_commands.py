@@ -29,7 +29,7 @@ from katana450.extensions.real_arm.link.tcp import TcpTransport
 from katana450.server.api import answers
 from katana450.server.api.arm_answers import MeasuredArm
 from katana450.server.api.motion_requests import OperateArm
-from tests.browser.server import APP, AppServer
+from tests.browser.server import APP, AppServer, free_port
 from tests.real_arm.emulated import ROOT, TIMEOUT, emulator, linked
 
 KATANA450 = (sys.executable, "-m", "katana450")
@@ -267,6 +267,22 @@ def test_server_simulates_a_plant() -> None:
         state = client.query(answers.State)
         away = np.degrees(np.abs(np.array(state.q) - [0.0, -1.0, 1.0, 0.5, 0.0]).max())
         assert 0.0 < away < 0.15, "it droops"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--arm", "192.168.1.1"), "is no address of an arm"),
+        (("--arm-log", "exchanges.log"), "needs an arm"),
+        (("--arm", "tcp://127.0.0.1", "--arm-log", "/nowhere/exchanges.log"), "cannot be written"),
+        (("--arm", "tcp://127.0.0.1", "--urdf", "tests/exchange/gantry.urdf"), "five turning axes"),
+    ],
+)
+def test_server_refuses_an_arm_that_it_cannot_drive(options: tuple[str, ...], words: str) -> None:
+    done = katana450("serve", "--port", str(free_port()), "--no-log", "--no-record", *options)
+    assert done.returncode != 0
+    assert words in done.stderr
 
 
 def measured(client: Client) -> MeasuredArm:

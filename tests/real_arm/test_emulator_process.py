@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -90,8 +91,12 @@ def test_client_may_poll_without_pause(port: int) -> None:
         assert sorted(link.round_trips)[500] < 2e-3
 
 
-def test_calibration_is_seen_by_polling_the_first_axis() -> None:
-    with emulator("--calibration-scale", "30") as port, linked(port) as link:
+def test_calibration_is_seen_by_polling_the_first_axis(tmp_path: Path) -> None:
+    script = tmp_path / "faults.yaml"
+    script.write_text("object_mm: 40\nfaults: [{do: jitter, seconds: 0.01, lasts: 0.1}]\n")
+    options = ("--calibration-scale", "30", "--faults", str(script))
+    with emulator(*options) as port, linked(port) as link:
+        assert link.exchange(req.ReadSensors()).values[11] > 200  # type: ignore[attr-defined]
         link.exchange(req.SetCollisionDetection(0))
         link.exchange(req.CommandMotor(0, req.MotorFlag.CALIBRATE, 32000))
         begun, polls = time.monotonic(), 0

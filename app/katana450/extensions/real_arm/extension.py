@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
+from katana450.errors import ConfigurationError
 from katana450.extension import CliCommand, Extension, ServeExtension
 from katana450.extensions.real_arm.commands.options import (
     add_arm_command_options,
@@ -44,6 +45,8 @@ def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> 
         from katana450.extensions.real_arm.commands.serve_arm import driver_of
 
         return driver_of(options, robot, q, gripper)
+    if options.arm_log is not None:
+        raise ConfigurationError("--arm-log needs an arm: add --arm URL.")
     if options.plant is None:
         return None
     from katana450.extensions.real_arm.plant.driver import PlantDriver
