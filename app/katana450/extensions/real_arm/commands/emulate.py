@@ -15,8 +15,8 @@ from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.plant.profile import profile_named
 from katana450.platform_support import raise_priority, stop_signals
 
-LONGEST_WAIT = 3600.0
-"""[s] Some systems deliver no signal during a wait without end."""
+CHECK_INTERVAL = 1.0
+"""[s] Interval at which the emulator is looked after."""
 
 
 def emulate(options: Namespace) -> int:
@@ -45,10 +45,10 @@ def emulate(options: Namespace) -> int:
     if window is not None:
         say(f"The arm behind the wire: {window.url}")
     try:
-        while not ending.wait(LONGEST_WAIT):
+        while not ending.wait(CHECK_INTERVAL) and emulator.is_running:
             pass
     finally:
         if window is not None:
             window.close()
         emulator.stop()
-    return 0
+    return 0 if ending.is_set() else 1

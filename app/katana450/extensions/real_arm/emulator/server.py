@@ -34,6 +34,9 @@ with ever more steps. It then calibrates more slowly instead."""
 
 RECEIVED_BYTES = 4096
 
+SEND_TIMEOUT = 1.0
+"""[s] Time after which a client that reads no replies is dropped."""
+
 
 class EmulatorServer:
     """Serves one client at a time; the others wait for their turn, as far as the system lets them.
@@ -68,10 +71,15 @@ class EmulatorServer:
         """Serve in a thread of its own."""
         self._thread.start()
 
+    @property
+    def is_running(self) -> bool:
+        """True while the arm is served in its thread."""
+        return self._thread.is_alive()
+
     def stop(self) -> None:
         """End ``run``, wait for it, and close the port."""
         self._ending.set()
-        if self._thread.is_alive():
+        if self.is_running:
             self._thread.join()
 
     def drop_client(self) -> None:
@@ -120,6 +128,7 @@ class EmulatorServer:
                 client.close()
                 return
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            client.settimeout(SEND_TIMEOUT)
             self._client, self._codec = client, FirmwareCodec()
 
     def _receive(self, client: socket.socket) -> None:
