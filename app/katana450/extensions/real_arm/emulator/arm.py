@@ -234,5 +234,6 @@ class EmulatedArm:
                 continue
             self.collided = self.collided or number + 1
             for other in self.axes:
+                # Only the axis that collided says so; the others hold where they come to rest.
                 if other.mode in (AxisMode.TARGET, AxisMode.SPLINE):
-                    other.collide()
+                    other.freeze()
