@@ -15,6 +15,7 @@ from katana450.extensions.real_arm.emulator.posture import joints_at, loads_of_r
 from katana450.extensions.real_arm.emulator.sensors import encoder_at_gap, gap_at_encoder
 from katana450.extensions.real_arm.emulator.spline_buffer import DEPTH, SplineBuffer
 from katana450.extensions.real_arm.plant.profile import STIFF
+from katana450.extensions.touch.gripper_sensors import GripperSensors
 from tests.real_arm.emulated import HOLDS, Bench, at_rest
 
 CALIBRATED = (30500, -30500, -30500, 30500, 30500, 30500)
@@ -218,6 +219,22 @@ def test_obstacle_stops_the_arm_until_it_is_unblocked(bench: Bench) -> None:
     assert bench.positions[0] == pytest.approx(28000, abs=30)
 
 
+def test_gripper_that_holds_something_does_not_keep_the_arm_blocked() -> None:
+    bench = Bench(EmulatedArm(calibrated=True, object_width=100.0))
+    bench.move(6, 12240)
+    bench.wait(4.0)
+    bench.arm.block(1)
+    bench.move(1, 29000)
+    bench.wait(2.0)
+    assert bench.states == (40, 8, 8, 8, 8, 40)
+    bench.arm.release(1)
+    bench.ask(req.CommandMotor(1, req.MotorFlag.FREEZE, bench.positions[0]))
+    bench.move(1, 29000)
+    bench.wait(3.0)
+    assert bench.positions[0] == pytest.approx(29000, abs=30)
+    assert bench.states[5] == 40, "it still holds"
+
+
 def test_no_collision_is_found_while_detection_is_off(bench: Bench) -> None:
     bench.arm.block(1)
     bench.ask(req.SetCollisionDetection(0))
@@ -237,6 +254,7 @@ def test_gripper_closes_on_an_object_and_its_sensors_feel_it(width: float) -> No
     bench.ask(req.SetAxisParameter(6, 3, 100, 30))
     bench.move(6, 12240)
     bench.wait(7.0)
+    assert GripperSensors.from_bytes(bench.arm.sensors).holding
     assert bench.states == (8, 8, 8, 8, 8, 40), "the gripper stops alone"
     assert gap_at_encoder(bench.positions[5]) == pytest.approx(width, abs=1.5)
     held = bench.arm.sensors

@@ -147,7 +147,7 @@ class EmulatedArm:
         self.end_calibration()
         for each in self.chosen(axis):
             each.freeze()
-        if all(each.status != AxisStatus.COLLIDED for each in self.axes):
+        if all(each.status != AxisStatus.COLLIDED for each in self.axes[:GRIPPER]):
             self.collided = 0
         self.touch()
 

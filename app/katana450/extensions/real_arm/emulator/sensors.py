@@ -1,12 +1,18 @@
 """The 16 sensors of the emulated gripper, and the object between its fingers.
 
-The meaning of each sensor is that reported for this gripper; its zero and scale are assumed.
+Sensors read as those of the simulation, whose zero and scale are assumed.
 """
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
+
+from katana450.extensions.touch.gripper_sensors import (
+    GripperSensors,
+    distance_value,
+    force_value,
+)
+from katana450.extensions.touch.squeeze import FORCE_LIMIT
 
 OPEN_ENCODER, CLOSED_ENCODER = 30770, 12240
 """Counts of the open and the closed gripper."""
@@ -25,26 +31,8 @@ GAPS = (
 
 CLOSED_ANGLE, OPEN_ANGLE = GAPS[0][0], GAPS[-1][0]
 
-RIGHT_NEAR, LEFT_NEAR = (0, 1), (8, 9)
-"""Infrared distances at the insides of the fingers."""
-
-CENTRE = 11
-"""Infrared distance in the middle of the gripper."""
-
-FORCES = (6, 7, 14, 15)
-"""Forces: right rear and front, left rear and front."""
-
-DARK = (2, 3, 10)
-"""Sensors that read 0: two that are reserved, and the conductivity between the fingers."""
-
-FAR, NEAR = 12, 250
-"""Readings of an infrared sensor with nothing in front of it, and at a surface. Assumed."""
-
-SIGHT = 15.0
-"""[mm] Distance at which that reading has fallen by a factor e. Assumed."""
-
-NO_FORCE, WHOLE_FORCE = 20, 255
-"""Readings of a force sensor without contact, and at the whole effort of the motor. Assumed."""
+OPEN_GAP = GAPS[-1][1]
+"""[mm] Distance of everything that is not between the fingers."""
 
 
 def encoder_at_gap(gap: float) -> float:
@@ -73,19 +61,19 @@ def sensor_values(encoder: float, width: float | None, squeeze: float) -> tuple[
         width: width of the object between the fingers [mm]; None without one.
         squeeze: force on it, as a fraction of the whole effort of the motor.
     """
-    values = [FAR] * 16
-    for each in DARK:
-        values[each] = 0
-    away = gap_at_encoder(encoder) - (width or 0.0)
-    seen = _seen(max(0.5 * away, 0.0))
-    for each in (*RIGHT_NEAR, *LEFT_NEAR):
-        values[each] = seen
-    values[CENTRE] = FAR if width is None else NEAR
-    force = NO_FORCE + min(squeeze, 1.0) * (WHOLE_FORCE - NO_FORCE)
-    for each in FORCES:
-        values[each] = round(force)
-    return tuple(values)
-
-
-def _seen(distance: float) -> int:
-    return round(FAR + (NEAR - FAR) * math.exp(-distance / SIGHT))
+    beside = 0.5e-3 * max(gap_at_encoder(encoder) - (width or 0.0), 0.0)
+    near = distance_value(beside)
+    # Half of a pad has one of its two sensors.
+    force = force_value(0.5 * FORCE_LIMIT * squeeze)
+    sensors = GripperSensors(
+        right_near_distance=near,
+        right_far_distance=near,
+        right_rear_force=force,
+        right_front_force=force,
+        left_near_distance=near,
+        left_far_distance=near,
+        left_rear_force=force,
+        left_front_force=force,
+        centre_distance=distance_value(1e-3 * (OPEN_GAP if width is None else 0.0)),
+    )
+    return tuple(sensors.to_bytes())

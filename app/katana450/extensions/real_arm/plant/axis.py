@@ -128,7 +128,9 @@ class PlantAxis:
         self.effort = drive / limit
         before, slid = self.position, self.output
         if before < self.contact:
+            # What is soft damps, too; without that, fingers would bounce.
             drive += self._softness * (self.contact - before)
+            drive -= math.sqrt(self._softness) * self.speed
         speed = self.speed + (drive - weight * load - self._viscous * self.speed) * STEP
         # Friction ends a motion but begins none, so an axis comes to rest exactly.
         if abs(speed) <= STICTION * self._coulomb:
