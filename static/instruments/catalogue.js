@@ -62,7 +62,7 @@ function knobs(arm, gripper, say) {
 function pads() {
   const maps = new PressureMaps();
   const draw = ({ touch }) => maps.show(touch);
-  return { id: "pads", title: "Pressure on the pads", sizes: ["large", "broad"], shown: true, element: maps.element, draw };
+  return { id: "pads", title: "Pressure on the pads", sizes: ["large", "wide"], shown: true, element: maps.element, draw };
 }
 
 function gauges(arm) {

@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from katana450.extensions.touch.pad import Pad
+from katana450.extensions.touch.pad import COLUMNS, ROWS, Pad
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 MODULUS = 100e3
@@ -44,22 +45,28 @@ class PadPressure:
     centre: tuple[float, float] | None
 
 
-def pressed(pad: Pad, depth: FloatArray) -> PadPressure:
-    """Return the pressure on ``pad`` whose points are ``depth`` (n,) [m] inside a body."""
-    forces = pressure_at(depth) * pad.areas
+def pressed(
+    pad: Pad, depth: FloatArray, numbers: npt.NDArray[np.intp] | None = None
+) -> PadPressure:
+    """Return the pressure on ``pad`` whose points are ``depth`` (n,) [m] inside a body.
+
+    ``numbers``: (n,) the points to which the depths belong, if the others are not pressed.
+    """
+    at = slice(None) if numbers is None else numbers
+    forces = pressure_at(depth) * pad.areas[at]
     force = float(forces.sum())
-    taxels = pad.summed(forces)
-    half = len(taxels) // 2
+    taxels = np.bincount(pad.taxels[at], weights=forces, minlength=ROWS * COLUMNS)
+    taxels = taxels.reshape(ROWS, COLUMNS)
     centre = None
     if force > 0.0:
-        along, across = (forces @ pad.places / force).tolist()
+        along, across = (forces @ pad.places[at] / force).tolist()
         centre = (along, across)
     return PadPressure(
         pad.finger,
         force,
         frozen(taxels / pad.taxel_areas),
-        float(taxels[:half].sum()),
-        float(taxels[half:].sum()),
+        float(taxels[: ROWS // 2].sum()),
+        float(taxels[ROWS // 2 :].sum()),
         centre,
     )
 

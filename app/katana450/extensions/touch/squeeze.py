@@ -25,7 +25,7 @@ FORCE_LIMIT = 10.0
 """[N] Greatest force of a finger, as the current of its motor allows. Assumed: the 0.5 N m that the
 robot description states for a finger, at the 50 mm from its pivot to the middle of its pad."""
 
-REACH = 2.0 * THICKNESS
+REACH = 1.5 * THICKNESS
 """[m] Distance from the object up to which a point of a pad can come into it by squeezing."""
 
 MAX_GAP = 2e-3
@@ -39,9 +39,10 @@ MAX_SQUEEZE = 0.25
 """[rad] Squeeze beyond which the pads have no more to yield: they are THICKNESS deep everywhere."""
 
 MARGIN = 1e-3
-"""[m] Distance from the object at the greatest force up to which a point counts as near."""
+"""[m] Distance from the object up to which a point counts as near, at more than the greatest force.
+"""
 
-FIRST_SQUEEZE, GROWTH = 4e-3, 2.0
+FIRST_SQUEEZE, GROWTH = 0.02, 2.0
 """[rad, 1] Begin of the search for a force, and the growth of its steps."""
 
 POWER = 2.0 / 3.0
@@ -136,26 +137,21 @@ class SqueezedBody:
             self._shift, self._gap = self._centred()
             self.on_pads = self._gap <= MAX_GAP
         if self.on_pads:
-            self._greatest, self._shift = self._squeeze_at(force_limit)
-            depths = self._depths(self._greatest, self._shift)
-            # With less force the pads touch less of it, so the other points are never needed.
-            self._near = [
-                near.only(depth > -MARGIN) for near, depth in zip(self._near, depths, strict=True)
-            ]
+            self._greatest, self._shift = self._squeeze_at(force_limit, forget=True)
 
     def squeezed(self, squeeze: float) -> Squeeze:
         """Return the object under ``squeeze`` [rad], or the part that the force limit allows."""
         used = min(squeeze, self._greatest)
         if not self.on_pads:
-            first, second = (pressed(pad, np.zeros(len(pad.points))) for pad in self._pads)
+            none = np.zeros(0)
+            first, second = (pressed(pad, none, none.astype(np.intp)) for pad in self._pads)
             return Squeeze((first, second), used, self.axis)
-        shift = self._forces(used, self._shift)[1]
-        pads = []
-        for pad, near, depth in zip(self._pads, self._near, self._depths(used, shift), strict=True):
-            whole = np.zeros(len(pad.points))
-            whole[near.numbers] = depth
-            pads.append(pressed(pad, whole))
-        return Squeeze((pads[0], pads[1]), used, self.axis)
+        depths = self._forces(used, self._shift)[2]
+        first, second = (
+            pressed(pad, depth, near.numbers)
+            for pad, near, depth in zip(self._pads, self._near, depths, strict=True)
+        )
+        return Squeeze((first, second), used, self.axis)
 
     def squeeze_for(self, force: float) -> float:
         """Return the squeeze [rad] at which the fingers press with ``force`` [N].
@@ -197,11 +193,17 @@ class SqueezedBody:
             gap = 0.5 * (first + second)
         return shift, gap
 
-    def _forces(self, squeeze: float, shift: float) -> tuple[float, float]:
-        """Return the greater force of a finger [N], and the shift [m] at which they are equal."""
-        for _ in range(BALANCE_STEPS):
+    def _forces(self, squeeze: float, shift: float) -> tuple[float, float, list[FloatArray]]:
+        """Return the greater force of a finger [N], the shift [m] at which both are equal, depths.
+
+        The depths [m] are those of the near points of each pad.
+        """
+        depths = self._depths(squeeze, shift)
+        for step in range(BALANCE_STEPS):
+            if step:
+                depths = self._depths(squeeze, shift)
             greatest = total = stiffness = 0.0
-            for near, depth in zip(self._near, self._depths(squeeze, shift), strict=True):
+            for near, depth in zip(self._near, depths, strict=True):
                 forces = pressure_at(depth) * near.areas
                 closing = near.normals @ self._along
                 greatest = max(greatest, float(forces.sum()))
@@ -211,24 +213,31 @@ class SqueezedBody:
             if abs(total) <= FORCE_TOLERANCE or stiffness <= 0.0:
                 break
             shift += total / stiffness
-        return greatest, shift
+        return greatest, shift, depths
 
-    def _squeeze_at(self, wanted: float) -> tuple[float, float]:
-        """Return the squeeze [rad] with the force ``wanted`` [N], and the shift there [m]."""
+    def _squeeze_at(self, wanted: float, *, forget: bool = False) -> tuple[float, float]:
+        """Return the squeeze [rad] with the force ``wanted`` [N], and the shift there [m].
+
+        ``forget``: whether to drop the points that more than this force does not bring near.
+        """
         low, low_force, shift = 0.0, 0.0, self._shift
-        high = FIRST_SQUEEZE
+        high = min(FIRST_SQUEEZE, self._greatest)
         while True:
-            high_force, shift = self._forces(high, shift)
+            high_force, shift, depths = self._forces(high, shift)
             if high_force >= wanted or high >= self._greatest:
                 break
             low, low_force, high = high, high_force, min(GROWTH * high, self._greatest)
+        if forget:
+            # With less force the pads touch less of it.
+            pairs = zip(self._near, depths, strict=True)
+            self._near = [near.only(depth > -MARGIN) for near, depth in pairs]
         if high_force <= wanted:
             return high, shift
         for _ in range(SEARCH_STEPS):
             # A round contact grows as the power 3/2, so this power of the force is nearly a line.
             below, above, between = (each**POWER for each in (low_force, high_force, wanted))
             middle = low + (high - low) * (between - below) / (above - below)
-            force, shift = self._forces(middle, shift)
+            force, shift, _ = self._forces(middle, shift)
             if abs(force - wanted) <= FORCE_TOLERANCE:
                 return middle, shift
             if force > wanted:
