@@ -32,6 +32,7 @@ KINDS = {
     "tests/cli/test_serve.py": BROWSER,
     "tests/docs": BROWSER,
     "tests/examples": BROWSER,
+    "tests/leader/test_leader_on_a_server.py": SERVERS[1],
     "tests/library/test_run.py": BROWSER,
     "tests/real_arm/test_arm_commands.py": SERVERS[0],
     "tests/real_arm/test_driver.py": SERVERS[1],

@@ -64,6 +64,7 @@ BUILT_IN = (
     "kinematics",
     "real_arm",
     "touch",
+    "leader",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 

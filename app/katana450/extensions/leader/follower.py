@@ -1,0 +1,265 @@
+"""The rules by which an arm follows a leader, as a machine without clock, port or connection.
+
+The arm first moves to the leader's posture on a planned path. It follows only once both are near
+each other. Everything unexpected ends this: the samples end, the arm comes to rest by itself, and
+nothing moves again before a person asks for it. The page follows the same rules in
+static/leader/follower.js.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from katana450.extensions.leader.joint_map import LeaderPosture
+from katana450.extensions.leader.posture_history import SILENCE, PostureHistory
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.api import answers
+
+NEAR = 0.09
+"""[rad] Difference of each joint up to which the arm follows the leader without a planned path."""
+
+HELD_BACK = 0.5
+"""[rad] Difference at which an arm that waits before a contact no longer follows."""
+
+SERVER_SILENCE = 0.6
+"""[s] Time without a state of the server after which the arm no longer follows."""
+
+FINGER_NEAR = 0.1
+"""[1] Fraction of the range of the fingers within which the leader's jaw has met them."""
+
+FINGER_STEP = 0.02
+"""[1] Fraction of the range of the fingers from which a motion of the jaw is sent."""
+
+FINGER_INTERVAL = 0.1
+"""[s] Minimum time between two targets of the fingers."""
+
+NOT_RUN = "Not run"
+"""Begins the reason for which a planned program was not run."""
+
+ENDED = ("stopped", "failed", "refused", "cancelled")
+"""Statuses of a program that does not reach its end."""
+
+
+class LeadPhase(Enum):
+    """The activity of a follower."""
+
+    WAITING = "waiting"
+    """Nothing, until a person asks for it."""
+    EASING = "easing"
+    """The arm moves to the leader's posture on a planned path."""
+    SETTLING = "settling"
+    """The arm has arrived, and the leader is elsewhere."""
+    FOLLOWING = "following"
+
+
+@dataclass(frozen=True, eq=False)
+class Ease:
+    """Move the arm to the joint angles ``q`` (n,) [rad] on a planned path, by a program.
+
+    ``revocations``: number of the state in which the motion was decided.
+    """
+
+    q: FloatArray
+    revocations: int
+
+
+@dataclass(frozen=True)
+class EndEase:
+    """End the program."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Send joint angles ``q`` (n,) [rad] with their rates ``qd`` (n,) [rad/s] to the arm.
+
+    ``first``: whether it is the first one, whose refusal is to be reported.
+    """
+
+    q: FloatArray
+    qd: FloatArray
+    revocations: int
+    first: bool
+
+
+@dataclass(frozen=True)
+class FingerTarget:
+    """Move the finger joint to ``angle`` [rad, or m for fingers that slide]."""
+
+    angle: float
+    revocations: int
+
+
+@dataclass(frozen=True)
+class Release:
+    """Release the lease, so that other people may clear a stop and drive."""
+
+
+@dataclass(frozen=True)
+class Say:
+    """Report a sentence to the person."""
+
+    text: str
+
+
+Action = Ease | EndEase | Sample | FingerTarget | Release | Say
+
+
+class Follower:
+    """The rules, advanced by ``step``.
+
+    Attributes:
+        phase: its activity.
+        history: the newest postures of the leader.
+    """
+
+    def __init__(self, finger_range: tuple[float, float] | None) -> None:
+        """Wait. ``finger_range``: finger joint closed and open; None without fingers."""
+        self.phase = LeadPhase.WAITING
+        self.history = PostureHistory()
+        self._range = finger_range
+        self._eased: float | None = None
+        self._revocations = 0
+        self._first = True
+        self._holds = False
+        self._finger: tuple[float, float] | None = None
+
+    def step(
+        self,
+        t: float,
+        posture: LeaderPosture | None,
+        state: answers.State,
+        heard: float,
+        *,
+        asked: bool = False,
+    ) -> list[Action]:
+        """Return what is to be done now.
+
+        Args:
+            t: now [s].
+            posture: posture of the leader; None if it did not answer.
+            state: newest state of the server.
+            heard: time [s] at which it arrived, on the clock of ``t``.
+            asked: whether a person asks to begin, or to end.
+        """
+        if self.phase is not LeadPhase.WAITING and (ended := self._ended(t, state, heard)):
+            return ended
+        accepted = posture is not None and self.history.add(t, posture)
+        match self.phase:
+            case LeadPhase.WAITING:
+                return self._begun(t, state) if asked else self._released(t, state, heard)
+            case _ if asked:
+                return self.rest("You have ended it.")
+            case LeadPhase.EASING:
+                return self._arrived(state)
+            case LeadPhase.SETTLING:
+                return self._settled(t, state)
+            case LeadPhase.FOLLOWING:
+                return self._followed(t, state) if accepted else []
+
+    def eased(self, since: float) -> None:
+        """Take note that the program was accepted.
+
+        ``since``: time of the server [s] from which states report it.
+        """
+        self._eased = since
+
+    def rest(self, why: str) -> list[Action]:
+        """Follow no longer, for the reason ``why``."""
+        ends: list[Action] = [EndEase()] if self.phase is LeadPhase.EASING else []
+        return [*ends, self.refused(why)]
+
+    def refused(self, why: str) -> Say:
+        """Follow no longer, because the server has refused a request for the reason ``why``."""
+        self.phase = LeadPhase.WAITING
+        return Say(f"{why} The arm rests.")
+
+    def _begun(self, t: float, state: answers.State) -> list[Action]:
+        if not self.history.fresh(t):
+            return self.rest("The leader does not answer.")
+        if state.stopped is not None:
+            return self.rest(f"The arm is stopped: {state.stopped} Clear the stop first.")
+        return self._ease(
+            state, "The arm moves to the posture of the leader. Keep the leader still."
+        )
+
+    def _released(self, t: float, state: answers.State, heard: float) -> list[Action]:
+        """Release the lease once the arm is at rest."""
+        if not self._holds or state.moving or t - heard > SERVER_SILENCE:
+            return []
+        self._holds = False
+        return [Release()]
+
+    def _ease(self, state: answers.State, text: str) -> list[Action]:
+        self.phase, self._eased, self._revocations = LeadPhase.EASING, None, state.revocations
+        return [Say(text), Ease(self.history.newest.q, state.revocations)]
+
+    def _ended(self, t: float, state: answers.State, heard: float) -> list[Action]:
+        """Return the actions that end the motion; none if it may continue."""
+        if not self.history.fresh(t):
+            return self.rest(f"The leader has sent no valid posture for {SILENCE:g} s.")
+        if t - heard > SERVER_SILENCE:
+            return self.rest("The server does not answer.")
+        if state.stopped is not None:
+            return self.rest(f"The arm was stopped: {state.stopped}")
+        if self.phase is LeadPhase.EASING:
+            # The program has a lease of its own, which counts as a revocation when it ends.
+            return []
+        if state.revocations != self._revocations:
+            return self.rest("The arm was stopped or changed its driver.")
+        if state.status == "paused":
+            return self.rest("The arm was paused.")
+        if state.status == "blocked" and self._distance(state) > HELD_BACK:
+            return self.rest(f"The arm is held back: {state.why}")
+        return []
+
+    def _arrived(self, state: answers.State) -> list[Action]:
+        program = state.program
+        if self._eased is None or state.sent < self._eased or program is None:
+            return []
+        if program.status in ENDED or program.why.startswith(NOT_RUN):
+            why = f"The arm did not reach the posture of the leader: {program.why}"
+            return [self.refused(why)]
+        if program.status != "done":
+            return []
+        self.phase, self._revocations, self._first = LeadPhase.SETTLING, state.revocations, True
+        self._finger = None
+        if self._distance(state) <= NEAR:
+            return []
+        return [Say("The leader has moved. Keep it still, and the arm moves there.")]
+
+    def _settled(self, t: float, state: answers.State) -> list[Action]:
+        if self._distance(state) <= NEAR:
+            self.phase = LeadPhase.FOLLOWING
+            return [Say("The arm follows the leader.")]
+        if not self.history.at_rest(t):
+            return []
+        return self._ease(state, "The arm moves to the posture of the leader.")
+
+    def _followed(self, t: float, state: answers.State) -> list[Action]:
+        newest = self.history.newest
+        sample = Sample(newest.q, self.history.rates(), self._revocations, self._first)
+        self._first, self._holds = False, True
+        grip = self._gripped(t, newest.finger, state.gripper)
+        return [sample] if grip is None else [sample, grip]
+
+    def _gripped(self, t: float, target: float | None, present: float) -> FingerTarget | None:
+        """Return the next target of the fingers, which wait until the jaw has met them."""
+        if target is None or self._range is None:
+            return None
+        span = abs(self._range[1] - self._range[0])
+        if self._finger is None:
+            if abs(target - present) <= FINGER_NEAR * span:
+                self._finger = t, present
+            return None
+        then, last = self._finger
+        if t - then < FINGER_INTERVAL or abs(target - last) < FINGER_STEP * span:
+            return None
+        self._finger = t, target
+        return FingerTarget(target, self._revocations)
+
+    def _distance(self, state: answers.State) -> float:
+        """Return the largest difference of a joint of the leader from the setpoint [rad]."""
+        return float(np.abs(self.history.newest.q - np.array(state.setpoint)).max())

@@ -1,0 +1,222 @@
+"""``katana450 leader``: a leader arm at a serial port drives the arm of a server."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from argparse import Namespace
+from contextlib import suppress
+
+from katana450.assembly.log_lines import printable
+from katana450.client.asynchronous import AsyncClient, aconnect
+from katana450.client.files import LostError, RefusedError
+from katana450.errors import InputError, KatanaError
+from katana450.extensions.experiments.keyboard import Keyboard
+from katana450.extensions.leader.calibration import Calibration, read_calibration
+from katana450.extensions.leader.follower import (
+    Action,
+    Ease,
+    EndEase,
+    FingerTarget,
+    Follower,
+    LeadPhase,
+    Release,
+    Sample,
+    Say,
+)
+from katana450.extensions.leader.joint_map import JointMap, LeaderPosture
+from katana450.extensions.leader.layout import SO101, read_layout
+from katana450.extensions.leader.motor_bus import MotorBus, SilentLeaderError
+from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, TORQUE_ENABLE
+from katana450.extensions.leader.serial_port import SerialPort, UnpluggedError
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.api import answers, requests
+
+NAME = "Leader"
+"""Name of this client, which others see as the driver."""
+
+PERIOD = 0.01
+"""[s] Time between two readings of the leader."""
+
+STATE_RATE = 25.0
+"""[Hz] Rate of the states that are requested."""
+
+REST_TIMEOUT = 3.0
+"""[s] Timeout for the rest of the arm at the end."""
+
+HELP = "Enter begins and ends following, Ctrl-C ends the program."
+
+
+def lead(options: Namespace) -> int:
+    """Run ``katana450 leader`` and return the exit status. Raises KatanaError."""
+    calibration = read_calibration(options.calibration)
+    layout = SO101 if options.layout is None else read_layout(options.layout)
+    port = SerialPort(options.port)
+    try:
+        bus = MotorBus(port)
+
+        async def drive() -> int:
+            async with aconnect(options.url, NAME, options.token) as client:
+                joints = JointMap(calibration, layout, await client.query(answers.Arm))
+                prepare(bus, calibration, joints.motors)
+                return await LeaderRun(client, bus, joints, Keyboard()).run()
+
+        return asyncio.run(drive())
+    except KeyboardInterrupt:
+        print("\nThe leader no longer drives the arm.")
+        return 130
+    finally:
+        port.close()
+
+
+def prepare(bus: MotorBus, calibration: Calibration, motors: tuple[int, ...]) -> None:
+    """Switch the torque of ``motors`` off, so that a hand can move them.
+
+    Raises SilentLeaderError if one does not answer, and InputError if the calibration is not that
+    of this leader. Nothing that the motors keep without power is written.
+    """
+    names = {motor.id: name for name, motor in calibration.items()}
+    for motor in motors:
+        found, expected = bus.read(motor, HOMING_OFFSET), calibration[names[motor]].homing_offset
+        if found != expected:
+            raise InputError(
+                f"The homing offset of {names[motor]} is {found} in the motor and {expected} in "
+                "the calibration file. The file is that of another leader, or the leader was "
+                "calibrated again. Choose its newest file."
+            )
+        bus.write(motor, TORQUE_ENABLE, 0)
+        if errors := bus.errors(motor):
+            print(printable(f"{names[motor]} reports: {str(errors.name).lower()}."))
+
+
+class LeaderRun:
+    """One run of the program, from its connections to its end."""
+
+    def __init__(
+        self, client: AsyncClient, bus: MotorBus, joints: JointMap, keyboard: Keyboard
+    ) -> None:
+        self._client = client
+        self._bus = bus
+        self._joints = joints
+        self._keyboard = keyboard
+        self._follower = Follower(joints.finger_range)
+        self._state: tuple[answers.State, float] | None = None
+        self._easing: asyncio.Task[None] | None = None
+
+    async def run(self) -> int:
+        """Drive the arm until the program ends; return the exit status. Raises KatanaError."""
+        if self._keyboard.present:
+            print(HELP, flush=True)
+        watching = asyncio.create_task(self._watch())
+        try:
+            return await self._drive(watching)
+        except (LostError, UnpluggedError) as error:
+            raise type(error)(f"{error} The arm comes to rest by itself.") from error
+        finally:
+            await self._come_to_rest()
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+
+    async def _drive(self, watching: asyncio.Task[None]) -> int:
+        """Follow until nobody can ask for it again. Raises KatanaError."""
+        # The person who starts the program asks for the first motion.
+        asked, due = True, time.monotonic()
+        while True:
+            posture = await asyncio.to_thread(self._posture)
+            for task in (watching, self._easing):
+                if task is not None and task.done():
+                    # Raises an error that has ended it.
+                    task.result()
+            if self._state is not None:
+                state, heard = self._state
+                now = time.monotonic()
+                for action in self._follower.step(now, posture, state, heard, asked=asked):
+                    await self._perform(action)
+                asked = False
+                if self._follower.phase is LeadPhase.WAITING and not self._keyboard.present:
+                    return 1
+            asked = asked or self._keyboard.line() is not None
+            due = max(due + PERIOD, time.monotonic())
+            await asyncio.sleep(due - time.monotonic())
+
+    def _posture(self) -> LeaderPosture | None:
+        """Return the posture of the leader; None if it does not answer. Raises UnpluggedError."""
+        try:
+            return self._joints.posture(self._bus.read_all(self._joints.motors, PRESENT_POSITION))
+        except SilentLeaderError:
+            return None
+
+    async def _watch(self) -> None:
+        """Keep the newest state. Raises LostError."""
+        async for state in self._client.states(STATE_RATE):
+            self._state = state, time.monotonic()
+
+    async def _perform(self, action: Action) -> None:
+        match action:
+            case Say(text=text):
+                again = " Press Enter to begin again." if self._waits else ""
+                print(printable(text + again), flush=True)
+            case Ease(q=q, revocations=revocations):
+                self._easing = asyncio.create_task(self._ease(q, revocations))
+            case EndEase():
+                await self._end_ease()
+            case Release():
+                await self._release()
+            case Sample(q=q, qd=qd, revocations=revocations, first=first):
+                sample = requests.Servo(q=q.tolist(), qd=qd.tolist(), revocations=revocations)
+                await (self._ask(sample) if first else self._client.send(sample))
+            case FingerTarget(angle=angle, revocations=revocations):
+                await self._client.send(requests.Gripper(angle=angle, revocations=revocations))
+
+    @property
+    def _waits(self) -> bool:
+        return self._follower.phase is LeadPhase.WAITING and self._keyboard.present
+
+    async def _ask(self, request: requests.Request) -> None:
+        """Send ``request``; rest if it is refused."""
+        try:
+            await self._client.ask(request)
+        except RefusedError as error:
+            await self._perform(self._follower.refused(str(error)))
+
+    async def _ease(self, q: FloatArray, revocations: int) -> None:
+        """Run a program that moves the arm to ``q`` (n,) [rad] on a planned path."""
+        try:
+            text = ease_script(q)
+            await self._client.ask(Program(text=text, revocations=revocations))
+            await self._client.ask(Steer(order=ProgramOrder.RUN, revocations=revocations))
+            self._follower.eased((await self._client.query(answers.State)).sent)
+        except RefusedError as error:
+            await self._perform(self._follower.refused(str(error)))
+
+    async def _end_ease(self) -> None:
+        """End the program, or do not begin it. Raises LostError."""
+        if self._easing is not None:
+            # First, so that it sends no order to run after the order to end.
+            self._easing.cancel()
+            await asyncio.gather(self._easing, return_exceptions=True)
+        with suppress(RefusedError):
+            await self._client.ask(Steer(order=ProgramOrder.END))
+
+    async def _come_to_rest(self) -> None:
+        """Wait until the arm is at rest, and release the lease; the connection may be lost."""
+        with suppress(KatanaError):
+            if self._follower.phase is LeadPhase.EASING:
+                await self._end_ease()
+            due = time.monotonic() + REST_TIMEOUT
+            while (await self._client.query(answers.State)).moving and time.monotonic() < due:
+                await asyncio.sleep(0.05)
+            await self._release()
+
+    async def _release(self) -> None:
+        # Somebody may have taken it.
+        with suppress(RefusedError):
+            await self._client.ask(requests.ReleaseLease())
+
+
+def ease_script(q: FloatArray) -> str:
+    """Return the script that moves the arm to ``q`` (n,) [rad], around obstacles if necessary."""
+    angles = ", ".join(f"{math.degrees(each):.4f}" for each in q)
+    return f"name: Leader\nsteps:\n  - joints: [{angles}]\n"

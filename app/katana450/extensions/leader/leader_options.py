@@ -1,0 +1,32 @@
+"""Options of ``katana450 leader``, separate from its work: reading them must load nothing heavy."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_leader_options(parser: argparse.ArgumentParser) -> None:
+    """Add port, calibration, layout, and the address and token of the server, to ``parser``."""
+    parser.add_argument("port", help="serial port of the leader, such as /dev/ttyUSB0 or COM3")
+    parser.add_argument(
+        "--calibration",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="calibration of the leader, a JSON file of LeRobot",
+    )
+    parser.add_argument(
+        "--layout",
+        type=Path,
+        metavar="FILE",
+        help="YAML file with the joints of another leader than the SO-101",
+    )
+    parser.add_argument(
+        "--url",
+        default="http://127.0.0.1:8080",
+        help="address of the server (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--token", default="", help="token of an access link, if the server needs one"
+    )

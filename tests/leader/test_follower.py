@@ -1,0 +1,252 @@
+"""The rules of following: what ends it, and what begins it again."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from katana450.extensions.leader.follower import (
+    Action,
+    Ease,
+    EndEase,
+    FingerTarget,
+    Follower,
+    LeadPhase,
+    Release,
+    Sample,
+    Say,
+)
+from katana450.extensions.leader.joint_map import LeaderPosture
+from katana450.server.api import answers
+
+N = 5
+PERIOD = 0.01
+FINGERS = (0.0, 1.0)
+
+
+def posture(angle: float, finger: float = 0.5) -> LeaderPosture:
+    q = np.full(N, angle)
+    return LeaderPosture(q, q, finger)
+
+
+class Bench:
+    """A follower with a server and a leader of which the test is in charge."""
+
+    def __init__(self) -> None:
+        self.follower = Follower(FINGERS)
+        self.t = 100.0
+        self.angle, self.finger = 0.3, 0.5
+        self.answers = True
+        self.server_answers = True
+        self.heard = self.t
+        self.values: dict[str, Any] = {
+            "setpoint": [0.0] * N,
+            "stopped": None,
+            "revocations": 4,
+            "program": None,
+            "status": "ok",
+            "gripper": 0.5,
+            "moving": False,
+            "why": "",
+            "sent": 0.0,
+        }
+
+    def step(self, count: int = 1, *, asked: bool = False) -> list[Action]:
+        """Advance by periods; return the actions of all."""
+        found: list[Action] = []
+        for _ in range(count):
+            self.t += PERIOD
+            if self.server_answers:
+                self.heard = self.t
+                self.values["sent"] = self.t
+            given = posture(self.angle, self.finger) if self.answers else None
+            state = msgspec.convert(self.values, _State)
+            found += self.follower.step(self.t, given, state, self.heard, asked=asked)  # type: ignore[arg-type]
+        return found
+
+    def arrive(self, angle: float) -> None:
+        """Let the program move the arm to ``angle``."""
+        self.follower.eased(self.t)
+        self.values |= {"setpoint": [angle] * N, "program": _program("done"), "revocations": 5}
+
+    def follow(self) -> None:
+        """Begin to follow."""
+        self.step(5)
+        self.step(asked=True)
+        self.arrive(self.angle)
+        self.step(3)
+        assert self.follower.phase is LeadPhase.FOLLOWING
+
+
+class _State(msgspec.Struct):
+    """The part of a state that the follower reads."""
+
+    setpoint: list[float]
+    stopped: str | None
+    revocations: int
+    program: answers.Progress | None
+    status: str
+    gripper: float
+    moving: bool
+    why: str
+    sent: float
+
+
+def _program(status: str, why: str = "") -> dict[str, str]:
+    return {"name": "Leader", "by": "Leader", "status": status, "why": why}
+
+
+def texts(actions: list[Action]) -> str:
+    return " ".join(each.text for each in actions if isinstance(each, Say))
+
+
+def samples(actions: list[Action]) -> list[Sample]:
+    return [each for each in actions if isinstance(each, Sample)]
+
+
+def test_arm_eases_to_the_leader_and_then_follows_with_rates() -> None:
+    bench = Bench()
+    assert not bench.step(5)
+    eases = [each for each in bench.step(asked=True) if isinstance(each, Ease)]
+    assert eases[0].q == pytest.approx([0.3] * N)
+    assert eases[0].revocations == 4
+    # A program that ended before does not count as the present one.
+    bench.values["program"] = _program("done")
+    assert not bench.step(10)
+    bench.arrive(0.3)
+    assert "follows" in texts(bench.step(2))
+    found: list[Sample] = []
+    for _ in range(30):
+        bench.angle += 0.5 * PERIOD
+        found += samples(bench.step())
+    assert [each.first for each in found] == [True] + 29 * [False]
+    assert found[-1].q == pytest.approx([0.45] * N)
+    assert found[-1].qd == pytest.approx([0.5] * N, abs=1e-6)
+    assert found[-1].revocations == 5
+
+
+def test_leader_that_moved_meanwhile_is_approached_on_another_plan_once_it_rests() -> None:
+    bench = Bench()
+    bench.step(60)
+    bench.step(asked=True)
+    bench.angle = 0.4
+    bench.step(10)
+    bench.arrive(0.3)
+    assert "Keep it still" in texts(bench.step())
+    for i in range(100):
+        bench.angle = 0.6 + 0.05 * math.sin(0.3 * i)
+        assert not any(isinstance(each, Ease | Sample) for each in bench.step())
+    bench.angle = 0.6
+    again = [each for each in bench.step(60) if isinstance(each, Ease)]
+    assert len(again) == 1
+    assert again[0].q == pytest.approx([0.6] * N)
+    assert bench.follower.phase is LeadPhase.EASING
+
+
+ENDS: dict[str, dict[str, Any]] = {
+    "sent no valid posture": {"answers": False},
+    "server does not answer": {"server_answers": False},
+    "stopped: Ada pressed STOP.": {"values": {"stopped": "Ada pressed STOP.", "revocations": 6}},
+    "changed its driver": {"values": {"revocations": 6}},
+    "was paused": {"values": {"status": "paused"}},
+    "held back: The hand meets": {
+        "values": {"status": "blocked", "why": "The hand meets the cup.", "setpoint": [-0.3] * N}
+    },
+}
+
+
+@pytest.mark.parametrize("why", ENDS)
+def test_unexpected_event_ends_following_until_a_person_asks(why: str) -> None:
+    bench = Bench()
+    bench.follow()
+    bench.step()
+    values = dict(bench.values)
+    change = dict(ENDS[why])
+    bench.values |= change.pop("values", {})
+    for name, value in change.items():
+        setattr(bench, name, value)
+    assert why in texts(bench.step(100))
+    assert bench.follower.phase is LeadPhase.WAITING
+    # The cause ends, and the leader moves: nothing follows.
+    bench.answers = bench.server_answers = True
+    bench.values = values | {"revocations": bench.values["revocations"], "moving": True}
+    for _ in range(200):
+        bench.angle += 0.001
+        assert set(bench.step()) <= {Release()}
+    assert any(isinstance(each, Ease) for each in bench.step(asked=True))
+
+
+@pytest.mark.parametrize("status", ["stopped", "failed", "refused", "cancelled", "ready"])
+def test_program_that_does_not_arrive_ends_it(status: str) -> None:
+    bench = Bench()
+    bench.step(5)
+    bench.step(asked=True)
+    bench.arrive(0.0)
+    bench.values["program"] = _program(status, "Not run: the arm has moved.")
+    assert "did not reach" in texts(bench.step())
+    assert bench.follower.phase is LeadPhase.WAITING
+
+
+def test_silent_leader_ends_the_planned_motion_too() -> None:
+    bench = Bench()
+    bench.step(5)
+    bench.step(asked=True)
+    bench.answers = False
+    found = bench.step(40)
+    assert EndEase() in found
+    assert "no valid posture" in texts(found)
+
+
+def test_stopped_arm_and_silent_leader_refuse_to_begin() -> None:
+    bench = Bench()
+    bench.values["stopped"] = "Ada pressed STOP."
+    bench.step(5)
+    assert "Clear the stop first" in texts(bench.step(asked=True))
+    bench.answers = False
+    bench.step(50)
+    assert "does not answer" in texts(bench.step(asked=True))
+    assert bench.follower.phase is LeadPhase.WAITING
+
+
+def test_jumps_are_refused_and_end_it_if_they_last() -> None:
+    bench = Bench()
+    bench.follow()
+    bench.angle += 2.0 * math.pi
+    assert not samples(bench.step())
+    bench.angle -= 2.0 * math.pi
+    assert samples(bench.step())
+    bench.angle += 2.0 * math.pi
+    found = bench.step(50)
+    assert not samples(found)
+    assert "no valid posture" in texts(found)
+
+
+def test_person_ends_it() -> None:
+    bench = Bench()
+    bench.follow()
+    bench.step(3)
+    bench.values["moving"] = True
+    assert "You have ended it." in texts(bench.step(asked=True))
+    assert not bench.step(20)
+    # Others may drive once the arm is at rest.
+    bench.values["moving"] = False
+    assert bench.step(20) == [Release()]
+
+
+def test_fingers_wait_until_the_jaw_has_met_them() -> None:
+    bench = Bench()
+    bench.finger = 1.0
+    bench.follow()
+    assert not [each for each in bench.step(20) if isinstance(each, FingerTarget)]
+    grips: list[FingerTarget] = []
+    for _ in range(100):
+        bench.finger -= 0.01
+        grips += [each for each in bench.step() if isinstance(each, FingerTarget)]
+    # They move only from where the jaw met them, at most ten times a second.
+    assert 3 <= len(grips) <= 10
+    assert max(each.angle for each in grips) < 0.6
+    assert grips[-1].angle < 0.15

@@ -1,0 +1,189 @@
+"""Calibration files, layouts, and the posture of the arm that a posture of the leader means."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from katana450.client.files import LostError
+from katana450.errors import InputError
+from katana450.extensions.leader.calibration import decoded_calibration, read_calibration
+from katana450.extensions.leader.joint_map import JointMap
+from katana450.extensions.leader.layout import SO101, Layout, read_layout
+from katana450.extensions.leader.motor_bus import MotorBus, SilentLeaderError
+from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, MotorError, Packet
+from katana450.server.api import answers
+from tests.leader.emulated_leader import OFFSETS, RANGE, EmulatedMotors, calibration
+
+LOWER = (-3.0, -2.1, -2.0, -2.0, -2.8)
+UPPER = (2.8, 0.1, 2.2, 1.8, 2.9)
+MIDDLE = sum(RANGE) // 2
+
+
+def arm(*, gripper: bool = True) -> answers.Arm:
+    """The description of an arm with rounded limits."""
+    numbers = [1.0] * 5
+    return answers.Arm(
+        name="Arm",
+        joints=list("abcde"),
+        lower=list(LOWER),
+        upper=list(UPPER),
+        speed=numbers,
+        acceleration=numbers,
+        jerk=numbers,
+        ready=numbers,
+        tools={},
+        default_tool=None,
+        gripper=(-0.4, 0.3, 0.7) if gripper else None,
+        gripper_slides=False,
+        T_base_shoulder=None,
+        slides=[False] * 5,
+        links=[],
+        joints_only="",
+    )
+
+
+def calibrated(**changes: object) -> bytes:
+    found = calibration()
+    found["elbow_flex"] |= changes  # type: ignore[arg-type]
+    return json.dumps(found).encode()
+
+
+def ticks(*degrees: float) -> dict[int, int]:
+    return {i: round((sum(RANGE)) / 2 + each * 4096 / 360) for i, each in enumerate(degrees, 1)}
+
+
+def test_directions_of_the_links_are_those_of_the_leader() -> None:
+    joints = JointMap(decoded_calibration(calibrated()), SO101, arm())
+    found = joints.posture(ticks(0, 0, 0, 0, 0, 0))
+    assert joints.motors == (1, 2, 3, 4, 5, 6)
+    # In the middle of all ranges the upper arm rises steeply, forearm and hand are level.
+    pitch = np.degrees(np.cumsum(found.q[1:4]))
+    assert pitch == pytest.approx([-76.0, -2.2, 0.0], abs=0.2)
+    assert found.q[[0, 4]] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert found.finger == pytest.approx(-0.05, abs=1e-3)
+    # Each joint of the leader turns one of the arm; pan and roll in the other direction.
+    for axis, sign in enumerate((-1, 1, 1, 1, -1)):
+        turned = joints.posture(ticks(*(10.0 * (i == axis) for i in range(6)))).raw - found.raw
+        expected = math.radians(10.0) * sign * np.eye(5)[axis]
+        assert turned == pytest.approx(expected, abs=2e-3)
+
+
+def test_posture_stays_within_the_limits_of_the_arm() -> None:
+    joints = JointMap(decoded_calibration(calibrated()), SO101, arm())
+    for way in (-1, 1):
+        found = joints.posture(ticks(*[way * 200.0] * 6))
+        assert (found.q > LOWER).all()
+        assert (found.q < UPPER).all()
+        assert np.abs(found.raw).max() > 3.0
+        assert found.finger == pytest.approx(0.3 if way > 0 else -0.4)
+
+
+def test_drive_mode_reverses_a_joint() -> None:
+    found = decoded_calibration(calibrated(drive_mode=1))["elbow_flex"]
+    assert found.angle(MIDDLE + 1024) == pytest.approx(-math.pi / 2, abs=1e-3)
+    assert found.fraction(RANGE[0]) == 1.0
+
+
+def test_arm_without_gripper_needs_no_jaw() -> None:
+    joints = JointMap(decoded_calibration(calibrated()), SO101, arm(gripper=False))
+    assert joints.motors == (1, 2, 3, 4, 5)
+    assert joints.posture(ticks(0, 0, 0, 0, 0)).finger is None
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"{", "truncated"),
+        (b"[1]", "Expected `object`"),
+        (calibrated(range_min=4000), "elbow_flex: range_min 4000 is not below range_max 3395"),
+        (calibrated(id=2), "elbow_flex and shoulder_lift have the same id 2"),
+        (calibrated(homing_offset="3"), r"Expected `int`, got `str` - at `\$"),
+        (calibrated(speed=1), "unknown field `speed`"),
+        (calibrated(id=300), "<= 253"),
+        (b" " * 65_000, "64000 bytes"),
+    ],
+)
+def test_wrong_calibration_is_refused_with_its_place(data: bytes, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        decoded_calibration(data)
+
+
+def test_missing_file_and_missing_motor_are_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        read_calibration(tmp_path / "none.json")
+    file = tmp_path / "some.json"
+    file.write_bytes(b'{"elbow_flex": 3}')
+    with pytest.raises(InputError, match=r"some.json is not a calibration file of LeRobot"):
+        read_calibration(file)
+    known = decoded_calibration(calibrated())
+    del known["wrist_flex"]
+    with pytest.raises(InputError, match="no motor wrist_flex, but shoulder_pan"):
+        JointMap(known, SO101, arm())
+
+
+def test_layout_of_another_leader(tmp_path: Path) -> None:
+    file = tmp_path / "layout.yaml"
+    sources = [f"  - {{motor: m{i}, sign: -1, offset: {i}}}" for i in range(5)]
+    file.write_text("\n".join(["axes:", *sources, "gripper: {motor: m5, reversed: true}"]))
+    layout = read_layout(file)
+    known = {f"m{i}": each for i, each in enumerate(decoded_calibration(calibrated()).values())}
+    found = JointMap(known, layout, arm()).posture(ticks(10, 0, 0, 0, 0, 118))
+    assert np.degrees(found.raw) == pytest.approx([-10, 1, 2, 3, 4], abs=0.1)
+    assert found.finger == pytest.approx(-0.4, abs=0.01)
+    for text, message in (("axes: [{motor: a, sign: 2}]", "sign"), ("axes: {", "not the layout")):
+        file.write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_layout(file)
+    with pytest.raises(InputError, match="names 1 that turn"):
+        JointMap(known, msgspec.structs.replace(layout, axes=layout.axes[:1]), arm())
+    assert isinstance(layout, Layout)
+
+
+class WiredPort:
+    """A port with the emulated motors behind it, which gives the bytes in small parts."""
+
+    def __init__(self) -> None:
+        self.motors = EmulatedMotors()
+        self._waiting = b""
+        self.noise = b""
+
+    def write(self, data: bytes) -> None:
+        self._waiting = self.noise + self.motors.answer(data)
+
+    def read(self) -> bytes:
+        data, self._waiting = self._waiting[:3], self._waiting[3:]
+        return data
+
+    def discard(self) -> None:
+        self._waiting = b""
+
+    def close(self) -> None:
+        raise LostError("It is never closed.")
+
+
+def test_bus_reads_the_motors_through_noise() -> None:
+    port = WiredPort()
+    bus = MotorBus(port)
+    # An adapter may return what was sent, and answers of other motors.
+    port.noise = b"\x00\xff\xff" + Packet(9, 0, b"ab").encoded
+    assert [bus.read(motor, HOMING_OFFSET) for motor in range(1, 7)] == list(OFFSETS)
+    port.motors.angles = (0.1, -0.1, 0.2, -0.2, 1.0, -1.0)
+    positions = bus.read_all((1, 2, 3, 4, 5, 6), PRESENT_POSITION)
+    assert positions[5] - positions[6] == pytest.approx(2.0 * 4096 / (2.0 * math.pi), abs=1.0)
+    assert bus.errors(2) == MotorError(0)
+
+
+def test_silent_motors_are_named() -> None:
+    port = WiredPort()
+    port.motors.silent = {2, 4}
+    bus = MotorBus(port)
+    with pytest.raises(SilentLeaderError, match="do not answer: 2, 4"):
+        bus.read_all((1, 2, 3, 4), PRESENT_POSITION)
+    with pytest.raises(SilentLeaderError, match="do not answer: 4"):
+        bus.read(4, HOMING_OFFSET)

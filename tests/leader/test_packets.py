@@ -1,0 +1,82 @@
+"""Packets of the servo bus: worked bytes, every split, garbage."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from katana450.extensions.leader import packets
+from katana450.extensions.leader.packets import (
+    HOMING_OFFSET,
+    PRESENT_POSITION,
+    TORQUE_ENABLE,
+    Packet,
+    PacketReader,
+    Register,
+)
+
+WORKED = (
+    # The first two are examples of Feetech's protocol manual.
+    (packets.ping(1), "ff ff 01 02 01 fb"),
+    (packets.read(1, PRESENT_POSITION), "ff ff 01 04 02 38 02 be"),
+    (packets.write(1, TORQUE_ENABLE, 0), "ff ff 01 04 03 28 00 cf"),
+    (packets.sync_read((1, 2), Register(56, 8)), "ff ff fe 06 82 38 08 01 02 36"),
+    (Packet(1, 0, bytes((0x18, 0x05))), "ff ff 01 04 00 18 05 dd"),
+)
+
+
+@pytest.mark.parametrize(("packet", "text"), WORKED)
+def test_worked_bytes(packet: Packet, text: str) -> None:
+    data = bytes.fromhex(text)
+    assert packet.encoded == data
+    for at in range(len(data) + 1):
+        reader = PacketReader()
+        assert reader.feed(data[:at]) + reader.feed(data[at:]) == [packet]
+
+
+def test_packets_are_found_in_any_split_of_a_stream_with_garbage() -> None:
+    random.seed(7)
+    expected = [each for each, _ in WORKED] * 20
+    # Garbage without the first byte of a header, and headers that begin nothing.
+    noise = [bytes(random.randrange(0xFF) for _ in range(5)), b"\xff\xff\xff", b"\xff\xff\x01\x00"]
+    stream = b"".join(random.choice(noise) + each.encoded for each in expected)
+    for _ in range(50):
+        reader, found, at = PacketReader(), [], 0
+        while at < len(stream):
+            end = at + random.randint(1, 9)
+            found += reader.feed(stream[at:end])
+            at = end
+        assert found == expected
+
+
+def test_wrong_checksum_is_no_packet_and_hides_none() -> None:
+    good = packets.ping(3).encoded
+    wrong = bytearray(packets.read(2, PRESENT_POSITION).encoded)
+    wrong[-1] ^= 0x10
+    assert PacketReader().feed(bytes(wrong) + good) == [packets.ping(3)]
+
+
+@settings(max_examples=50)
+@given(st.binary(max_size=400))
+def test_any_bytes_raise_nothing_and_keep_little(data: bytes) -> None:
+    reader = PacketReader()
+    for packet in reader.feed(data):
+        assert packet.encoded in data
+    assert len(reader._rest) <= packets.MAX_LENGTH + 4
+
+
+@given(st.integers(-2047, 2047), st.integers(-32767, 32767))
+@settings(max_examples=30)
+def test_signs_are_bits(offset: int, position: int) -> None:
+    assert HOMING_OFFSET.decoded(HOMING_OFFSET.encoded(offset)) == offset
+    assert PRESENT_POSITION.decoded(PRESENT_POSITION.encoded(position)) == position
+
+
+def test_worked_signs() -> None:
+    assert HOMING_OFFSET.encoded(-1) == b"\x01\x08"
+    assert PRESENT_POSITION.decoded(b"\x05\x80") == -5
+    with pytest.raises(OverflowError, match="11 bits"):
+        HOMING_OFFSET.encoded(2048)
