@@ -236,6 +236,7 @@ const Jog = (() => {
     key,
     release,
     quiet,
+    hear: (answer) => steps?.hear(answer),
     show(shown) {
       open = shown;
       if (shown) load();

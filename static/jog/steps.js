@@ -17,6 +17,7 @@ export class Steps {
   #held = [0, 0, 0, 0, 0]; // signs of the gamepad's sticks
   #gripped = [false, false];
   #grid = html("div", { id: "steps", hidden: "" });
+  #leader = null; // a leader arm, loaded with the first press of its button
   #gripper = html("fieldset", { id: "gripper" }, html("legend", {}, "Gripper"));
 
   // Return the steps in the sheet `root`, once the description of the arm is there.
@@ -49,6 +50,24 @@ export class Steps {
     }
     root.addEventListener("change", ({ target }) => this.#choose(target));
     if (arm.joints_only) root.querySelector("[value=joints]").click();
+    else if ("serial" in navigator) this.#offer(root);
+  }
+
+  // Offer to connect a leader arm, where the browser has Web Serial.
+  #offer(root) {
+    const button = html("button", { type: "button" }, "Connect a leader arm");
+    const place = html("p", { id: "leader" }, button);
+    root.append(place);
+    button.addEventListener("click", async () => {
+      const { Leader } = await import("../leader/leader.js");
+      this.#leader ??= new Leader(place, this.#say, this.#arm);
+      this.#leader.press();
+    });
+  }
+
+  // Take an answer of the server; return whether it was for the leader arm.
+  hear(answer) {
+    return this.#leader?.hear(answer) ?? false;
   }
 
   // Whether a press moves by one step, so that holding moves nothing.

@@ -1,7 +1,8 @@
-"""Jogging at the page: held keys, pads, buttons, a gamepad and a SpaceMouse."""
+"""Jogging at the page: held keys, pads, buttons, a gamepad, a SpaceMouse and a leader arm."""
 
 from __future__ import annotations
 
+import urllib.request
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ import pytest
 
 from katana450.client import connect
 from tests.browser.page import ViserPage
+from tests.browser.page_leader import TURNED, connect_leader, setpoint, turn_pan, words
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop
+from tests.gateway.client import enter
 
 
 def tool_point(page: ViserPage) -> Any:
@@ -242,3 +245,73 @@ def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage
     truth.wait(moving=True)
     page.page.evaluate("() => clearInterval(held)")
     truth.wait(moving=False)
+
+
+def test_page_follows_a_leader_until_stop_and_unplugging(
+    page: ViserPage, truth: Truth, artefacts: Path, tmp_path: Path
+) -> None:
+    connect_leader(page, tmp_path)
+    assert page.page.evaluate("() => leader.baud") == 1_000_000
+    assert page.page.evaluate("() => leader.torque.some(Boolean)") is False
+    before = setpoint(truth)
+    page.press_in_bar("Follow the leader")
+    words(page, "The arm follows the leader.")
+    page.keep(artefacts / "gateway-leader.png")
+    reached = setpoint(truth)
+    assert np.abs(reached - before).max() > 0.05
+    turn_pan(page, TURNED)
+    page.wait_until(
+        lambda: bool(np.allclose(setpoint(truth) - reached, [-TURNED, 0, 0, 0, 0], atol=5e-3)),
+        "the arm to follow",
+    )
+    page.page.keyboard.press("Escape")
+    words(page, "The arm was stopped")
+    clear_stop(page, truth)
+    rests = setpoint(truth)
+    turn_pan(page, -TURNED)
+    assert np.array_equal(setpoint(truth), rests)
+    page.press_in_bar("Follow the leader")
+    words(page, "The arm follows the leader.")
+    assert setpoint(truth)[0] == pytest.approx(reached[0], abs=0.1)
+    page.page.evaluate("() => leader.unplug()")
+    words(page, "unplugged")
+    truth.wait(moving=False)
+    assert page.page.get_by_role("button", name="Connect a leader arm").is_visible()
+
+
+@pytest.mark.long
+def test_silent_leader_and_hidden_page_end_it(
+    new_page: ViserPage, truth: Truth, tmp_path: Path
+) -> None:
+    page = new_page
+    connect_leader(page, tmp_path)
+    page.press_in_bar("Follow the leader")
+    words(page, "The arm follows the leader.")
+    page.page.evaluate("() => { leader.answers = false }")
+    words(page, "no valid posture")
+    page.page.evaluate("() => { leader.answers = true }")
+    truth.wait(moving=False)
+    rests = setpoint(truth)
+    turn_pan(page, TURNED)
+    assert np.array_equal(setpoint(truth), rests)
+    page.press_in_bar("Follow the leader")
+    words(page, "The arm follows the leader.")
+    page.page.evaluate(
+        """() => {
+          Object.defineProperty(document, "hidden", {value: true, configurable: true});
+          document.dispatchEvent(new Event("visibilitychange"));
+          delete document.hidden;
+        }"""
+    )
+    words(page, "hidden")
+    page.page.evaluate("() => leader.unplug()")
+
+
+def test_only_our_page_may_ask_for_a_serial_port(server: AppServer) -> None:
+    cookie = enter(server.url)
+    found = {}
+    for path in ("/", "/static/page.js", "/viser/", "/api/v1/state"):
+        request = urllib.request.Request(server.url + path, headers={"Cookie": cookie})
+        with urllib.request.urlopen(request, timeout=10.0) as answer:
+            found[path] = "serial=(self)" in answer.headers["Permissions-Policy"]
+    assert found == {"/": True, "/static/page.js": False, "/viser/": False, "/api/v1/state": False}

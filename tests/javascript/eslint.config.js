@@ -23,5 +23,5 @@ export default [
       "prefer-const": "error",
     },
   },
-  { files: ["static/{episodes,instruments,jog,more,people,scene,selection,sheet,teach,timeline,welcome}/*.js"], languageOptions: { sourceType: "module" } },
+  { files: ["static/{episodes,instruments,jog,leader,more,people,scene,selection,sheet,teach,timeline,welcome}/*.js"], languageOptions: { sourceType: "module" } },
 ];

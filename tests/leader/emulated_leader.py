@@ -36,6 +36,9 @@ Motion = Callable[[float], Sequence[float]]
 
 STILL = (0.0,) * 6
 
+START = (0.1, 0.0, 0.2, 0.1, 0.0, 0.0)
+"""A posture [rad] that the arm can take."""
+
 
 def calibration() -> dict[str, dict[str, int]]:
     """Return the calibration of the emulated leader, as LeRobot writes it."""

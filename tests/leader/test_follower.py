@@ -16,7 +16,7 @@ from katana450.extensions.leader.follower import (
     FingerTarget,
     Follower,
     LeadPhase,
-    Release,
+    ReleaseControl,
     Sample,
     Say,
 )
@@ -169,14 +169,14 @@ def test_unexpected_event_ends_following_until_a_person_asks(why: str) -> None:
     bench.values |= change.pop("values", {})
     for name, value in change.items():
         setattr(bench, name, value)
-    assert why in texts(bench.step(100))
+    assert why in texts(bench.step(150))
     assert bench.follower.phase is LeadPhase.WAITING
     # The cause ends, and the leader moves: nothing follows.
     bench.answers = bench.server_answers = True
     bench.values = values | {"revocations": bench.values["revocations"], "moving": True}
     for _ in range(200):
         bench.angle += 0.001
-        assert set(bench.step()) <= {Release()}
+        assert set(bench.step()) <= {ReleaseControl()}
     assert any(isinstance(each, Ease) for each in bench.step(asked=True))
 
 
@@ -196,7 +196,7 @@ def test_silent_leader_ends_the_planned_motion_too() -> None:
     bench.step(5)
     bench.step(asked=True)
     bench.answers = False
-    found = bench.step(40)
+    found = bench.step(150)
     assert EndEase() in found
     assert "no valid posture" in texts(found)
 
@@ -207,7 +207,7 @@ def test_stopped_arm_and_silent_leader_refuse_to_begin() -> None:
     bench.step(5)
     assert "Clear the stop first" in texts(bench.step(asked=True))
     bench.answers = False
-    bench.step(50)
+    bench.step(150)
     assert "does not answer" in texts(bench.step(asked=True))
     assert bench.follower.phase is LeadPhase.WAITING
 
@@ -220,9 +220,21 @@ def test_jumps_are_refused_and_end_it_if_they_last() -> None:
     bench.angle -= 2.0 * math.pi
     assert samples(bench.step())
     bench.angle += 2.0 * math.pi
-    found = bench.step(50)
+    found = bench.step(150)
     assert not samples(found)
     assert "no valid posture" in texts(found)
+
+
+@pytest.mark.parametrize("moved", [0.05, 0.2])
+def test_after_a_gap_the_arm_follows_a_leader_that_has_stayed(moved: float) -> None:
+    bench = Bench()
+    bench.follow()
+    bench.answers = False
+    # The samples end, so that the arm rests.
+    assert not bench.step(50)
+    bench.answers = True
+    bench.angle += moved
+    assert bool(samples(bench.step(10))) == (moved < 0.09)
 
 
 def test_person_ends_it() -> None:
@@ -234,7 +246,7 @@ def test_person_ends_it() -> None:
     assert not bench.step(20)
     # Others may drive once the arm is at rest.
     bench.values["moving"] = False
-    assert bench.step(20) == [Release()]
+    assert bench.step(20) == [ReleaseControl()]
 
 
 def test_fingers_wait_until_the_jaw_has_met_them() -> None:

@@ -15,6 +15,7 @@ from katana450.errors import InputError
 from katana450.extensions.leader.calibration import decoded_calibration, read_calibration
 from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.layout import SO101, Layout, read_layout
+from katana450.extensions.leader.leader_command import prepare
 from katana450.extensions.leader.motor_bus import MotorBus, SilentLeaderError
 from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, MotorError, Packet
 from katana450.server.api import answers
@@ -187,3 +188,15 @@ def test_silent_motors_are_named() -> None:
         bus.read_all((1, 2, 3, 4), PRESENT_POSITION)
     with pytest.raises(SilentLeaderError, match="do not answer: 4"):
         bus.read(4, HOMING_OFFSET)
+
+
+def test_torque_is_switched_off_only_with_the_calibration_of_this_leader() -> None:
+    port = WiredPort()
+    known = decoded_calibration(calibrated())
+    prepare(MotorBus(port), known, (1, 2, 3, 4, 5, 6))
+    assert not any(port.motors.torque)
+    port.motors.torque[2] = True
+    other = decoded_calibration(calibrated(homing_offset=5))
+    with pytest.raises(InputError, match="elbow_flex is 0 in the motor and 5 in the calibration"):
+        prepare(MotorBus(port), other, (3,))
+    assert port.motors.torque[2]

@@ -70,7 +70,7 @@ def application(
 
     async def page(request: Request) -> Response:
         origin = hub.stop_path.origin_beside(request.headers["host"])
-        return index.answer(request, security.page_policy(origin))
+        return security.with_serial(index.answer(request, security.page_policy(origin)))
 
     async def file(request: Request) -> Response:
         found = static.get(request.path_params["name"])

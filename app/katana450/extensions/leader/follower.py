@@ -93,8 +93,8 @@ class FingerTarget:
 
 
 @dataclass(frozen=True)
-class Release:
-    """Release the lease, so that other people may clear a stop and drive."""
+class ReleaseControl:
+    """ReleaseControl the lease, so that other people may clear a stop and drive."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Say:
     text: str
 
 
-Action = Ease | EndEase | Sample | FingerTarget | Release | Say
+Action = Ease | EndEase | Sample | FingerTarget | ReleaseControl | Say
 
 
 class Follower:
@@ -186,11 +186,11 @@ class Follower:
         )
 
     def _released(self, t: float, state: answers.State, heard: float) -> list[Action]:
-        """Release the lease once the arm is at rest."""
+        """ReleaseControl the lease once the arm is at rest."""
         if not self._holds or state.moving or t - heard > SERVER_SILENCE:
             return []
         self._holds = False
-        return [Release()]
+        return [ReleaseControl()]
 
     def _ease(self, state: answers.State, text: str) -> list[Action]:
         self.phase, self._eased, self._revocations = LeadPhase.EASING, None, state.revocations

@@ -21,7 +21,7 @@ from katana450.extensions.leader.follower import (
     FingerTarget,
     Follower,
     LeadPhase,
-    Release,
+    ReleaseControl,
     Sample,
     Say,
 )
@@ -162,7 +162,7 @@ class LeaderRun:
                 self._easing = asyncio.create_task(self._ease(q, revocations))
             case EndEase():
                 await self._end_ease()
-            case Release():
+            case ReleaseControl():
                 await self._release()
             case Sample(q=q, qd=qd, revocations=revocations, first=first):
                 sample = requests.Servo(q=q.tolist(), qd=qd.tolist(), revocations=revocations)

@@ -12,8 +12,11 @@ import numpy as np
 from katana450.extensions.leader.joint_map import LeaderPosture
 from katana450.maths.geometry.arrays import FloatArray
 
-SILENCE = 0.3
-"""[s] Time without a valid posture after which the leader is silent. The arm rests after 0.2 s."""
+GAP, GAP_JUMP = 0.2, 0.09
+"""[s], [rad] The arm rests after this time without a posture. The next one must be this near."""
+
+SILENCE = 1.0
+"""[s] Time without a valid posture after which the leader is silent."""
 
 MAX_SPEED = 12.0
 """[rad/s] Speed of a joint beyond which a posture is an error of the encoder and refused."""
@@ -50,6 +53,8 @@ class PostureHistory:
         elif self._postures:
             then, last = self._postures[-1]
             allowed = NOISE + MAX_SPEED * min(t - then, MAX_INTERVAL)
+            if t - then > GAP:
+                allowed = GAP_JUMP
             if np.abs(posture.raw - last.raw).max() > allowed:
                 return False
         self._postures.append((t, posture))

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from katana450.server.web.authenticator import Address
 
 SAFE_METHODS = ("GET", "HEAD")
+
+FEATURES = "Permissions-Policy"
+
+USED = "gamepad=(self), hid=(self), camera=(), geolocation=(), microphone=(), payment=(), usb=(), "
+"""Features that documents may use, except serial ports, which only our own page may ask for."""
 
 EVERYWHERE = {
     # Static files say otherwise.
@@ -19,8 +24,7 @@ EVERYWHERE = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
-    "Permissions-Policy": "gamepad=(self), hid=(self), camera=(), geolocation=(), microphone=(), "
-    "payment=(), usb=(), serial=()",
+    FEATURES: USED + "serial=()",
 }
 
 FOR_PROGRAMS = "/api/"
@@ -50,6 +54,12 @@ def content_policy(*, ends: Iterable[str], **sources: Iterable[str]) -> str:
     """Return a content security policy: ``sources`` by their kind, then ``ends`` as they are."""
     parts = [f"{kind}-src {' '.join(each)}" for kind, each in sources.items()]
     return "; ".join((*parts, *ends))
+
+
+def with_serial(response: Response) -> Response:
+    """Return ``response``, our own page, with the permission to ask for a serial port."""
+    response.headers[FEATURES] = USED + "serial=(self)"
+    return response
 
 
 class SecurityMiddleware:
