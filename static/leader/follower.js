@@ -19,12 +19,7 @@ const BOUNDS = { id: [0, 253], drive_mode: [0, 1], homing_offset: [-2047, 2047],
 
 // Return the calibration in LeRobot's JSON `text`. Throws an error with what is wrong in it.
 export function calibrationIn(text) {
-  let found = null;
-  try {
-    found = JSON.parse(text);
-  } catch (error) {
-    throw new Error(`This is not a calibration file of LeRobot: ${error.message}`);
-  }
+  const found = parsed(text);
   for (const name of [...AXES.map(([motor]) => motor), "gripper"]) {
     const motor = found?.[name];
     if (!motor) throw new Error(`This is not a calibration file of an SO-101 leader: it has no motor ${name}.`);
@@ -34,6 +29,14 @@ export function calibrationIn(text) {
     if (motor.range_min >= motor.range_max) throw new Error(`In the calibration, range_min of ${name} is not below range_max.`);
   }
   return found;
+}
+
+function parsed(text) {
+  try {
+    return JSON.parse(text);
+  } catch (cause) {
+    throw new Error(`This is not a calibration file of LeRobot: ${cause.message}`, { cause });
+  }
 }
 
 // Return the posture {raw, q, finger} of the arm `arm` at the positions `ticks` by the ids of the motors.
