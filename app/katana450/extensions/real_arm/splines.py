@@ -101,7 +101,11 @@ def joined(start: SplineKnot, position: FloatArray, speed: FloatArray) -> Spline
 
 
 class SplineStream:
-    """One motion from rest: setpoints in, segments out, at most one per 80 ms of setpoints."""
+    """One motion from rest: setpoints in, segments out, at most one per 80 ms of setpoints.
+
+    Attributes:
+        is_still: Whether the newest setpoint is that before it.
+    """
 
     def __init__(self, start: IntArray, speed: FloatArray) -> None:
         """Create a stream from rest at ``start`` (6,) [encoders].
@@ -113,7 +117,7 @@ class SplineStream:
         self._times: deque[float] = deque()
         self._points: deque[FloatArray] = deque()
         self._end = self._moved_at = 0.0
-        self._is_still = True
+        self.is_still = True
 
     @property
     def knot(self) -> SplineKnot:
@@ -131,13 +135,13 @@ class SplineStream:
             self._end = t - TICK + SEGMENT_TIME
         if t <= self._times[-1]:
             return
-        if t - self._times[-1] > LONGEST_GAP and self._is_still:
+        if t - self._times[-1] > LONGEST_GAP and self.is_still:
             # Setpoints at rest are rare, and a motion begins one tick before its first setpoint.
             self._append(t - TICK, self._points[-1])
         bound = self._max_speed * (t - self._times[-1]) / TICK
         step = np.clip(encoders - self._points[-1], -bound, bound)
-        self._is_still = not step.any()
-        if not self._is_still:
+        self.is_still = not step.any()
+        if not self.is_still:
             self._moved_at = t
         self._append(t, self._points[-1] + step)
 

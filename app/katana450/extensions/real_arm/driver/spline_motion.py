@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
 
+from katana450.arm.control.session import MAX_STEP_TIME
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
 from katana450.extensions.real_arm.splines import (
     SEGMENT_TICKS,
@@ -34,6 +36,12 @@ the two accelerations of the firmware. A faster one would look like a collision.
 RESERVE = 1.5 * SEGMENT_TIME
 """[s] Motion left in the arm above which another request may come before its next segment."""
 
+CATCH_UP_TIME = 1.0
+"""[s] Time constant with which motion that late setpoints took from the arm is made up."""
+
+MAX_SLOWING, SLOWING_STEP = 0.3, 0.005
+"""Largest part by which a motion is slowed down meanwhile, and its largest change per setpoint."""
+
 KEPT_TIME = 2.0
 """[s] Past of the motion that is kept for late measurements."""
 
@@ -59,6 +67,7 @@ class SplineMotion:
         self._is_closed = False
         self._has_sent_last = False
         self._start = start.astype(float)
+        self._t, self._time, self._lead, self._slowing = -math.inf, 0.0, 0.0, 1.0
         self.is_late = False
 
     @property
@@ -75,11 +84,30 @@ class SplineMotion:
         """Add the setpoint (6,) [encoders] at ``t`` [s]."""
         if self._is_closed:
             return
-        self._stream.add(t, encoders)
+        self._stream.add(self._stream_time(t), encoders)
         while not self._is_closed and (segment := self._stream.cut()) is not None:
             is_still = segment.start.is_at_rest and not segment.travel.any()
             self._is_closed = is_still and self._stream.still_for() >= LINGER
             self._ready.append((segment, self._is_closed))
+
+    def _stream_time(self, t: float) -> float:
+        """Return the time of a setpoint of time ``t`` [s] in the motion.
+
+        The session moves the setpoint for MAX_STEP_TIME at most, however late a tick is. What the
+        arm then lacks is made up by a motion that is slightly slower, until as much waits in the
+        arm as at its start.
+        """
+        dt = t - self._t
+        self._t = t
+        if math.isinf(dt):
+            return self._time
+        if not self._stream.is_still:
+            dt = min(dt, MAX_STEP_TIME)
+        lack = 0.0 if self._started is None else self._lead - self._time + t - self._started
+        wanted = 1.0 + min(max(lack, 0.0) / CATCH_UP_TIME, MAX_SLOWING)
+        self._slowing += min(max(wanted - self._slowing, -SLOWING_STEP), SLOWING_STEP)
+        self._time += dt * self._slowing
+        return self._time
 
     def next_packet(self, now: float) -> SendSplines | None:
         """Return the packet to send at ``now`` [s], or None. ``sent`` must follow."""
@@ -101,7 +129,7 @@ class SplineMotion:
         segment, self._has_sent_last = self._ready.popleft()
         self._sent.append(segment)
         if self._started is None and packet.more != More.STORE:
-            self._started = t
+            self._started, self._lead = t, self._time
         while self._started is not None and len(self._sent) > KEPT_TIME / SEGMENT_TIME:
             self._sent.popleft()
             self._dropped += 1
