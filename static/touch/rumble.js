@@ -55,7 +55,9 @@ function nearness({ moving, findings, margins }) {
 }
 
 function play({ duration, weak, strong }) {
-  for (const pad of navigator.getGamepads?.() ?? []) {
+  /** @type {any[]} */
+  const pads = navigator.getGamepads?.() ?? [];
+  for (const pad of pads) {
     if (!pad?.connected) continue;
     const effect = { duration, weakMagnitude: weak, strongMagnitude: strong };
     // An unplugged gamepad rejects the effect.

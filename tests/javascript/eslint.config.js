@@ -23,5 +23,5 @@ export default [
       "prefer-const": "error",
     },
   },
-  { files: ["static/{episodes,instruments,jog,leader,more,people,scene,selection,sheet,teach,timeline,welcome}/*.js"], languageOptions: { sourceType: "module" } },
+  { files: ["static/{arm,episodes,instruments,jog,leader,more,people,scene,selection,sheet,teach,timeline,touch,welcome}/*.js"], languageOptions: { sourceType: "module" } },
 ];
