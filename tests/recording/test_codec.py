@@ -6,6 +6,7 @@ import math
 import struct
 from collections.abc import Iterable
 from contextlib import suppress
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any, cast, get_args
 
@@ -222,7 +223,7 @@ def test_random_sessions_continue_from_the_text_of_their_states() -> None:
 
 WRONG: st.SearchStrategy[Any] = st.sampled_from(
     [None, True, -1, 10**30, 1e300, "", "x", "nan", [], [[]], [1, "x"], {}, {"is": "Plan"}]
-)
+).map(deepcopy)  # A form is changed several times, and must not become a part of itself.
 
 
 def places(form: Any, path: tuple[Any, ...] = ()) -> Iterable[tuple[Any, ...]]:
