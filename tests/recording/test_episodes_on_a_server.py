@@ -20,8 +20,6 @@ from katana450.client.episodes import EpisodeClient
 from katana450.client.files import Site
 from katana450.extensions.recording.episodes.episode import EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
-from katana450.extensions.recording.files.checking import session_for, verify_recording
-from katana450.extensions.recording.files.recording_file import RecordingFile
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.conftest import LONG
 from tests.gateway.client import ask, enter
@@ -37,7 +35,16 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def command(tmp_path: Path, folder: Path) -> tuple[str, ...]:
-    return (*RECORDING_APP, "--record", str(tmp_path / "ring"), "--episodes", str(folder))
+    # A busy machine delays the heartbeats of its processes, for which the arm would pause.
+    return (
+        *RECORDING_APP,
+        "--silence",
+        "2.0",
+        "--record",
+        str(tmp_path / "ring"),
+        "--episodes",
+        str(folder),
+    )
 
 
 @pytest.fixture
@@ -135,8 +142,9 @@ def test_killed_recorder_keeps_the_running_episode_as_unfinished(
         found = EpisodeFolder(folder).find(number)
         assert found.episode.outcome is EpisodeOutcome.UNFINISHED
         assert moved - (found.episode.end or 0.0) <= MAX_LOSS
-        with RecordingFile.open(found.path) as file:
-            assert verify_recording(file, session_for(file).session).identical
+        # In a process that rounds as those of the server.
+        verified = katana450.open(found.path).verify()
+        assert verified.identical, str(verified)
         waited_for(partial(_answers, client, number), "the next process")
     kept = EpisodeFolder(folder).kept()
     assert [each.episode.number for each in kept] == list(range(1, KILLS + 2))
