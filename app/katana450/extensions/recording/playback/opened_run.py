@@ -10,6 +10,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import time
 import weakref
 from collections.abc import Sequence
 from contextlib import suppress
@@ -25,6 +26,9 @@ from katana450.platform_support import without_interrupts
 
 TIMEOUT = 30.0
 """[s] Timeout of a request to the process."""
+
+WATCH_PERIOD = 0.5
+"""[s] Time between two looks at how long a request takes."""
 
 MAX_ANSWER_BYTES = 64_000_000
 """Maximum size of an answer; a moment has some kilobytes, and 2 MB with many solids."""
@@ -43,6 +47,7 @@ class OpenedRun:
         self._path = path
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
+        self._asked: float | None = None
         self.spans: tuple[Span, ...] = ()
         """The times with records; empty before ``update``."""
         self.metadata: dict[str, str] = {}
@@ -79,9 +84,7 @@ class OpenedRun:
         with self._lock:
             again = self._process is None and method != "update"
             process = self._started()
-            # A process that hangs ends, and its pipe with it.
-            watch = threading.Timer(TIMEOUT, process.kill)
-            watch.start()
+            self._asked = time.monotonic()
             try:
                 if again:
                     _request(process, "update", ())
@@ -93,7 +96,7 @@ class OpenedRun:
                     "file may take."
                 ) from error
             finally:
-                watch.cancel()
+                self._asked = None
         if not successful:
             raise InputError(found)
         return found
@@ -108,12 +111,26 @@ class OpenedRun:
                 **without_interrupts(),
             )
             weakref.finalize(self, _end, self._process)
+            # One thread for all requests: to start one for each would take most of their time.
+            watch = (weakref.ref(self), self._process)
+            threading.Thread(target=_watch, args=watch, name="decoder", daemon=True).start()
         return self._process
 
     def _end(self) -> None:
         if self._process is not None:
             _end(self._process)
             self._process = None
+
+
+def _watch(of: weakref.ref[OpenedRun], process: subprocess.Popen[bytes]) -> None:
+    """Kill ``process`` when it hangs, so that the pipe with its answer ends."""
+    while process.poll() is None:
+        time.sleep(WATCH_PERIOD)
+        run = of()
+        asked = None if run is None else run._asked
+        del run
+        if asked is not None and time.monotonic() - asked > TIMEOUT:
+            process.kill()
 
 
 def _request(process: subprocess.Popen[bytes], method: str, arguments: Sequence[Any]) -> Any:
