@@ -110,7 +110,7 @@ export class Bus {
       };
     });
     const late = new Promise((resolve) => setTimeout(resolve, DEADLINE, null));
-    const sent = this.#writer.write(request).catch((error) => (this.lost ??= error.message));
+    const sent = this.#writer.write(request).catch((error) => this.#lose(error.message));
     return Promise.race([all, late, sent.then(() => (this.lost ? null : all))]);
   }
 
@@ -123,9 +123,13 @@ export class Bus {
         this.#rest = rest;
         found.forEach((each) => this.#heard(each));
       }
+      this.#lose("the port has ended.");
     } catch (error) {
-      this.lost ??= error.message;
+      this.#lose(error.message);
     }
-    this.lost ??= "The port is lost.";
+  }
+
+  #lose(why) {
+    this.lost ??= `The leader is unplugged: ${why}`;
   }
 }

@@ -4,6 +4,7 @@ export const SILENCE = 1000; // ms without a valid posture after which the leade
 const GAP = 200; // ms without a posture after which the arm rests; the next one must be near
 const GAP_JUMP = 0.09; // rad
 export const NEAR = 0.09; // rad up to which the arm follows without a planned path
+export const HELD_BACK = 0.5; // rad that a leader moves on while the arm waits before a contact
 const MAX_SPEED = 0.012; // rad/ms beyond which a posture is an error of the encoder
 const MAX_INTERVAL = 50; // ms; a longer interval allows no larger jump
 const NOISE = 0.01; // rad
@@ -17,17 +18,19 @@ const AXES = [["shoulder_pan", -1, 0], ["shoulder_lift", 1, -76], ["elbow_flex",
 const [LOW, HIGH] = [-TURN, 2 * TURN];
 const BOUNDS = { id: [0, 253], drive_mode: [0, 1], homing_offset: [-2047, 2047], range_min: [LOW, HIGH], range_max: [LOW, HIGH] };
 
-// Return the calibration in LeRobot's JSON `text`. Throws an error with what is wrong in it.
+// Return the calibration of the six motors in LeRobot's JSON `text`. Throws an error with what is wrong in it.
 export function calibrationIn(text) {
-  const found = parsed(text);
+  const all = parsed(text);
+  const found = {};
   for (const name of [...AXES.map(([motor]) => motor), "gripper"]) {
-    const motor = found?.[name];
+    const motor = (found[name] = all?.[name]);
     if (!motor) throw new Error(`This is not a calibration file of an SO-101 leader: it has no motor ${name}.`);
     for (const [field, [low, high]] of Object.entries(BOUNDS))
       if (!Number.isInteger(motor[field]) || motor[field] < low || motor[field] > high)
         throw new Error(`In the calibration, ${field} of ${name} is not an integer from ${low} to ${high}.`);
     if (motor.range_min >= motor.range_max) throw new Error(`In the calibration, range_min of ${name} is not below range_max.`);
   }
+  if (new Set(Object.values(found).map(({ id }) => id)).size < 6) throw new Error("In the calibration, two motors have the same id.");
   return found;
 }
 

@@ -2,7 +2,7 @@
 // leader's posture on a planned path. Everything unexpected ends this, and only a press begins again.
 import { html } from "../instruments/shape.js";
 import { Bus, HOMING_OFFSET, POSITION, TORQUE_ENABLE } from "./bus.js";
-import { calibrationIn, distance, History, NEAR, posture, SILENCE } from "./follower.js";
+import { calibrationIn, distance, HELD_BACK, History, NEAR, posture, SILENCE } from "./follower.js";
 
 const EVERY = 12; // ms between two readings of the leader
 const LOOK = 150; // ms between two looks at the progress of the program
@@ -28,6 +28,7 @@ export class Leader {
   #revocations = 0;
   #finger = null; // the fingers' last target and its time, once the jaw has met them
   #answered = 0;
+  #held = null; // posture of the leader when the arm began to wait before a contact
   #file = html("input", { type: "file", accept: ".json", hidden: "", "aria-label": "Calibration of the leader" });
   #button = html("button", { type: "button" });
   #words = html("span", { role: "status" });
@@ -77,9 +78,11 @@ export class Leader {
     }
   }
 
+  // keep: whether the person has chosen it now. A connected leader was compared with another one.
   #calibrate(text, keep) {
     try {
       this.#calibration = calibrationIn(text);
+      this.#bus?.close();
       if (keep) storage()?.setItem(KEPT, text);
       this.#show("The calibration is kept in this browser.");
     } catch (error) {
@@ -118,7 +121,7 @@ export class Leader {
       if (ticks && this.#history.add(t, posture(this.#calibration, this.#arm, ticks)) && this.#phase === "following") this.#follow(t);
       await pause(Math.max(due + EVERY - performance.now(), 0));
     }
-    this.#rest(`The leader is unplugged: ${this.#bus.lost}`, "off");
+    this.#rest(this.#bus.lost, "off");
     await this.#bus.close();
   }
 
@@ -174,6 +177,7 @@ export class Leader {
   #follow(t) {
     if (t - this.#answered > ANSWER) return this.#rest("The server does not answer.");
     const { q, finger } = this.#history.newest;
+    if (this.#held && distance(q, this.#held) > HELD_BACK) return this.#rest("The arm is held back by a contact.");
     const fields = { revocations: this.#revocations, id: FOLLOW };
     this.#say({ do: "servo", q, qd: this.#history.rates(), ...fields });
     if (finger === null) return;
@@ -188,6 +192,7 @@ export class Leader {
   // Take the status of the bar.
   #see(status) {
     if (this.#phase === "off" || this.#phase === "waiting") return;
+    this.#held = status.mood === "blocked" ? (this.#held ?? this.#history.newest.q) : null;
     if (status.stopped) this.#rest(`The arm was stopped: ${status.stopped}`);
     else if (this.#phase === "easing") return;
     else if (status.revocations !== this.#revocations) this.#rest("The arm was stopped or changed its driver.");

@@ -15,6 +15,7 @@ from tests.browser.page_leader import TURNED, connect_leader, setpoint, turn_pan
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop
 from tests.gateway.client import enter
+from tests.leader.emulated_leader import write_calibration
 
 
 def tool_point(page: ViserPage) -> Any:
@@ -304,7 +305,11 @@ def test_silent_leader_and_hidden_page_end_it(
         }"""
     )
     words(page, "hidden")
-    page.page.evaluate("() => leader.unplug()")
+    # It was compared with the calibration that was chosen before.
+    file = write_calibration(tmp_path / "other.json")
+    page.page.locator("#leader input[type=file]").set_input_files(file)
+    words(page, "The port is closed.")
+    page.page.get_by_role("button", name="Connect a leader arm").wait_for()
 
 
 def test_only_our_page_may_ask_for_a_serial_port(server: AppServer) -> None:
