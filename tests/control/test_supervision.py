@@ -216,8 +216,13 @@ def test_contact_at_the_measured_posture_stops_the_arm(session: Session, state: 
     # Lean the arm forward until it meets the table.
     while world.nearest(np.append(touching, 0.0)).distance > 0.0:  # type: ignore[union-attr]
         touching[1] -= 0.01
-    report = ArmReport(ArmMode.MOVING, state.t, np.append(touching, 0.0))
-    met = session.supervised(replace(state, q=frozen(touching), report=report), report)
+    there = replace(state, q=frozen(touching))
+    # Where a contact is intended, as when an object is put down, it is no reason to stop.
+    intended = ArmReport(ArmMode.MOVING, state.t, np.append(touching, 0.0))
+    assert session.supervised(there, intended).stopped is None
+    # Not astray for long enough to be stopped for that.
+    report = ArmReport(ArmMode.MOVING, state.t, np.append(session.ready, 0.0))
+    met = session.supervised(there, report)
     assert met.stopped is not None
     assert Reason.MEASURED_CONTACT in reasons(met)
     assert "touch, as measured" in met.stopped.cause.why

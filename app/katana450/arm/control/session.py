@@ -230,8 +230,7 @@ class Session:
         """Return ``state``, at the measured place, stopped if ``report`` is a reason to."""
         state = with_tracking_time(state, report)
         if state.stopped is None:
-            world = self.world_at(state) if state.moving else None
-            stop = stop_for(state, report, None if world is None else world.nearest(state.x))
+            stop = stop_for(state, report, self.world_at(state) if state.moving else None)
             if stop is None:
                 return state
             state = self._stop_motion(state, stop)

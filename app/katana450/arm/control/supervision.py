@@ -14,6 +14,7 @@ from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.control.stop_commands import Stop
 from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import JointMotion
 
@@ -28,6 +29,10 @@ MAX_REPORT_AGE = 0.5
 
 CONTACT_DISTANCE = 5e-4
 """[m] Measured distance below which parts touch: encoders and calibration leave as much open."""
+
+INTENDED_DISTANCE = 3e-3
+"""[m] Distance below which parts are meant to touch, as an object that is picked up or put down and
+what it stands on. All other parts are kept 5 mm apart."""
 
 
 def tracking_error(report: ArmReport, q: FloatArray) -> tuple[float, int]:
@@ -46,11 +51,22 @@ def with_tracking_time(state: State, report: ArmReport) -> State:
     return replace(state, report=report, astray_since=since)
 
 
-def fault_of(state: State, report: ArmReport, nearest: Contact | None) -> Finding | None:
+def unintended_contact(world: CollisionWorld, state: State, report: ArmReport) -> Contact | None:
+    """Return the contact of the nearest parts at the measured posture.
+
+    None if they are not near, or if they are meant to touch where the arm should be.
+    """
+    nearest = world.nearest(state.x)
+    if nearest is None or nearest.distance >= CONTACT_DISTANCE:
+        return None
+    is_intended = world.gap(report.expected, *nearest.parts) < INTENDED_DISTANCE
+    return None if is_intended else nearest
+
+
+def fault_of(state: State, report: ArmReport, contact: Contact | None) -> Finding | None:
     """Return the reason for which ``state`` must be stopped by ``report``; None without one.
 
-    nearest: the two parts that are nearest to each other at the measured posture; None if they are
-    not known.
+    contact: of two parts that touch at the measured posture and are not meant to; None without one.
     """
     if not report.mode.follows:
         return Finding(Reason.NOT_FOLLOWING)
@@ -59,17 +75,19 @@ def fault_of(state: State, report: ArmReport, nearest: Contact | None) -> Findin
         return Finding(Reason.ARM_SILENT, age)
     if state.astray_since is not None and report.t - state.astray_since > MAX_ASTRAY_TIME:
         return Finding(Reason.TRACKING_ERROR, *tracking_error(report, state.q))
-    if nearest is not None and nearest.distance < CONTACT_DISTANCE and state.moving:
-        return Finding(Reason.MEASURED_CONTACT, nearest.distance, parts=nearest.parts)
+    if contact is not None and state.moving:
+        return Finding(Reason.MEASURED_CONTACT, contact.distance, parts=contact.parts)
     return None
 
 
-def stop_for(state: State, report: ArmReport, nearest: Contact | None) -> Stop | None:
+def stop_for(state: State, report: ArmReport, world: CollisionWorld | None) -> Stop | None:
     """Return the stop that ``report`` asks for; None without a fault, see ``fault_of``.
 
-    Its cause is a sentence that stays true until the stop is cleared.
+    Its cause is a sentence that stays true until the stop is cleared. world: None if contacts are
+    not checked.
     """
-    fault = fault_of(state, report, nearest)
+    contact = None if world is None else unintended_contact(world, state, report)
+    fault = fault_of(state, report, contact)
     if fault is None:
         return None
     why = f"{finding_text(fault)}."
