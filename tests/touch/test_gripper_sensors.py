@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
+from katana450.arm.control.arm_report import ArmMode, ArmReport
+from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.touch.gripper_sensors import (
     COUNT,
@@ -20,6 +23,7 @@ from katana450.extensions.touch.gripper_sensors import (
     distance_value,
     force_value,
 )
+from katana450.extensions.touch.touch_model import TouchModel
 
 
 def test_each_sensor_has_its_place_in_the_answer() -> None:
@@ -63,3 +67,11 @@ def test_force_is_scaled_to_the_value_of_holding() -> None:
     assert force_value(0.0) == 0
     assert force_value(HELD_FORCE) == HELD_VALUE
     assert force_value(50.0) == MAX_VALUE
+
+
+def test_sensors_of_a_real_arm_replace_the_simulated_ones(model: TouchModel, around: State) -> None:
+    raw = tuple(float(number) for number in range(100, 116))
+    report = ArmReport(ArmMode.HOLDING, around.t, around.x, sensors=raw)
+    measured = model.report(replace(around, report=report))["sensors"]
+    assert measured == GripperSensors.from_bytes(bytes(range(100, 116))).named()
+    assert model.report(around)["sensors"] != measured

@@ -12,6 +12,7 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.touch.foundation import PadPressure
 from katana450.extensions.touch.gripper_sensors import (
+    COUNT,
     GripperSensors,
     distance_value,
     force_value,
@@ -132,7 +133,10 @@ class TouchModel:
         return wanted
 
     def sensors(self, state: State) -> GripperSensors:
-        """Return the simulated values of the 16 sensors."""
+        """Return the values of the 16 sensors: those that the arm reports, or simulated ones."""
+        measured = () if state.report is None else state.report.sensors
+        if len(measured) == COUNT:
+            return GripperSensors.from_bytes([round(each) for each in measured])
         last = self._last_sensors
         if last is None or last[0] is not state:
             last = self._last_sensors = (state, self._sensors(state))
