@@ -39,7 +39,7 @@ def nanoseconds(t: float) -> int:
 
 
 def _rounded(values: FloatArray, digits: int) -> list[float]:
-    """Return a few numbers (n,) with ``digits`` decimals; numpy takes twice the time for them."""
+    """Return a few numbers (n,) with ``digits`` decimals; numpy takes longer for them."""
     return [round(each, digits) + 0.0 for each in values.tolist()]
 
 
@@ -65,7 +65,7 @@ class StateMessages:
         self._tools: dict[int, tuple[State, FloatArray]] = {}
 
     def prepare(self, states: Sequence[State]) -> None:
-        """Find the poses of the tool in ``states`` together, which takes a fifth of the time."""
+        """Find the poses of the tool in ``states`` together, which takes less time."""
         arm = self._robot.arm
         if arm is None or len({each.tool for each in states}) != 1:
             return

@@ -1,7 +1,7 @@
 """Writer of messages to an MCAP file, in chunks.
 
-Its file is like that of the writer of the ``mcap`` library, which needs twice the time for a
-message.
+Readers find the same as in a file of the writer of the ``mcap`` library, which needs more time for
+a message.
 """
 
 from __future__ import annotations

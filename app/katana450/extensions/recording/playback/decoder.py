@@ -20,7 +20,7 @@ from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.platform_support import limit_resources
 
 MAX_MEMORY_BYTES = 3_000_000_000
-"""Maximum address space; libraries reserve a gigabyte of it, a file of 200 MB takes a half."""
+"""Maximum address space, a part of which libraries only reserve."""
 
 MAX_SECONDS = 3600
 """[s] Maximum processor time of all requests for one file."""
