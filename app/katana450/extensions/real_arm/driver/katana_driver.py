@@ -29,7 +29,7 @@ from katana450.extensions.real_arm.link.transport import ArmRefusalError, LinkLo
 from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, Variant
 from katana450.maths.geometry.arrays import FloatArray
 
-IDLE_TIME = 0.005
+IDLE_TIME = 0.01
 """[s] Longest sleep of the thread, if nothing wakes it, while an arm is connected."""
 
 UNCONNECTED_TIME = 0.1

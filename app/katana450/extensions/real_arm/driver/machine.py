@@ -5,6 +5,7 @@ It knows no connection, clock or thread: the caller performs the exchanges and n
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -235,11 +236,11 @@ class ArmMachine:
         order = self._motion.finger_order() if self._may_move else None
         if order is not None:
             due.append((order, FINGER_PERIOD))
-        overdue = [(now - self._polled.get(type(each), -np.inf)) / time for each, time in due]
-        most = int(np.argmax(overdue))
-        if overdue[most] < 1.0:
+        overdue = [(now - self._polled.get(type(each), -math.inf)) / time for each, time in due]
+        most = max(overdue)
+        if most < 1.0:
             return None
-        request = due[most][0]
+        request = due[overdue.index(most)][0]
         self._polled[type(request)] = now
         return request
 
