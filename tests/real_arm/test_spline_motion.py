@@ -44,15 +44,15 @@ def test_punctual_setpoints_are_not_slowed_down() -> None:
     end = np.array([axis.target for axis in packets[-1][1].segments])
     begun = packets[0][0] - 0.09
     expected = HOME + DIRECTIONS * (1.0 - np.cos(begun + 0.08 * len(packets)))
-    assert np.abs(end - expected).max() < 30
+    assert np.abs(end - expected).max() <= 0.5
 
 
 def test_late_ticks_make_no_jerk_and_are_made_up() -> None:
-    late = {60: 0.15, 90: 0.12, 200: 0.1}
+    late = {60: 0.15, 140: 0.12, 230: 0.1}
     packets = played(late)
     assert largest_acceleration(packets) < MAX_ACCELERATION
-    # After the last late tick the packets come as far ahead as at the beginning.
+    # 0.22 s were lost, and after the last late tick most of it is made up.
     starts = [t - 0.08 * number for number, (t, _) in enumerate(packets)]
-    assert starts[-1] - starts[5] < 0.05
+    assert starts[-1] - starts[5] < 0.09
     for (_, before), (_, after) in pairwise(packets):
         assert [a.p0 for a in after.segments] == [b.target for b in before.segments]

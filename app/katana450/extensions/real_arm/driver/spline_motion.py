@@ -36,6 +36,9 @@ the two accelerations of the firmware. A faster one would look like a collision.
 RESERVE = 1.5 * SEGMENT_TIME
 """[s] Motion left in the arm above which another request may come before its next segment."""
 
+SLACK = 0.04
+"""[s] Lack that is none: setpoints come at any time within a tick."""
+
 CATCH_UP_TIME = 1.0
 """[s] Time constant with which motion that late setpoints took from the arm is made up."""
 
@@ -104,7 +107,7 @@ class SplineMotion:
         if not self._stream.is_still:
             dt = min(dt, MAX_STEP_TIME)
         lack = 0.0 if self._started is None else self._lead - self._time + t - self._started
-        wanted = 1.0 + min(max(lack, 0.0) / CATCH_UP_TIME, MAX_SLOWING)
+        wanted = 1.0 + min(max(lack - SLACK, 0.0) / CATCH_UP_TIME, MAX_SLOWING)
         self._slowing += min(max(wanted - self._slowing, -SLOWING_STEP), SLOWING_STEP)
         self._time += dt * self._slowing
         return self._time
