@@ -9,6 +9,7 @@ import select
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -126,6 +127,8 @@ class EmulatedLeader:
         self.motion = motion
         self.motors = EmulatedMotors()
         self._end, self._inner = os.openpty()
+        # A program that reads nothing loses answers, and does not hold the thread up.
+        os.set_blocking(self._end, False)
         self.port = os.ttyname(self._inner)
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, name="emulated leader")
@@ -155,4 +158,5 @@ class EmulatedLeader:
             if not select.select([self._end], [], [], 0.02)[0]:
                 continue
             self.motors.angles = self.motion(time.monotonic())
-            os.write(self._end, self.motors.answer(os.read(self._end, 4096)))
+            with suppress(BlockingIOError):
+                os.write(self._end, self.motors.answer(os.read(self._end, 4096)))
