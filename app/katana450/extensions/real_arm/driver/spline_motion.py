@@ -94,7 +94,7 @@ class SplineMotion:
             self._ready.append((segment, self._is_closed))
 
     def _stream_time(self, t: float) -> float:
-        """Return the time of a setpoint of time ``t`` [s] in the motion.
+        """Return the time [s] in the motion of a setpoint of time ``t`` [s]: ``t`` without delays.
 
         The session moves the setpoint for MAX_STEP_TIME at most, however late a tick is. What the
         arm then lacks is made up by a motion that is slightly slower, until as much waits in the
@@ -103,7 +103,8 @@ class SplineMotion:
         dt = t - self._t
         self._t = t
         if math.isinf(dt):
-            return self._time
+            self._time = t
+            return t
         if not self._stream.is_still:
             dt = min(dt, MAX_STEP_TIME)
         lack = 0.0 if self._started is None else self._lead - self._time + t - self._started
