@@ -10,6 +10,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 
 
+@pytest.mark.long
 def test_both_tables_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
     main(["--postures", "3"])
     printed = capsys.readouterr().out

@@ -20,7 +20,10 @@ STEP_3 = ".steps li:nth-child(3) button"
 
 @pytest.mark.parametrize(
     ("window", "options"),
-    [(PORTRAIT, PHONE), pytest.param(WIDE, {}, marks=pytest.mark.long)],
+    [
+        pytest.param(PORTRAIT, PHONE, marks=pytest.mark.long),
+        pytest.param(WIDE, {}, marks=pytest.mark.long),
+    ],
     ids=["phone", "desk"],
 )
 def test_steps_of_a_program_are_controlled_in_the_list(

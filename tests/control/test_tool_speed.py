@@ -74,7 +74,14 @@ def test_repeated_jumps_keep_the_tool_speed(session: Session, kind: str) -> None
     assert 0.8 * TOOL_SPEED < max(speeds(session, ORDERS[kind], 2500, 7)) <= TOOL_SPEED
 
 
-@pytest.mark.parametrize(("size", "longest", "seed"), [(0.4, 30, 2), (0.9, 30, 3), (0.9, 80, 5)])
+@pytest.mark.parametrize(
+    ("size", "longest", "seed"),
+    [
+        (0.4, 30, 2),
+        pytest.param(0.9, 30, 3, marks=pytest.mark.long),
+        pytest.param(0.9, 80, 5, marks=pytest.mark.long),
+    ],
+)
 def test_fast_drags_keep_the_tool_speed(
     session: Session, size: float, longest: int, seed: int
 ) -> None:

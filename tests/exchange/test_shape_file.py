@@ -270,7 +270,7 @@ def test_names_of_files_become_names_of_objects(name: str, shown: str, scene_obj
     assert (label(name), object_name(name)) == (shown, scene_object)
 
 
-@settings(max_examples=50)
+@settings(max_examples=15)
 @given(st.text(max_size=99))
 def test_any_file_name_gives_an_object_name(name: str) -> None:
     SceneObject(object_name(name), Shape.SPHERE, (0.1,), np.eye(4))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.arm.runtime.mailbox import Mailbox
@@ -132,6 +133,8 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.ListPeople, requests.Kick, requests.Mute, requests.Unmute,
         # Refused without a detour on offer; see test_detour_on_a_server.
         requests.Go,
+        # Refused at a simulated arm.
+        requests.OperateArm,
     }  # fmt: skip
     assert set(samples) | no_commands == {*schema.kinds(requests.AnyRequest), Program, Steer}
     for kind, several in samples.items():
@@ -150,6 +153,13 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
             else:
                 expected = ("requested",) if kind is requests.Stop else ("accepted", "limited")
                 assert answer.outcome in expected, request
+
+
+def test_simulated_arm_has_nothing_to_operate(program: Client) -> None:
+    with pytest.raises(RefusedError, match="simulated"):
+        program.ask(requests.OperateArm(act=ArmAct.CONNECT))
+    with pytest.raises(RefusedError, match="Motors off means the arm falls"):
+        program.ask(requests.OperateArm(act=ArmAct.RELEASE))
 
 
 def wait_until_clearable(program: Client) -> None:

@@ -178,7 +178,7 @@ def test_what_cannot_be_done_is_refused_with_its_reason(
 @pytest.mark.parametrize(
     ("side", "size"),
     [
-        ("above", (40.0, 40.0, 12.0)),
+        pytest.param("above", (40.0, 40.0, 12.0), marks=pytest.mark.long),
         pytest.param("above", (20.0, 60.0, 30.0), marks=pytest.mark.long),
         pytest.param("front", (40.0, 40.0, 12.0), marks=pytest.mark.long),
     ],

@@ -67,6 +67,7 @@ def orders(arm: PaperArm) -> list[requests.ArmRequest]:
     ]
 
 
+@pytest.mark.long
 def test_motion_is_followed_over_a_connection() -> None:
     with served() as (paper, _, loop):
         loop.engage()

@@ -94,6 +94,8 @@ def inwards(loop: SmallLoop, size: float = 0.3) -> None:
     loop.setpoint = lambda t: start + signs * away(t)
 
 
+# In real time, so it needs a machine that does nothing else; test_machine.py has simulated time.
+@pytest.mark.long
 @pytest.mark.parametrize("faults", [(), SLOW], ids=["fast", "slow"])
 def test_setpoints_are_followed(wire: Wire, faults: tuple[AnyFault, ...]) -> None:
     with emulated(*faults) as (loop, _):

@@ -62,6 +62,7 @@ def recorded(server: AppServer, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
+@pytest.mark.long
 def test_recorded_drag_runs_again(
     server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

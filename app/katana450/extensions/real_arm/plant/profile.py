@@ -73,8 +73,8 @@ KATANA450 = PlantProfile(
     backlash=math.radians(0.03),
     # Assumed: the reflected inertia of the motors lets the arm sink slower than a free body.
     fall=5.0,
-    # Assumed: the acceleration limit that the controllers accept is a third of what they can.
-    reserve=3.0,
+    # Assumed: with less than this, axis 3 could not follow the arm's own limits under its weight.
+    reserve=5.0,
 )
 """The Katana450. Only the cycle of its bus and its precision are known; the rest is assumed until
 an arm is measured."""

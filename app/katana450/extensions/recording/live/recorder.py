@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 START_DELAY = 3.0
 """[s] Time after the start of the arm in which the other processes have the processor alone."""
 
-SYNC_INTERVAL = 0.8
+SYNC_INTERVAL = 0.6
 """[s] Time between two syncs of the file. With ``COLLECTING`` of the arm's process it is the
 maximum age of what a crash of the machine loses."""
 
