@@ -105,6 +105,34 @@ def test_calibration_waits_until_the_arm_has_ended_it(talk: Conversation) -> Non
     assert (talk.machine.arm.held == [30500, -30500, -30500, 30500, 30500, 30500]).all()
 
 
+def test_stop_ends_a_calibration_and_leaves_the_arm_uncalibrated(talk: Conversation) -> None:
+    talk.connect()
+    talk.machine.perform(ArmAct.CALIBRATE)
+    talk.run(1.0)
+    assert talk.mode() is ArmMode.CALIBRATING
+    before = len(talk.motors)
+    # Two presses are one stop.
+    talk.machine.end_act(talk.now)
+    talk.machine.end_act(talk.now)
+    talk.run(0.3)
+    assert talk.motors[before] == (0, MotorFlag.FLUSH)
+    frozen = talk.motors[before + 1 :]
+    assert sorted(frozen) == [(axis, MotorFlag.FREEZE) for axis in range(1, 7)]
+    talk.run(2.0)
+    assert talk.mode() is ArmMode.UNCALIBRATED
+    assert talk.machine.note.startswith("STOP ended the calibration")
+    assert ArmAct.UNBLOCK not in talk.mode().acts
+
+
+def test_stop_drops_an_act_that_waits(talk: Conversation) -> None:
+    talk.connect()
+    talk.machine.perform(ArmAct.CALIBRATE)
+    talk.machine.end_act(talk.now)
+    talk.run(1.0)
+    assert talk.mode() is ArmMode.UNCALIBRATED
+    assert not talk.motors
+
+
 def test_refused_calibration_switches_collision_detection_on_again(talk: Conversation) -> None:
     talk.connect()
     talk.arm.refusals[CommandMotor] = FirmwareError(ord("C"), -1, 0, "")

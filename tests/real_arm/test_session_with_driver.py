@@ -107,3 +107,16 @@ def test_person_connects_calibrates_moves_and_stops(operator: Operator) -> None:
     time.sleep(0.3)
     assert np.abs(operator.state.q - stopped.q).max() < 0.003
     assert operator.state.stopped is None
+
+
+def test_stop_ends_a_calibration(operator: Operator) -> None:
+    operator.until(lambda state: state.stopped is not None)
+    operator.perform(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
+    operator.perform(ArmAct.CALIBRATE, ArmMode.CALIBRATING)
+    # The arm is stopped already, so only the press itself can end what it does.
+    operator.give(cmd.Stop())
+    ended = operator.until(lambda _: operator.mode() is ArmMode.UNCALIBRATED)
+    assert ended.report is not None
+    assert ended.report.note == "STOP ended the calibration. Calibrate the arm again."
+    time.sleep(0.5)
+    assert np.abs(operator.state.q - ended.q).max() < 0.02, "the arm holds"

@@ -33,8 +33,8 @@ class ArmAct(Enum):
 
 
 HAZARDS = {
-    ArmAct.CALIBRATE: "The arm moves by itself to its mechanical stops, for about 30 s, and STOP "
-    "may not end it. Clear the space around it, and keep a hand on its switch.",
+    ArmAct.CALIBRATE: "The arm moves by itself to its mechanical stops, for about 30 s, and may "
+    "not obey STOP meanwhile. Clear the space around it, and keep a hand on its switch.",
     ArmAct.ENGAGE: "The joint angles are right only if the arm was calibrated since it was "
     "switched on.",
     ArmAct.RELEASE: "Motors off means the arm falls. Hold it by hand.",

@@ -65,6 +65,13 @@ class Driver(Protocol):
         """
         ...
 
+    def freeze(self, t: float) -> None:
+        """Stop what the arm does by itself, such as a calibration: somebody has pressed STOP.
+
+        t: now [s].
+        """
+        ...
+
     def stop(self) -> None:
         """Disconnect from the arm. May be called twice."""
         ...

@@ -77,6 +77,9 @@ class SimulatedDriver:
     def perform(self, act: ArmAct, t: float) -> None:
         """Do nothing: the session refuses every act at an arm without a report."""
 
+    def freeze(self, t: float) -> None:
+        """Do nothing: the arm does nothing by itself."""
+
     def stop(self) -> None:
         """End the motion; ``start`` is needed before the next setpoint."""
         self._t = None

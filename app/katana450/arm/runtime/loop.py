@@ -116,7 +116,9 @@ class ControlLoop:
             self._put_stops_again(drained)
         self._state = state
         for command, outcome in zip(commands, state.outcomes, strict=False):
-            if isinstance(command, OperateArm) and outcome.verdict is not Verdict.REFUSED:
+            if isinstance(command, Stop):
+                self._driver.freeze(t)
+            elif isinstance(command, OperateArm) and outcome.verdict is not Verdict.REFUSED:
                 self._driver.perform(command.act, t)
         if self.record is not None and state is not before:
             self.record(TickRecord(before.t, t, drained.submissions, has_failed, state))

@@ -104,6 +104,7 @@ class KatanaDriver:
         self._asked: deque[tuple[ArmRequest, Future[ArmReply]]] = deque()
         self._wake = threading.Event()
         self._ending = threading.Event()
+        self._stop_pressed = threading.Event()
         self._was_stopped = True
         self._end: float | None = None
         self._answer = self._machine.answer()
@@ -140,6 +141,11 @@ class KatanaDriver:
     def perform(self, act: ArmAct, t: float) -> None:  # noqa: ARG002
         """Give ``act`` to the thread, at once."""
         self._acts.append(act)
+        self._wake.set()
+
+    def freeze(self, t: float) -> None:  # noqa: ARG002
+        """Let the thread end what the arm does by itself, at once."""
+        self._stop_pressed.set()
         self._wake.set()
 
     def ask(self, request: ArmRequest) -> Future[ArmReply]:
@@ -203,6 +209,11 @@ class KatanaDriver:
             joints, t, stopped = self._setpoints.popleft()
             if self._end is None:
                 self._machine.steer(joints, t, stopped=stopped)
+        if self._stop_pressed.is_set():
+            self._stop_pressed.clear()
+            # Acts that wait are older than the stop.
+            self._acts.clear()
+            self._machine.end_act(self._clock())
         while self._acts:
             act = self._acts.popleft()
             self._machine.perform(act)

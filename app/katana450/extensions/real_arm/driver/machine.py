@@ -58,6 +58,8 @@ UNPROVEN = (ArmMode.CONNECTED, ArmMode.UNCALIBRATED, ArmMode.CALIBRATING)
 MAX_REFUSALS = 3
 """Measurements that may be refused one after another."""
 
+CALIBRATION_ENDED = "STOP ended the calibration. Calibrate the arm again."
+
 FIRST_NOTE = "No connection. Connect to the arm to read it."
 
 
@@ -163,6 +165,17 @@ class ArmMachine:
             if problem:
                 self._halt(t, problem)
         self._stopped = stopped
+
+    def end_act(self, now: float) -> None:
+        """Drop acts that wait, and end a calibration: somebody has pressed STOP.
+
+        The arm is not calibrated then.
+        """
+        self._acts.clear()
+        if self.mode is ArmMode.CALIBRATING and self._procedure is not None:
+            self._procedure.close()
+            axes = self._variant.driven
+            self._start(halt(self.arm, axes, self._encoders, now, CALIBRATION_ENDED), now)
 
     def freeze(self, now: float) -> None:
         """Stop an arm that moves, as at the end of the program."""

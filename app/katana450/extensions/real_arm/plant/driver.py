@@ -105,6 +105,9 @@ class PlantDriver:
     def perform(self, act: ArmAct, t: float) -> None:
         """Do nothing: a simulated arm is always connected, calibrated and held."""
 
+    def freeze(self, t: float) -> None:
+        """Do nothing: a simulated arm does nothing by itself."""
+
     def stop(self) -> None:
         """End the motion; ``start`` is needed before the next setpoint."""
         self._t = None
