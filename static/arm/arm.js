@@ -3,7 +3,7 @@ import { html, signed, write } from "../instruments/shape.js";
 
 const NAMES = {
   connect: "Connect", disconnect: "Disconnect", calibrate: "Calibrate…",
-  engage: "Hold by motors…", release: "Motors off…", unblock: "Hold again",
+  engage: "Engage motors…", release: "Release motors…", unblock: "Unblock",
 };
 const FOLLOWS = ["holding", "moving"];
 
