@@ -60,7 +60,13 @@ CELLS = 81
 """Number of cells of each axis in the search for a continuous path."""
 
 
-@pytest.fixture(params=["katana450", pytest.param("so101", marks=pytest.mark.long), "pincherx_150"])
+@pytest.fixture(
+    params=[
+        pytest.param("katana450", marks=pytest.mark.long),
+        pytest.param("so101", marks=pytest.mark.long),
+        "pincherx_150",
+    ]
+)
 def dragged(request: pytest.FixtureRequest, tmp_path: Path) -> Session:
     """A session of each arm, without collision checks."""
     files = {
