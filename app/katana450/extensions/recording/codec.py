@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from katana450.extensions.recording.allowed import (
     CLASSES,
@@ -115,7 +116,8 @@ class Codec:
             return self.coder(MEMBERS[hint])
         if origin is Literal:
             return PlainCoder(type(parts[0]), parts)
-        if origin is np.ndarray:
+        # From numpy 2.5 on, which needs Python 3.12, the alias is a type of its own.
+        if origin in (np.ndarray, npt.NDArray):
             return ArrayCoder()
         if origin is tuple:
             repeated = len(parts) == 2 and parts[1] is ...
