@@ -221,7 +221,7 @@ def test_log_is_followed_line_by_line(tmp_path: Path) -> None:
 
 def test_line_that_is_none_of_a_log_is_reported() -> None:
     decoder = ExchangeDecoder()
-    assert decoder.words("nonsense\n") == ["This is no line of a log: nonsense"]
+    assert decoder.words("nonsense\n") == ["This is not a line of a log: nonsense"]
     assert "nothing for" in decoder.words("1.0 <\n")[0]
 
 
@@ -273,7 +273,7 @@ def test_server_simulates_a_plant() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--arm", "192.168.1.1"), "is no address of an arm"),
+        (("--arm", "192.168.1.1"), "is not the address of an arm"),
         (("--arm-log", "exchanges.log"), "needs an arm"),
         (("--arm", "tcp://127.0.0.1", "--arm-log", "/nowhere/exchanges.log"), "cannot be written"),
         (("--arm", "tcp://127.0.0.1", "--urdf", "tests/exchange/gantry.urdf"), "five turning axes"),

@@ -147,7 +147,7 @@ def test_address_is_read_and_shown(text: str, url: ArmUrl) -> None:
     ["", "192.168.1.1", "tcp://", "tcp://a:b", "tcp://a:0", "udp://a", "tcp://a/b", "serial://"],
 )
 def test_other_address_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="no address of an arm"):
+    with pytest.raises(InputError, match="not the address of an arm"):
         ArmUrl.parse(text)
 
 

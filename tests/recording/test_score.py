@@ -207,7 +207,7 @@ def test_trimmed_episode_is_scored_and_run_again_in_its_range(
     capsys.readouterr()
     assert main(["record", "again", str(path), "--out", str(script)]) == 0
     assert script.read_text(encoding="utf-8") == run.script()
-    # A recording in which an episode took place is no file of that episode.
+    # A recording that contains an episode is not the file of that episode.
     with_episode(path, replace(episode, start=begin + 0.1, end=end - 0.1), "trimmed")
     with RecordingFile.open(path) as file:
         assert shown_part(file, None, None) == pytest.approx((0.1, end - begin - 0.1))

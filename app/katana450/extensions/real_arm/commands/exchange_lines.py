@@ -39,7 +39,7 @@ class ExchangeDecoder:
             at, mark = float(parts[0]), parts[1]
             data = bytes.fromhex(parts[2]) if len(parts) > 2 else b""
         except (IndexError, ValueError):
-            return [f"This is no line of a log: {printable(line.strip())}"]
+            return [f"This is not a line of a log: {printable(line.strip())}"]
         shown = time.strftime("%H:%M:%S", time.localtime(at)) + f"{at % 1.0:.3f}"[1:]
         match mark:
             case logged.CONNECTED:

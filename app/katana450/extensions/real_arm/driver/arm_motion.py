@@ -106,7 +106,7 @@ class ArmMotion:
         if not self._variant.has_gripper:
             return None
         if FINGER + 1 in self._arm.collided and self._arm.states_t > self._finger_freed:
-            # An object between the fingers is no collision of the arm: they hold it.
+            # The fingers stop at an object because they hold it. The arm has not collided.
             position = int(self._arm.positions[FINGER])
             return CommandMotor(FINGER + 1, MotorFlag.FREEZE, position)
         return self._finger.next_order()

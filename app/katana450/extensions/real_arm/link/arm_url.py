@@ -42,7 +42,7 @@ class ArmUrl:
             host = port = None
         if scheme != "tcp" or not host or port == 0 or text.count("/") > 2:
             raise InputError(
-                f"{text!r} is no address of an arm: give tcp://HOST, tcp://HOST:PORT, or "
+                f"{text!r} is not the address of an arm: give tcp://HOST, tcp://HOST:PORT, or "
                 "serial://PATH such as serial:///dev/ttyUSB0."
             )
         return cls(host, PORT if port is None else port)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from katana450.errors import ConfigurationError
 from katana450.extensions.real_arm.link.transport import LinkLostError
 
+PORT_ERRORS = (OSError, TypeError, ValueError)
+"""Errors that pyserial raises, also for a port that was unplugged."""
+
 BAUD = 57_600
 """Speed of every arm with a serial port; 8 bits, no parity, one stop bit, no flow control."""
 
@@ -23,10 +26,10 @@ class SerialTransport:
             raise ConfigurationError(
                 "A serial arm needs pyserial: run pip install 'katana450[serial]'."
             ) from None
-        self._error = serial.SerialException
         try:
-            self._port = serial.Serial(path, BAUD)
-        except (serial.SerialException, OSError, ValueError) as error:
+            # Two programs at one arm would spoil the replies of each other.
+            self._port = serial.Serial(path, BAUD, exclusive=True)
+        except PORT_ERRORS as error:
             raise LinkLostError(f"The serial port {path} cannot be opened: {error}.") from None
 
     def write(self, data: bytes, timeout: float) -> None:
@@ -35,7 +38,7 @@ class SerialTransport:
             self._port.reset_input_buffer()
             self._port.write_timeout = timeout
             self._port.write(data)
-        except (self._error, OSError) as error:
+        except PORT_ERRORS as error:
             raise LinkLostError(f"The serial connection to the arm broke: {error}.") from None
 
     def read(self, timeout: float) -> bytes:
@@ -43,7 +46,7 @@ class SerialTransport:
         try:
             self._port.timeout = timeout
             data: bytes = self._port.read(max(self._port.in_waiting, 1))
-        except (self._error, OSError) as error:
+        except PORT_ERRORS as error:
             raise LinkLostError(f"The serial connection to the arm broke: {error}.") from None
         return data
 
