@@ -33,6 +33,8 @@ const Jog = (() => {
   /** @type {(request: object) => void} */
   let say = () => {};
   let stop = () => {};
+  /** @type {(hz: number) => void} */
+  let watch = () => {};
 
   function quiet() {
     keys.clear();
@@ -182,7 +184,7 @@ const Jog = (() => {
   }
 
   function begin(options) {
-    ({ say, stop } = options);
+    ({ say, stop, watch } = options);
     listen(byId("plane"), pads.plane, (rates, right, down) => {
       [rates[0], rates[1]] = [-bent(down), -bent(right)];
       return [right, down];
@@ -224,7 +226,7 @@ const Jog = (() => {
     loading = true;
     try {
       const { Steps } = await import("./jog/steps.js");
-      steps = await Steps.in(byId("jog"), say);
+      steps = await Steps.in(byId("jog"), say, watch);
     } catch (error) {
       console.warn(`No steps in the Jog sheet: ${error.message}`);
     }

@@ -424,7 +424,7 @@
   const kept = storage();
   Pace.begin({ say, toast });
   More.begin({ say, toast, kept, view: () => window.katana.view });
-  Jog.begin({ say, stop });
+  Jog.begin({ say, stop, watch: (hz) => see("leader", hz) });
   Objects.begin({ say });
   Edit.begin({ say, toast, connected: () => up, scene: () => stage, replay: (file) => showTimeline(true, (there) => there.open(file)) });
   // What a pointer does in the scene; loaded when the scene is drawn.

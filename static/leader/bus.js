@@ -42,7 +42,7 @@ export function packets(bytes) {
 export function value([, , sign], bytes) {
   const number = bytes.reduce((sum, byte, i) => sum + byte * 256 ** i, 0);
   const bit = 2 ** (sign ?? 31);
-  return number >= bit ? -(number % bit) : number;
+  return Math.floor(number / bit) % 2 ? -(number % bit) : number;
 }
 
 export class Bus {

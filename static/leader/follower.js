@@ -1,66 +1,27 @@
-// The rules by which the arm follows a leader, without port, clock or connection. As follower.py,
-// posture_history.py, joint_map.py and layout.py in app/katana450/extensions/leader.
-export const SILENCE = 1000; // ms without a valid posture after which the leader is silent
-const GAP = 200; // ms without a posture after which the arm rests; the next one must be near
-const GAP_JUMP = 0.09; // rad
-export const NEAR = 0.09; // rad up to which the arm follows without a planned path
-export const HELD_BACK = 0.5; // rad that a leader moves on while the arm waits before a contact
-const MAX_SPEED = 0.012; // rad/ms beyond which a posture is an error of the encoder
-const MAX_INTERVAL = 50; // ms; a longer interval allows no larger jump
-const NOISE = 0.01; // rad
-const RATE_WINDOW = 70; // ms
-const REST_TIME = 500; // ms
-const REST_ANGLE = 0.02; // rad
-const LIMIT_MARGIN = 1e-4; // rad
-const TURN = 4096; // ticks
-/** @type {[string, number, number][]} The SO-101: motor, direction, and angle of the arm's joint [deg] in the middle of its range. */
-const AXES = [["shoulder_pan", -1, 0], ["shoulder_lift", 1, -76], ["elbow_flex", 1, 73.8], ["wrist_flex", 1, 2.2], ["wrist_roll", -1, 0]];
-const [LOW, HIGH] = [-TURN, 2 * TURN];
-const BOUNDS = { id: [0, 253], drive_mode: [0, 1], homing_offset: [-2047, 2047], range_min: [LOW, HIGH], range_max: [LOW, HIGH] };
+// The rules by which the arm follows a leader, as a machine without port, clock or connection. It is the
+// machine of follower.py and posture_history.py in app/katana450/extensions/leader: a test compares both.
+// Times in s, angles in rad.
+const GAP = 0.2; // without a posture after which the arm rests
+const GAP_JUMP = 0.09; // the next posture must be this near then
+const SILENCE = 1; // without a valid posture after which the leader is silent
+const MAX_SPEED = 12; // rad/s beyond which a posture is an error of the encoder
+const MAX_INTERVAL = 0.05; // a longer interval allows no larger jump
+const NOISE = 0.01;
+const RATE_WINDOW = 0.07;
+const REST_TIME = 0.5;
+const REST_ANGLE = 0.02;
+const NEAR = 0.09; // up to which the arm follows without a planned path
+const HELD_BACK = 0.5; // at which an arm that waits before a contact no longer follows
+const SERVER_SILENCE = 1; // without a state of the server
+const FINGER_NEAR = 0.1; // fraction of the fingers' range within which the jaw has met them
+const FINGER_STEP = 0.02; // fraction of the fingers' range
+const FINGER_INTERVAL = 0.1;
+const ENDED = ["stopped", "failed", "refused", "cancelled"]; // of a program that does not arrive
 
-// Return the calibration of the six motors in LeRobot's JSON `text`. Throws an error with what is wrong in it.
-export function calibrationIn(text) {
-  const all = parsed(text);
-  const found = {};
-  for (const name of [...AXES.map(([motor]) => motor), "gripper"]) {
-    const motor = (found[name] = all?.[name]);
-    if (!motor) throw new Error(`This is not a calibration file of an SO-101 leader: it has no motor ${name}.`);
-    for (const [field, [low, high]] of Object.entries(BOUNDS))
-      if (!Number.isInteger(motor[field]) || motor[field] < low || motor[field] > high)
-        throw new Error(`In the calibration, ${field} of ${name} is not an integer from ${low} to ${high}.`);
-    if (motor.range_min >= motor.range_max) throw new Error(`In the calibration, range_min of ${name} is not below range_max.`);
-  }
-  if (new Set(Object.values(found).map(({ id }) => id)).size < 6) throw new Error("In the calibration, two motors have the same id.");
-  return found;
-}
+const distance = (one, other) => Math.max(...one.map((angle, i) => Math.abs(angle - other[i])));
 
-function parsed(text) {
-  try {
-    return JSON.parse(text);
-  } catch (cause) {
-    throw new Error(`This is not a calibration file of LeRobot: ${cause.message}`, { cause });
-  }
-}
-
-// Return the posture {raw, q, finger} of the arm `arm` at the positions `ticks` by the ids of the motors.
-export function posture(calibration, arm, ticks) {
-  const raw = AXES.map(([name, sign, offset]) => {
-    const { id, drive_mode, range_min, range_max } = calibration[name];
-    const angle = ((ticks.get(id) - (range_min + range_max) / 2) * 2 * Math.PI) / TURN;
-    return (drive_mode ? -sign : sign) * angle + (offset * Math.PI) / 180;
-  });
-  const q = raw.map((angle, i) => Math.min(Math.max(angle, arm.lower[i] + LIMIT_MARGIN), arm.upper[i] - LIMIT_MARGIN));
-  if (!arm.gripper) return { raw, q, finger: null };
-  const { id, drive_mode, range_min, range_max } = calibration.gripper;
-  const part = Math.min(Math.max((ticks.get(id) - range_min) / (range_max - range_min), 0), 1);
-  const [closed, opened] = arm.gripper;
-  return { raw, q, finger: closed + (drive_mode ? 1 - part : part) * (opened - closed) };
-}
-
-export const distance = (one, other) => Math.max(...one.map((angle, i) => Math.abs(angle - other[i])));
-
-// The accepted postures of the last REST_TIME. Times in ms.
-export class History {
+// The accepted postures of the last REST_TIME.
+class History {
   #postures = [];
   #begun = 0;
 
@@ -85,19 +46,139 @@ export class History {
     return this.#postures.at(-1);
   }
 
-  // Return the rates of the newest posture [rad/s]: the slope of the line through the last ones.
+  // Return the rates of the newest posture: the slope of the line through the last ones.
   rates() {
     const used = this.#postures.filter(({ t }) => this.newest.t - t <= RATE_WINDOW);
     const middle = used.reduce((sum, { t }) => sum + t, 0) / used.length;
     const spread = used.reduce((sum, { t }) => sum + (t - middle) ** 2, 0);
-    return this.newest.q.map((_, i) => (spread ? (1000 * used.reduce((sum, { t, q }) => sum + (t - middle) * q[i], 0)) / spread : 0));
+    return this.newest.q.map((_, i) => (spread ? used.reduce((sum, { t, q }) => sum + (t - middle) * q[i], 0) / spread : 0));
   }
 
   atRest(t) {
-    if (!this.fresh(t) || t - this.#begun < REST_TIME) return false;
+    if (!this.#postures.length || t - this.newest.t > GAP || t - this.#begun < REST_TIME) return false;
     return this.newest.q.every((_, i) => {
       const angles = this.#postures.map(({ q }) => q[i]);
       return Math.max(...angles) - Math.min(...angles) <= REST_ANGLE;
     });
+  }
+}
+
+export class Follower {
+  phase = "waiting"; // waiting, easing, settling or following
+  #history = new History();
+  #range; // finger joint closed and open; null without fingers
+  #eased = null; // time of the server from which states report the program
+  #revocations = 0;
+  #first = true;
+  #holds = false;
+  #finger = null; // time and target of the fingers, once the jaw has met them
+
+  constructor(range) {
+    this.#range = range;
+  }
+
+  // Return what is to be done at `t`, as objects {act, ...}: say, ease, end, sample, finger, release. posture: null if the
+  // leader did not answer. heard: time at which `state` arrived. asked: whether a person asks to begin, or to end.
+  step(t, posture, state, heard, asked) {
+    const ended = this.phase === "waiting" ? null : this.#ended(t, state, heard);
+    if (ended) return this.rest(ended);
+    const accepted = posture !== null && this.#history.add(t, posture);
+    if (this.phase === "waiting") return asked ? this.#begun(t, state) : this.#released(t, state, heard);
+    if (asked) return this.rest("You have ended it.");
+    if (this.phase === "easing") return this.#arrived(state);
+    if (this.phase === "settling") return this.#settled(t, state);
+    return accepted ? this.#followed(t, state) : [];
+  }
+
+  // Take note that the program was accepted; states report it from the time `since` of the server.
+  eased(since) {
+    this.#eased = since;
+  }
+
+  // Follow no longer, for the reason `why`.
+  rest(why) {
+    const ends = this.phase === "easing" ? [{ act: "end" }] : [];
+    return [...ends, ...this.refused(why)];
+  }
+
+  // Follow no longer, because the server has refused a request for the reason `why`.
+  refused(why) {
+    this.phase = "waiting";
+    return [{ act: "say", text: `${why} The arm rests.` }];
+  }
+
+  #begun(t, state) {
+    if (!this.#history.fresh(t)) return this.rest("The leader does not answer.");
+    if (state.stopped !== null) return this.rest(`The arm is stopped: ${state.stopped} Clear the stop first.`);
+    return this.#ease(state, "The arm moves to the posture of the leader. Keep the leader still.");
+  }
+
+  // Release the lease once the arm is at rest.
+  #released(t, state, heard) {
+    if (!this.#holds || state.moving || t - heard > SERVER_SILENCE) return [];
+    this.#holds = false;
+    return [{ act: "release" }];
+  }
+
+  #ease(state, text) {
+    [this.phase, this.#eased, this.#revocations] = ["easing", null, state.revocations];
+    return [{ act: "say", text }, { act: "ease", q: this.#history.newest.q, revocations: state.revocations }];
+  }
+
+  // Return the reason that ends the motion; null if it may continue.
+  #ended(t, state, heard) {
+    if (!this.#history.fresh(t)) return `The leader has sent no valid posture for ${SILENCE} s.`;
+    if (t - heard > SERVER_SILENCE) return "The server does not answer.";
+    if (state.stopped !== null) return `The arm was stopped: ${state.stopped}`;
+    // The program has a lease of its own, which counts as a revocation when it ends.
+    if (this.phase === "easing") return null;
+    if (state.revocations !== this.#revocations) return "The arm was stopped or changed its driver.";
+    if (state.status === "paused") return "The arm was paused.";
+    if (state.status === "blocked" && this.#distance(state) > HELD_BACK) return `The arm is held back: ${state.why}`;
+    return null;
+  }
+
+  #arrived({ program, sent, setpoint, revocations }) {
+    if (this.#eased === null || sent < this.#eased || !program) return [];
+    if (ENDED.includes(program.status) || program.why.startsWith("Not run"))
+      return this.refused(`The arm did not reach the posture of the leader: ${program.why}`);
+    if (program.status !== "done") return [];
+    [this.phase, this.#revocations, this.#first, this.#finger] = ["settling", revocations, true, null];
+    if (this.#distance({ setpoint }) <= NEAR) return [];
+    return [{ act: "say", text: "The leader has moved. Keep it still, and the arm moves there." }];
+  }
+
+  #settled(t, state) {
+    if (this.#distance(state) <= NEAR) {
+      this.phase = "following";
+      return [{ act: "say", text: "The arm follows the leader." }];
+    }
+    return this.#history.atRest(t) ? this.#ease(state, "The arm moves to the posture of the leader.") : [];
+  }
+
+  #followed(t, state) {
+    const { q, finger } = this.#history.newest;
+    const sample = { act: "sample", q, qd: this.#history.rates(), revocations: this.#revocations, first: this.#first };
+    [this.#first, this.#holds] = [false, true];
+    return [sample, ...this.#gripped(t, finger, state.gripper)];
+  }
+
+  // Return the next target of the fingers, which wait until the jaw has met them.
+  #gripped(t, target, present) {
+    if (target === null || this.#range === null) return [];
+    const span = Math.abs(this.#range[1] - this.#range[0]);
+    if (this.#finger === null) {
+      if (Math.abs(target - present) <= FINGER_NEAR * span) this.#finger = [t, present];
+      return [];
+    }
+    const [then, last] = this.#finger;
+    if (t - then < FINGER_INTERVAL || Math.abs(target - last) < FINGER_STEP * span) return [];
+    this.#finger = [t, target];
+    return [{ act: "finger", angle: target, revocations: this.#revocations }];
+  }
+
+  // Return the largest difference of a joint of the leader from the setpoint.
+  #distance({ setpoint }) {
+    return distance(this.#history.newest.q, setpoint);
   }
 }

@@ -2,40 +2,36 @@
 // leader's posture on a planned path. Everything unexpected ends this, and only a press begins again.
 import { html } from "../instruments/shape.js";
 import { Bus, HOMING_OFFSET, POSITION, TORQUE_ENABLE } from "./bus.js";
-import { calibrationIn, distance, HELD_BACK, History, NEAR, posture, SILENCE } from "./follower.js";
+import { calibrationIn, posture } from "./calibration.js";
+import { Follower } from "./follower.js";
 
 const EVERY = 12; // ms between two readings of the leader
-const LOOK = 150; // ms between two looks at the progress of the program
-const ANSWER = 1000; // ms without an answer to a sample after which the server is silent
-const TAKEN = 5000; // ms within which the server takes the program
-const ENDS = ["stopped", "failed", "refused", "cancelled"]; // of a program that does not arrive
-const FINGER_NEAR = 0.1; // fraction of the fingers' range within which the jaw has met them
-const FINGER_STEP = 0.02; // fraction of the fingers' range
-const FINGER_EVERY = 100; // ms
+const STATE_RATE = 25; // Hz
+const EXPECTED = ["program", "run", "first"]; // requests whose answers count
 const KEPT = "katana450.leader.calibration";
-const [EASE, FOLLOW] = ["leader-ease", "leader"]; // ids of the requests
+const LABELS = { off: "Connect a leader arm", waiting: "Follow the leader" };
 const NEEDED = "Choose the calibration file of LeRobot first.";
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class Leader {
   #say;
+  #watch; // sets the rate of states [Hz]
   #arm; // the description of the arm
   #calibration = null;
-  #bus = null;
-  #history = new History();
-  #phase = "off"; // off, waiting, easing, settling or following
-  #taken = 0; // number of the requests for the program that were answered
-  #revocations = 0;
-  #finger = null; // the fingers' last target and its time, once the jaw has met them
-  #answered = 0;
-  #held = null; // posture of the leader when the arm began to wait before a contact
+  #bus = null; // the connected leader
+  #follower = null; // the rules of the connected leader
+  #state = null; // the newest state of the server, and the time at which it came [s]
+  #asked = false; // whether the person has pressed the button since the last reading
+  #eases = 0; // number of planned motions, which is a part of the ids of their requests
+  #revocations = 0; // number of the state in which the newest of them was decided
+  #taken = false; // whether the server has accepted it, in no state so far
   #file = html("input", { type: "file", accept: ".json", hidden: "", "aria-label": "Calibration of the leader" });
   #button = html("button", { type: "button" });
   #words = html("span", { role: "status" });
 
-  // root: element for the controls. arm: the description of the arm.
-  constructor(root, say, arm) {
-    [this.#say, this.#arm] = [say, arm];
+  // root: element for the controls. say: sends a request. watch: sets the rate of states. arm: the description of the arm.
+  constructor(root, say, watch, arm) {
+    [this.#say, this.#watch, this.#arm] = [say, watch, arm];
     root.replaceChildren(this.#button, html("button", { type: "button", id: "leader-file" }, "Calibration…"), this.#file, this.#words);
     root.querySelector("#leader-file").addEventListener("click", () => this.#file.click());
     this.#file.addEventListener("change", async (event) => {
@@ -45,7 +41,6 @@ export class Leader {
       if (file) this.#calibrate(await file.text(), true);
     });
     this.#button.addEventListener("click", () => this.press());
-    window.addEventListener("status", ({ detail }) => this.#see(detail));
     // The timers of a hidden page are slow.
     document.addEventListener("visibilitychange", () => document.hidden && this.#rest("The page was hidden."));
     const kept = storage()?.getItem(KEPT);
@@ -53,29 +48,37 @@ export class Leader {
     else this.#show(NEEDED);
   }
 
-  // Take an answer of the server; return whether it was for the leader.
-  hear(answer) {
-    if (answer.id === EASE) this.#taken += 1;
-    else if (answer.id === FOLLOW) this.#answered = performance.now();
-    else return false;
-    if (answer.is === "refused" && this.#phase === (answer.id === EASE ? "easing" : "following")) this.#rest(answer.why);
+  // Take a message of the server; return whether it was for the leader alone.
+  hear(message) {
+    if (message.is === "state") {
+      if (this.#taken) this.#follower?.eased(message.sent);
+      [this.#state, this.#taken] = [{ ...message, heard: performance.now() / 1000 }, false];
+      return false;
+    }
+    const [name, number, request] = String(message.id).split(" ");
+    if (name !== "leader") return false;
+    // What the answers to later samples and to the order to end say is in the states, with its reason.
+    if (Number(number) !== this.#eases || !this.#follows || !EXPECTED.includes(request)) return true;
+    if (message.is === "refused") this.#perform(this.#follower.refused(message.why));
+    else if (request === "program") this.#run();
+    else if (request === "run") this.#taken = true;
     return true;
   }
 
   // Connect, begin or end, as the button says.
   async press() {
-    if (this.#phase !== "off" && this.#phase !== "waiting") return this.#rest("You have ended it.");
-    if (!this.#calibration) {
+    if (this.#bus && this.#state) this.#asked = true;
+    // A press must not count later, when the server is back.
+    else if (this.#bus) this.#show("The server does not answer.");
+    else if (this.#calibration) await this.#connect().catch((error) => this.#show(error.message));
+    else {
       this.#show(NEEDED);
-      return this.#file.click();
+      this.#file.click();
     }
-    try {
-      if (this.#phase === "off") await this.#connect();
-      else if (!this.#history.fresh(performance.now())) this.#show("The leader does not answer.");
-      else await this.#ease();
-    } catch (error) {
-      this.#rest(error.message);
-    }
+  }
+
+  get #follows() {
+    return this.#follower !== null && this.#follower.phase !== "waiting";
   }
 
   // keep: whether the person has chosen it now. A connected leader was compared with another one.
@@ -93,9 +96,9 @@ export class Leader {
   async #connect() {
     const { serial } = /** @type {any} */ (navigator);
     const port = await serial.requestPort();
-    const bus = await Bus.on(port);
+    const [bus, calibration] = [await Bus.on(port), this.#calibration];
     try {
-      for (const [name, { id, homing_offset }] of Object.entries(this.#calibration)) {
+      for (const [name, { id, homing_offset }] of Object.entries(calibration)) {
         const found = await bus.read(id, HOMING_OFFSET);
         if (found !== homing_offset)
           throw new Error(`The homing offset of ${name} is ${found} in the motor and ${homing_offset} in the calibration file. Choose the file of this leader.`);
@@ -105,119 +108,72 @@ export class Leader {
       await bus.close();
       throw error;
     }
-    [this.#bus, this.#phase] = [bus, "waiting"];
-    this.#show("Connected. The arm moves to the posture of the leader first. Keep the leader still.");
-    this.#read();
+    [this.#bus, this.#follower, this.#state, this.#asked] = [bus, new Follower(this.#arm.gripper), null, false];
+    this.#watch(STATE_RATE);
+    this.#show("Connected. Follow the leader first moves the arm to its posture. Keep it still meanwhile.");
+    this.#read(bus, calibration);
   }
 
   // Read the leader until its port is lost.
-  async #read() {
-    const ids = Object.values(this.#calibration).map(({ id }) => id);
-    for (let due = performance.now(); !this.#bus.lost; due = Math.max(due + EVERY, performance.now())) {
-      const ticks = await this.#bus.readAll(ids, POSITION);
-      const t = performance.now();
-      if (!["off", "waiting"].includes(this.#phase) && !this.#history.fresh(t))
-        this.#rest(`The leader has sent no valid posture for ${SILENCE / 1000} s.`);
-      if (ticks && this.#history.add(t, posture(this.#calibration, this.#arm, ticks)) && this.#phase === "following") this.#follow(t);
+  async #read(bus, calibration) {
+    const ids = Object.values(calibration).map(({ id }) => id);
+    for (let due = performance.now(); !bus.lost; due = Math.max(due + EVERY, performance.now())) {
+      const ticks = await bus.readAll(ids, POSITION);
+      if (!bus.lost) this.#step(ticks && posture(calibration, this.#arm, ticks));
       await pause(Math.max(due + EVERY - performance.now(), 0));
     }
-    this.#rest(this.#bus.lost, "off");
-    await this.#bus.close();
+    const moved = this.#follows;
+    this.#rest(bus.lost);
+    this.#watch(0);
+    [this.#bus, this.#follower] = [null, null];
+    this.#show(moved ? this.#words.textContent : bus.lost);
+    await bus.close();
   }
 
-  // Move to the leader's posture on a planned path until both are near each other, then follow.
-  async #ease() {
-    this.#phase = "easing";
-    while (this.#phase === "easing") {
-      this.#show("The arm moves to the posture of the leader. Keep the leader still.");
-      const state = await this.#arrived();
-      if (!state) return;
-      [this.#revocations, this.#phase] = [state.revocations, "settling"];
-      const far = () => distance(this.#history.newest.q, state.setpoint) > NEAR;
-      if (far()) this.#show("The leader has moved. Keep it still, and the arm moves there.");
-      while (far() && !this.#history.atRest(performance.now())) {
-        await pause(EVERY);
-        if (this.#phase !== "settling") return;
-      }
-      if (!far()) return this.#begin(state.gripper);
-      this.#phase = "easing";
+  #step(found) {
+    if (!this.#state) return;
+    const asked = this.#asked;
+    this.#asked = false;
+    this.#perform(this.#follower.step(performance.now() / 1000, found, this.#state, this.#state.heard, asked));
+  }
+
+  // Follow no longer, so that the arm comes to rest by itself.
+  #rest(why) {
+    if (this.#follows) this.#perform(this.#follower.rest(why));
+  }
+
+  #perform(actions) {
+    for (const { act, text, first, ...fields } of actions) {
+      if (act === "say") this.#show(text);
+      else if (act === "ease") this.#ease(fields);
+      else if (act === "end") this.#say({ do: "steer", order: "end", id: this.#id("end") });
+      else if (act === "sample") this.#say({ do: "servo", ...fields, id: this.#id(first ? "first" : "sample") });
+      else if (act === "finger") this.#say({ do: "gripper", ...fields, id: this.#id("sample") });
+      // After "release" the window keeps its lease, as after every other motion.
     }
   }
 
-  // Run the program that moves to the leader's posture. Return the state at its end; nothing if it was ended.
-  async #arrived() {
-    const angles = this.#history.newest.q.map((angle) => ((angle * 180) / Math.PI).toFixed(4));
+  // Send a program that moves the arm to `q` on a planned path.
+  #ease({ q, revocations }) {
+    [this.#eases, this.#taken, this.#revocations] = [this.#eases + 1, false, revocations];
+    const angles = q.map((angle) => ((angle * 180) / Math.PI).toFixed(4));
     const text = `name: Leader\nsteps:\n  - joints: [${angles.join(", ")}]\n`;
-    const { revocations } = await latestState();
-    const due = performance.now() + TAKEN;
-    this.#taken = 0;
-    // Both at once, so that an order to end it can't come between.
-    this.#say({ do: "program", text, revocations, id: EASE });
-    this.#say({ do: "steer", order: "run", revocations, id: EASE });
-    while (this.#phase === "easing") {
-      await pause(LOOK);
-      const taken = this.#taken > 1;
-      if (!taken && performance.now() > due) return this.#rest("The server does not answer.");
-      const now = taken ? await latestState() : null;
-      const { status, why } = now?.program ?? {};
-      if (this.#phase !== "easing") return;
-      if (now?.stopped) return this.#rest(`The arm was stopped: ${now.stopped}`);
-      if (ENDS.includes(status) || why?.startsWith("Not run")) return this.#rest(`The arm did not reach the posture of the leader: ${why}`);
-      if (status === "done") return now;
-    }
+    this.#say({ do: "program", text, revocations, id: this.#id("program") });
   }
 
-  #begin(finger) {
-    this.#phase = "following";
-    this.#answered = performance.now();
-    this.#finger = { met: false, to: finger, at: 0 };
-    this.#show("The arm follows the leader.");
+  // Run the program. Only once it is accepted: the order would run another program of this window.
+  #run() {
+    this.#say({ do: "steer", order: "run", revocations: this.#revocations, id: this.#id("run") });
   }
 
-  #follow(t) {
-    if (t - this.#answered > ANSWER) return this.#rest("The server does not answer.");
-    const { q, finger } = this.#history.newest;
-    if (this.#held && distance(q, this.#held) > HELD_BACK) return this.#rest("The arm is held back by a contact.");
-    const fields = { revocations: this.#revocations, id: FOLLOW };
-    this.#say({ do: "servo", q, qd: this.#history.rates(), ...fields });
-    if (finger === null) return;
-    const span = Math.abs(this.#arm.gripper[1] - this.#arm.gripper[0]);
-    const far = Math.abs(finger - this.#finger.to) / span;
-    this.#finger.met ||= far < FINGER_NEAR;
-    if (!this.#finger.met || far < FINGER_STEP || t - this.#finger.at < FINGER_EVERY) return;
-    this.#finger = { met: true, to: finger, at: t };
-    this.#say({ do: "gripper", angle: finger, ...fields });
-  }
-
-  // Take the status of the bar.
-  #see(status) {
-    if (this.#phase === "off" || this.#phase === "waiting") return;
-    this.#held = status.mood === "blocked" ? (this.#held ?? this.#history.newest.q) : null;
-    if (status.stopped) this.#rest(`The arm was stopped: ${status.stopped}`);
-    else if (this.#phase === "easing") return;
-    else if (status.revocations !== this.#revocations) this.#rest("The arm was stopped or changed its driver.");
-    else if (status.paused_at) this.#rest("The arm was paused.");
-  }
-
-  // Send no more, so that the arm comes to rest by itself.
-  #rest(why, phase = this.#bus && !this.#bus.lost ? "waiting" : "off") {
-    if (this.#phase === "easing") this.#say({ do: "steer", order: "end", id: FOLLOW });
-    const moved = !["off", "waiting"].includes(this.#phase);
-    this.#phase = phase;
-    this.#show(moved ? `${why} The arm rests.` : why);
+  #id(request) {
+    return `leader ${this.#eases} ${request}`;
   }
 
   #show(words) {
-    const labels = { off: "Connect a leader arm", waiting: "Follow the leader" };
-    this.#button.textContent = labels[this.#phase] ?? "End following";
+    this.#button.textContent = LABELS[this.#follower?.phase ?? "off"] ?? "End following";
     this.#words.textContent = words;
   }
-}
-
-async function latestState() {
-  const answer = await fetch("api/v1/state");
-  if (!answer.ok) throw new Error(await answer.text());
-  return answer.json();
 }
 
 // A browser may refuse to store anything.

@@ -52,6 +52,69 @@ SERIAL = """([offsets, middle, start]) => {
   Object.defineProperty(navigator, "serial", {value: serial, configurable: true});
 }"""
 
+RULES = """async (text) => {
+  const {Follower} = await import("/static/leader/follower.js");
+  const {inputs, fingers} = JSON.parse(text);
+  const follower = new Follower(fingers);
+  return JSON.stringify(inputs.map(({t, posture, state, heard, asked, eased}) => {
+    const acts = follower.step(t, posture, state, heard, asked);
+    if (eased !== undefined) follower.eased(eased);
+    return [follower.phase, ...acts];
+  }));
+}"""
+"""Returns what the machine of the page does with the inputs of a script, all as JSON texts."""
+
+POSTURES = """async ([text, arm, all]) => {
+  const {calibrationIn, posture} = await import("/static/leader/calibration.js");
+  return all.map((ticks) => posture(calibrationIn(text), arm, new Map(ticks)));
+}"""
+"""Returns the postures that the page finds at positions of the motors."""
+
+PACKETS = """async (parts) => {
+  const {HOMING_OFFSET, packets, value} = await import("/static/leader/bus.js");
+  const all = [];
+  let rest = [];
+  for (const part of parts) {
+    const read = packets([...rest, ...part]);
+    all.push(...read.found);
+    rest = read.rest;
+  }
+  return all.map(({id, code, parameters}) =>
+    [id, code, parameters, value(HOMING_OFFSET, parameters.slice(0, 2))]);
+}"""
+"""Returns the packets that the page finds in a stream that comes in parts, and a value of each."""
+
+REFUSED = """async ([arm, text]) => {
+  localStorage.setItem("katana450.leader.calibration", text);
+  const {Leader} = await import("/static/leader/leader.js");
+  const said = [];
+  const watch = () => {};
+  const panel = new Leader(document.createElement("p"), (each) => said.push(each), watch, arm);
+  const state = {is: "state", setpoint: [0, 0, 0, 0, 0], stopped: null, revocations: 0,
+    program: null, status: "ok", gripper: 0, moving: false, why: "", sent: 1};
+  const until = async (found) => {
+    while (!found()) {
+      panel.hear(state);
+      await new Promise((resolve) => setTimeout(resolve, 10));
+    }
+  };
+  await panel.press();
+  await until(() => leader.torque.every((each) => !each));
+  await new Promise((resolve) => setTimeout(resolve, 200));
+  panel.hear(state);
+  await panel.press();
+  await until(() => said.length);
+  const heard = panel.hear({is: "refused", why: "A program is running.", id: said[0].id});
+  for (let i = 0; i < 20; i += 1) {
+    panel.hear(state);
+    await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+  localStorage.removeItem("katana450.leader.calibration");
+  leader.unplug();
+  return [heard, ...said.map((each) => each.do)];
+}"""
+"""Returns the requests of a leader whose program is refused."""
+
 TURNED = 0.2
 """[rad] Angle by which the leader's pan is turned."""
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import msgspec
-import numpy as np
 import pytest
 
 from katana450.extensions.leader.follower import (
@@ -14,90 +12,13 @@ from katana450.extensions.leader.follower import (
     Ease,
     EndEase,
     FingerTarget,
-    Follower,
     LeadPhase,
     ReleaseControl,
     Sample,
     Say,
 )
-from katana450.extensions.leader.joint_map import LeaderPosture
-from katana450.server.api import answers
-
-N = 5
-PERIOD = 0.01
-FINGERS = (0.0, 1.0)
-
-
-def posture(angle: float, finger: float = 0.5) -> LeaderPosture:
-    q = np.full(N, angle)
-    return LeaderPosture(q, q, finger)
-
-
-class Bench:
-    """A follower with a server and a leader of which the test is in charge."""
-
-    def __init__(self) -> None:
-        self.follower = Follower(FINGERS)
-        self.t = 100.0
-        self.angle, self.finger = 0.3, 0.5
-        self.answers = True
-        self.server_answers = True
-        self.heard = self.t
-        self.values: dict[str, Any] = {
-            "setpoint": [0.0] * N,
-            "stopped": None,
-            "revocations": 4,
-            "program": None,
-            "status": "ok",
-            "gripper": 0.5,
-            "moving": False,
-            "why": "",
-            "sent": 0.0,
-        }
-
-    def step(self, count: int = 1, *, asked: bool = False) -> list[Action]:
-        """Advance by periods; return the actions of all."""
-        found: list[Action] = []
-        for _ in range(count):
-            self.t += PERIOD
-            if self.server_answers:
-                self.heard = self.t
-                self.values["sent"] = self.t
-            given = posture(self.angle, self.finger) if self.answers else None
-            state = msgspec.convert(self.values, _State)
-            found += self.follower.step(self.t, given, state, self.heard, asked=asked)  # type: ignore[arg-type]
-        return found
-
-    def arrive(self, angle: float) -> None:
-        """Let the program move the arm to ``angle``."""
-        self.follower.eased(self.t)
-        self.values |= {"setpoint": [angle] * N, "program": _program("done"), "revocations": 5}
-
-    def follow(self) -> None:
-        """Begin to follow."""
-        self.step(5)
-        self.step(asked=True)
-        self.arrive(self.angle)
-        self.step(3)
-        assert self.follower.phase is LeadPhase.FOLLOWING
-
-
-class _State(msgspec.Struct):
-    """The part of a state that the follower reads."""
-
-    setpoint: list[float]
-    stopped: str | None
-    revocations: int
-    program: answers.Progress | None
-    status: str
-    gripper: float
-    moving: bool
-    why: str
-    sent: float
-
-
-def _program(status: str, why: str = "") -> dict[str, str]:
-    return {"name": "Leader", "by": "Leader", "status": status, "why": why}
+from tests.leader.follower_bench import PERIOD, Bench, N, program
+from tests.leader.scripted_leader import scripted
 
 
 def texts(actions: list[Action]) -> str:
@@ -115,7 +36,7 @@ def test_arm_eases_to_the_leader_and_then_follows_with_rates() -> None:
     assert eases[0].q == pytest.approx([0.3] * N)
     assert eases[0].revocations == 4
     # A program that ended before does not count as the present one.
-    bench.values["program"] = _program("done")
+    bench.values["program"] = program("done")
     assert not bench.step(10)
     bench.arrive(0.3)
     assert "follows" in texts(bench.step(2))
@@ -186,7 +107,7 @@ def test_program_that_does_not_arrive_ends_it(status: str) -> None:
     bench.step(5)
     bench.step(asked=True)
     bench.arrive(0.0)
-    bench.values["program"] = _program(status, "Not run: the arm has moved.")
+    bench.values["program"] = program(status, "Not run: the arm has moved.")
     assert "did not reach" in texts(bench.step())
     assert bench.follower.phase is LeadPhase.WAITING
 
@@ -210,6 +131,20 @@ def test_stopped_arm_and_silent_leader_refuse_to_begin() -> None:
     bench.step(150)
     assert "does not answer" in texts(bench.step(asked=True))
     assert bench.follower.phase is LeadPhase.WAITING
+
+
+def test_silent_leader_does_not_count_as_one_at_rest() -> None:
+    bench = Bench()
+    bench.step(60)
+    bench.step(asked=True)
+    bench.step(60)
+    bench.answers = False
+    # Its last postures are equal, but 0.3 s old.
+    bench.step(30)
+    bench.arrive(0.0)
+    assert not any(isinstance(each, Ease) for each in bench.step(30))
+    bench.answers = True
+    assert any(isinstance(each, Ease) for each in bench.step())
 
 
 def test_jumps_are_refused_and_end_it_if_they_last() -> None:
@@ -262,3 +197,10 @@ def test_fingers_wait_until_the_jaw_has_met_them() -> None:
     assert 3 <= len(grips) <= 10
     assert max(each.angle for each in grips) < 0.6
     assert grips[-1].angle < 0.15
+
+
+def test_random_script_reaches_every_phase_and_action() -> None:
+    _, results = scripted(seed=1)
+    assert {phase for phase, *_ in results} == {each.value for each in LeadPhase}
+    done = {each["act"] for _, *acts in results for each in acts}
+    assert done == {"say", "ease", "end", "sample", "finger", "release"}

@@ -10,7 +10,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from katana450.client.files import LostError
 from katana450.errors import InputError
 from katana450.extensions.leader.calibration import decoded_calibration, read_calibration
 from katana450.extensions.leader.joint_map import JointMap
@@ -146,6 +145,12 @@ def test_layout_of_another_leader(tmp_path: Path) -> None:
     assert isinstance(layout, Layout)
 
 
+def test_layout_with_a_motor_twice_is_refused() -> None:
+    twice = msgspec.structs.replace(SO101, axes=(*SO101.axes[:4], SO101.axes[0]))
+    with pytest.raises(InputError, match="names a motor twice"):
+        JointMap(decoded_calibration(calibrated()), twice, arm())
+
+
 class WiredPort:
     """A port with the emulated motors behind it, which gives the bytes in small parts."""
 
@@ -154,18 +159,14 @@ class WiredPort:
         self._waiting = b""
         self.noise = b""
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, timeout: float) -> None:
+        assert timeout > 0.0
         self._waiting = self.noise + self.motors.answer(data)
 
-    def read(self) -> bytes:
+    def read(self, timeout: float) -> bytes:
+        assert timeout > 0.0
         data, self._waiting = self._waiting[:3], self._waiting[3:]
         return data
-
-    def discard(self) -> None:
-        self._waiting = b""
-
-    def close(self) -> None:
-        raise LostError("It is never closed.")
 
 
 def test_bus_reads_the_motors_through_noise() -> None:

@@ -193,3 +193,16 @@ def test_serial_device_is_used_like_a_socket() -> None:
 def test_serial_device_that_does_not_exist_is_reported() -> None:
     with pytest.raises(LinkLostError, match="cannot be opened"):
         ArmUrl("/dev/no-such-device", None).open()
+
+
+def test_unplugged_serial_device_is_reported() -> None:
+    pty = pytest.importorskip("pty")
+    master, slave = pty.openpty()
+    port = ArmUrl(os.ttyname(slave), None).open()
+    os.close(slave)
+    os.close(master)
+    with pytest.raises(LinkLostError, match="connection to the arm is lost"):
+        port.write(b"z", 0.1)
+    with pytest.raises(LinkLostError, match="connection to the arm is lost"):
+        port.read(0.1)
+    port.close()

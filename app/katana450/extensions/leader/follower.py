@@ -2,8 +2,8 @@
 
 The arm first moves to the leader's posture on a planned path. It follows only once both are near
 each other. Everything unexpected ends this: the samples end, the arm comes to rest by itself, and
-nothing moves again before a person asks for it. The page follows the same rules in
-static/leader/follower.js.
+nothing moves again before a person asks for it. The page has the same machine in
+static/leader/follower.js, which is compared with this one in tests/browser.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ NEAR = 0.09
 HELD_BACK = 0.5
 """[rad] Difference at which an arm that waits before a contact no longer follows."""
 
-SERVER_SILENCE = 0.6
-"""[s] Time without a state of the server after which the arm no longer follows."""
+SERVER_SILENCE = 1.0
+"""[s] Time without a state of the server after which the arm no longer follows. A page that draws
+slowly is late by up to 0.6 s."""
 
 FINGER_NEAR = 0.1
 """[1] Fraction of the range of the fingers within which the leader's jaw has met them."""
@@ -94,7 +95,7 @@ class FingerTarget:
 
 @dataclass(frozen=True)
 class ReleaseControl:
-    """ReleaseControl the lease, so that other people may clear a stop and drive."""
+    """Release the lease, so that other people may clear a stop and drive."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,7 @@ class Follower:
         )
 
     def _released(self, t: float, state: answers.State, heard: float) -> list[Action]:
-        """ReleaseControl the lease once the arm is at rest."""
+        """Release the lease once the arm is at rest."""
         if not self._holds or state.moving or t - heard > SERVER_SILENCE:
             return []
         self._holds = False

@@ -60,6 +60,8 @@ class JointMap:
             self.finger_range = arm.gripper[:2]
         found = [motor.id for motor, _ in self._axes]
         self.motors = tuple(found if self._finger is None else [*found, self._finger[0].id])
+        if len(set(self.motors)) < len(self.motors):
+            raise InputError("The layout of the leader names a motor twice. Each moves one joint.")
         self._lower = np.array(arm.lower) + LIMIT_MARGIN
         self._upper = np.array(arm.upper) - LIMIT_MARGIN
 

@@ -27,10 +27,15 @@ from katana450.extensions.leader.follower import (
 )
 from katana450.extensions.leader.joint_map import JointMap, LeaderPosture
 from katana450.extensions.leader.layout import SO101, read_layout
-from katana450.extensions.leader.motor_bus import MotorBus, SilentLeaderError
+from katana450.extensions.leader.motor_bus import (
+    BAUD,
+    MotorBus,
+    SilentLeaderError,
+    UnpluggedError,
+)
 from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, TORQUE_ENABLE
-from katana450.extensions.leader.serial_port import SerialPort, UnpluggedError
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
+from katana450.extensions.serial_port import SerialPort
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
 
@@ -53,7 +58,7 @@ def lead(options: Namespace) -> int:
     """Run ``katana450 leader`` and return the exit status. Raises KatanaError."""
     calibration = read_calibration(options.calibration)
     layout = SO101 if options.layout is None else read_layout(options.layout)
-    port = SerialPort(options.port)
+    port = SerialPort(options.port, BAUD, "the leader", UnpluggedError)
     try:
         bus = MotorBus(port)
 
@@ -197,6 +202,7 @@ class LeaderRun:
             # First, so that it sends no order to run after the order to end.
             self._easing.cancel()
             await asyncio.gather(self._easing, return_exceptions=True)
+            self._easing = None
         with suppress(RefusedError):
             await self._client.ask(Steer(order=ProgramOrder.END))
 

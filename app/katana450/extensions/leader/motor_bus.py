@@ -10,8 +10,14 @@ from katana450.errors import KatanaError
 from katana450.extensions.leader import packets
 from katana450.extensions.leader.packets import MotorError, Packet, PacketReader, Register
 
+BAUD = 1_000_000
+"""[bit/s] Rate of an STS3215 as delivered."""
+
 DEADLINE = 0.05
 """[s] Timeout for the answers to a request. Adapters for USB hold bytes back for up to 16 ms."""
+
+READ_TIMEOUT, WRITE_TIMEOUT = 0.005, 1.0
+"""[s] Timeouts of one read, which may return a part of an answer, and of a request."""
 
 TRIES = 3
 """Number of times that a request is sent before the motor counts as silent."""
@@ -21,23 +27,18 @@ class SilentLeaderError(KatanaError):
     """A motor of the leader does not answer."""
 
 
+class UnpluggedError(KatanaError):
+    """The serial port of the leader cannot be opened, or is lost."""
+
+
 class Port(Protocol):
-    """A serial port."""
+    """A serial port. Its methods raise UnpluggedError."""
 
-    def write(self, data: bytes) -> None:
-        """Send ``data``. Raises KatanaError if the port is lost."""
+    def write(self, data: bytes, timeout: float) -> None:
+        """Send ``data`` within ``timeout`` [s], and drop the bytes that wait to be read."""
 
-    def read(self) -> bytes:
-        """Return the bytes that arrive within some milliseconds. Raises KatanaError as ``write``.
-
-        The bytes of an answer may come in several parts.
-        """
-
-    def discard(self) -> None:
-        """Drop the bytes that wait to be read. Raises KatanaError as ``write``."""
-
-    def close(self) -> None:
-        """Close the port; it may be lost."""
+    def read(self, timeout: float) -> bytes:
+        """Return the bytes that arrive, which may be none, within ``timeout`` [s]."""
 
 
 class MotorBus:
@@ -83,13 +84,12 @@ class MotorBus:
 
     def _exchange(self, request: Packet, motors: tuple[int, ...], size: int) -> dict[int, Packet]:
         """Send ``request``; return the answers of ``motors`` with ``size`` bytes, by their ids."""
-        self._port.discard()
         self._reader.clear()
-        self._port.write(request.encoded)
+        self._port.write(request.encoded, WRITE_TIMEOUT)
         found: dict[int, Packet] = {}
         due = time.monotonic() + DEADLINE
         while len(found) < len(motors) and time.monotonic() < due:
-            for packet in self._reader.feed(self._port.read()):
+            for packet in self._reader.feed(self._port.read(READ_TIMEOUT)):
                 if packet.id in motors and len(packet.parameters) == size:
                     found[packet.id] = packet
         return found

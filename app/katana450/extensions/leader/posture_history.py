@@ -84,7 +84,7 @@ class PostureHistory:
 
     def at_rest(self, t: float) -> bool:
         """Return whether the leader was at rest for REST_TIME until ``t``."""
-        if not self.fresh(t) or t - self._begun < REST_TIME:
+        if not self._postures or t - self._postures[-1][0] > GAP or t - self._begun < REST_TIME:
             return False
         q = np.array([posture.q for _, posture in self._postures])
         return float(np.ptp(q, axis=0).max()) <= REST_ANGLE

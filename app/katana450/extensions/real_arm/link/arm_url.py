@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from katana450.errors import InputError
-from katana450.extensions.real_arm.link.serial_port import SerialTransport
+from katana450.extensions.real_arm.link.serial_port import serial_transport
 from katana450.extensions.real_arm.link.tcp import PORT, TcpTransport
 from katana450.extensions.real_arm.link.transport import Transport
 
@@ -50,7 +50,7 @@ class ArmUrl:
     def open(self) -> Transport:
         """Connect, and return the connection. Raises LinkLostError and ConfigurationError."""
         if self.port is None:
-            return SerialTransport(self.host)
+            return serial_transport(self.host)
         return TcpTransport(self.host, self.port, CONNECT_TIMEOUT)
 
     def __str__(self) -> str:

@@ -1,0 +1,88 @@
+"""A follower with a server and a leader that a test moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from katana450.extensions.leader.follower import Action, Follower, LeadPhase
+from katana450.extensions.leader.joint_map import LeaderPosture
+from katana450.server.api import answers
+
+N = 5
+PERIOD = 0.01
+FINGERS = (0.0, 1.0)
+
+
+def posture(angle: float, finger: float = 0.5) -> LeaderPosture:
+    q = np.full(N, angle)
+    return LeaderPosture(q, q, finger)
+
+
+class Bench:
+    """A follower with a server and a leader of which the test is in charge."""
+
+    def __init__(self) -> None:
+        self.follower = Follower(FINGERS)
+        self.t = 100.0
+        self.angle, self.finger = 0.3, 0.5
+        self.answers = True
+        self.server_answers = True
+        self.heard = self.t
+        self.values: dict[str, Any] = {
+            "setpoint": [0.0] * N,
+            "stopped": None,
+            "revocations": 4,
+            "program": None,
+            "status": "ok",
+            "gripper": 0.5,
+            "moving": False,
+            "why": "",
+            "sent": 0.0,
+        }
+
+    def step(self, count: int = 1, *, asked: bool = False) -> list[Action]:
+        """Advance by periods; return the actions of all."""
+        found: list[Action] = []
+        for _ in range(count):
+            self.t += PERIOD
+            if self.server_answers:
+                self.heard = self.t
+                self.values["sent"] = self.t
+            given = posture(self.angle, self.finger) if self.answers else None
+            state = msgspec.convert(self.values, ServerState)
+            found += self.follower.step(self.t, given, state, self.heard, asked=asked)  # type: ignore[arg-type]
+        return found
+
+    def arrive(self, angle: float) -> None:
+        """Let the program move the arm to ``angle``."""
+        self.follower.eased(self.t)
+        self.values |= {"setpoint": [angle] * N, "program": program("done"), "revocations": 5}
+
+    def follow(self) -> None:
+        """Begin to follow."""
+        self.step(5)
+        self.step(asked=True)
+        self.arrive(self.angle)
+        self.step(3)
+        assert self.follower.phase is LeadPhase.FOLLOWING
+
+
+class ServerState(msgspec.Struct):
+    """The part of a state that the follower reads."""
+
+    setpoint: list[float]
+    stopped: str | None
+    revocations: int
+    program: answers.Progress | None
+    status: str
+    gripper: float
+    moving: bool
+    why: str
+    sent: float
+
+
+def program(status: str, why: str = "") -> dict[str, str]:
+    return {"name": "Leader", "by": "Leader", "status": status, "why": why}
