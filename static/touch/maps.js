@@ -4,7 +4,7 @@ import { clamp, html, set, signed, write } from "../instruments/shape.js";
 const ROWS = 16; // taxels along a finger, from the palm to the tip
 const COLUMNS = 8;
 const FULL = 50_000; // Pa, pressure of the last colour
-const [LENGTH, WIDTH] = [74.4, 19.2]; // mm of a pad
+const [LENGTH, WIDTH] = [74.5, 19.2]; // mm of a pad
 const MM = 1000;
 // Colours of hardly any pressure, a third, two thirds and the full one, as on the fingers in the scene.
 const COLOURS = [[46, 94, 200], [20, 164, 156], [246, 196, 40], [226, 52, 40]];

@@ -10,6 +10,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import runner
+from katana450.extensions.programs.grip_until import CloseUntil
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
@@ -128,6 +129,17 @@ def test_grip_without_an_object_is_refused_and_fails_at_run_time(
         run, state = stage.tick(program, run, state)
     assert run.phase is Phase.FAILED
     assert "closed on nothing instead of part" in run.why
+
+
+def test_object_that_is_too_thin_at_run_time_ends_it_at_once(stage: Stage, holding: State) -> None:
+    program = compiled(parse("steps:\n- grip: {until: 9 N}\n"), stage.plan_context, holding)
+    (action,) = (task.action for task in program.tasks if isinstance(task.action, CloseUntil))
+    assert action.correction(holding)
+    # As if the fingers had closed on it near the end of their range.
+    assert holding.grip is not None
+    end = replace(action, closed=holding.grip - 1e-3)
+    with pytest.raises(InputError, match=r"part is too thin: .* before they press with 9 N"):
+        end.correction(holding)
 
 
 def test_gripper_without_known_pads_is_refused(stage: Stage, holding: State) -> None:

@@ -216,6 +216,13 @@ def test_map_takes_less_than_five_percent_of_a_processor_at_30_hertz(
     assert sorted(took)[len(took) // 4] < (0.05 if LONG else 0.1) / 30.0
 
 
+def test_equal_objects_share_the_work_of_a_grip(model: TouchModel, holding: State) -> None:
+    before = model.squeeze(holding)
+    # As in a state from a pipe in which another object has moved.
+    objects = tuple(replace(each) for each in holding.objects)
+    assert model.squeeze(replace(holding, objects=objects)) is before
+
+
 def test_object_beside_the_pads_has_no_force_and_does_not_slip(
     session: Session, model: TouchModel, holding: State
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -19,7 +18,6 @@ from katana450.extensions.touch.gripper_sensors import (
     MAX_VALUE,
     SATURATION_DISTANCE,
     GripperSensors,
-    distance_of,
     distance_value,
     force_value,
 )
@@ -59,8 +57,6 @@ def test_light_falls_with_the_square_of_the_distance() -> None:
     assert distance_value(0.0) == distance_value(SATURATION_DISTANCE) == MAX_VALUE
     assert distance_value(2.0 * SATURATION_DISTANCE) == 64
     assert distance_value(MAX_DISTANCE) == 0
-    assert distance_of(distance_value(0.05)) == pytest.approx(0.05, rel=0.02)
-    assert distance_of(0) == math.inf
 
 
 def test_force_is_scaled_to_the_value_of_holding() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +14,17 @@ import viser
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot
-from katana450.extensions.touch.pad_patches import HIDDEN, PadPatches, pressure_colours
+from katana450.extensions.touch.pad import COLUMNS, ROWS
+from katana450.extensions.touch.pad_patches import (
+    COLOURS,
+    FULL_PRESSURE,
+    HIDDEN,
+    PadPatches,
+    pressure_colours,
+)
+from katana450.extensions.touch.touch_model import TouchModel
+from katana450.maths.collision.clearance import STOP
+from katana450.resources import STATIC
 from tests.browser.server import free_port
 
 
@@ -65,3 +76,20 @@ def test_colours_rise_with_the_pressure() -> None:
     blue, *_, red = pressure_colours(np.array((0.0, 25e3, 1e9)))
     assert blue[2] > blue[0]
     assert red[0] > red[2]
+
+
+def test_page_draws_pads_with_the_same_numbers(model: TouchModel) -> None:
+    script = (STATIC / "touch" / "maps.js").read_text(encoding="utf-8")
+    (pad, _) = model.pads
+
+    def constant(name: str) -> Any:
+        return json.loads(script.split(f"const {name} = ")[1].split(";")[0].replace("_", ""))
+
+    assert (constant("ROWS"), constant("COLUMNS")) == (ROWS, COLUMNS)
+    assert constant("FULL") == FULL_PRESSURE
+    assert constant("COLOURS") == COLOURS.tolist()
+    assert constant("[LENGTH, WIDTH]") == pytest.approx(
+        [1e3 * pad.length, 1e3 * pad.width], abs=0.05
+    )
+    rumble = (STATIC / "touch" / "rumble.js").read_text(encoding="utf-8")
+    assert f"const STOP = {STOP:g};" in rumble

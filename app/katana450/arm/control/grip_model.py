@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -14,5 +15,5 @@ class GripModel(Protocol):
     def overload(self, state: State) -> float | None:
         """Return the load [N] that pulls the held object out of the fingers; None if they hold."""
 
-    def report(self, state: State) -> dict[str, Any]:
+    def report(self, state: State) -> Mapping[str, Any]:
         """Return forces, pressures and sensor values of ``state`` for the answer to a query."""

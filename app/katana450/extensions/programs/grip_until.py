@@ -24,16 +24,22 @@ FORCE_TOLERANCE = 0.02
 """[1] Relative difference from the force that counts as reached."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CloseUntil(MoveFingers):
     """Close the fingers until they press with ``force`` [N].
 
     The angle is that which the plan predicts. An object that is thicker or thinner than predicted
     changes it.
+
+    Attributes:
+        force: [N].
+        model: the forces of the fingers.
+        closed: end of the range of the finger joint [rad].
     """
 
-    force: float = 0.0
-    model: TouchModel | None = None
+    force: float
+    model: TouchModel
+    closed: float
 
     def done(self, state: State, waited: float) -> bool:
         """Return whether the fingers press with the force.
@@ -41,15 +47,7 @@ class CloseUntil(MoveFingers):
         Raises InputError after the timeout of a motion of the fingers, and if they hold nothing or
         something else than they must.
         """
-        if not super().done(state, waited):
-            return False
-        if state.held is None:
-            raise InputError(
-                f"The fingers have closed without an object between them, so they cannot press "
-                f"with {self.force:g} N."
-            )
-        assert self.model is not None
-        found = self.model.squeeze(state)
+        found = self.model.squeeze(state) if super().done(state, waited) else None
         return found is not None and abs(found.force - self.force) <= FORCE_TOLERANCE * self.force
 
     def correction(self, state: State) -> tuple[cmd.Command, ...]:
@@ -57,10 +55,25 @@ class CloseUntil(MoveFingers):
 
         Raises InputError for a force that they cannot have there.
         """
-        assert self.model is not None
         if state.held is None or state.grip is None:
             return ()
-        return (cmd.SetGripper(state.grip - self.model.squeeze_for(state, self.force)),)
+        return (cmd.SetGripper(_angle_for(self.force, self.model, state, self.closed)),)
+
+
+def _angle_for(force: float, model: TouchModel, state: State, closed: float) -> float:
+    """Return the finger joint [rad] at which ``force`` [N] acts on what the fingers hold.
+
+    Raises InputError for a force that they cannot have there, also beyond ``closed`` [rad].
+    """
+    squeeze = model.squeeze_for(state, force)
+    assert state.grip is not None
+    assert state.held is not None
+    if state.grip - squeeze < closed:
+        raise InputError(
+            f"{state.held.name} is too thin: the fingers reach the end of their range before they "
+            f"press with {force:g} N."
+        )
+    return state.grip - squeeze
 
 
 @dataclass(frozen=True)
@@ -107,13 +120,10 @@ class GripUntil:
                 f"The fingers would hold {closed.held.name} instead of {self.holding}, which has "
                 "to stand where they close."
             )
-        angle = closed.grip - model.squeeze_for(closed, self.force)
-        if angle < fingers.lower:
-            raise InputError(
-                f"{closed.held.name} is too thin: the fingers reach the end of their range before "
-                f"they press with {self.force:g} N."
-            )
-        action = CloseUntil(angle, closed.held.name, self.force, model)
+        angle = _angle_for(self.force, model, closed, fingers.lower)
+        action = CloseUntil(
+            angle, closed.held.name, force=self.force, model=model, closed=fingers.lower
+        )
         builder.state = closed
         builder.note(f"grip until {self.force:g} N", action, builder.after(cmd.SetGripper(angle)))
 

@@ -28,31 +28,17 @@ SATURATION_DISTANCE = 15e-3
 MAX_DISTANCE = SATURATION_DISTANCE * math.sqrt(2.0 * MAX_VALUE)
 """[m] Distance from which an infrared sensor reads 0."""
 
-INDICES = {
-    "right_near_distance": 0,
-    "right_far_distance": 1,
-    "conductivity": 3,
-    "right_outer_distance": 4,
-    "right_tip_distance": 5,
-    "right_rear_force": 6,
-    "right_front_force": 7,
-    "left_near_distance": 8,
-    "left_far_distance": 9,
-    "centre_distance": 11,
-    "left_outer_distance": 12,
-    "left_tip_distance": 13,
-    "left_rear_force": 14,
-    "left_front_force": 15,
-}
-"""Place of each sensor among the 16 values. Places 2 and 10 are reserved. The places are those of
-Fawkes (`KatanaInterface`) and of the configuration of Bielefeld, which agree."""
+RESERVED = (2, 10)
+"""Places among the values that stand for no sensor."""
 
 
 @dataclass(frozen=True)
 class GripperSensors:
-    """Values of the sensors, each from 0 to 255.
+    """Values of the sensors, each from 0 to 255, in the order in which the controller sends them.
 
-    Infrared sensors measure how much light an object reflects, so the value grows as it comes near.
+    The order is that of Fawkes (`KatanaInterface`) and of the configuration of Bielefeld, which
+    agree. Infrared sensors measure how much light an object reflects, so the value grows as it
+    comes near.
 
     Attributes:
         right_near_distance: infrared, inner surface of the right finger, next to the palm.
@@ -122,6 +108,16 @@ class GripperSensors:
         return min(right, left) >= HELD_VALUE
 
 
+INDICES = dict(
+    zip(
+        (each.name for each in fields(GripperSensors)),
+        (place for place in range(COUNT) if place not in RESERVED),
+        strict=True,
+    )
+)
+"""Place of each sensor among the values."""
+
+
 def distance_value(distance: float) -> int:
     """Return the value of an infrared sensor before a surface at ``distance`` [m].
 
@@ -131,14 +127,6 @@ def distance_value(distance: float) -> int:
     if distance <= SATURATION_DISTANCE:
         return MAX_VALUE
     return round(MAX_VALUE * (SATURATION_DISTANCE / distance) ** 2)
-
-
-def distance_of(value: float) -> float:
-    """Return the distance [m] at which an infrared sensor has ``value``; infinite for 0.
-
-    MAX_VALUE stands for all distances up to SATURATION_DISTANCE.
-    """
-    return math.inf if value <= 0 else SATURATION_DISTANCE * math.sqrt(MAX_VALUE / value)
 
 
 def force_value(force: float) -> int:

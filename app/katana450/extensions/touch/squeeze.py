@@ -58,12 +58,10 @@ class Squeeze:
 
     Attributes:
         pads: the pressures on both pads.
-        used: the part of the squeeze that the force limit allows [rad].
         axis: (3,) unit direction in the frame of the palm along which the fingers close.
     """
 
     pads: tuple[PadPressure, PadPressure]
-    used: float
     axis: FloatArray
 
     @property
@@ -141,17 +139,16 @@ class SqueezedBody:
 
     def squeezed(self, squeeze: float) -> Squeeze:
         """Return the object under ``squeeze`` [rad], or the part that the force limit allows."""
-        used = min(squeeze, self._greatest)
         if not self.on_pads:
             none = np.zeros(0)
             first, second = (pressed(pad, none, none.astype(np.intp)) for pad in self._pads)
-            return Squeeze((first, second), used, self.axis)
-        depths = self._forces(used, self._shift)[2]
+            return Squeeze((first, second), self.axis)
+        depths = self._forces(min(squeeze, self._greatest), self._shift)[2]
         first, second = (
             pressed(pad, depth, near.numbers)
             for pad, near, depth in zip(self._pads, self._near, depths, strict=True)
         )
-        return Squeeze((first, second), used, self.axis)
+        return Squeeze((first, second), self.axis)
 
     def squeeze_for(self, force: float) -> float:
         """Return the squeeze [rad] at which the fingers press with ``force`` [N].

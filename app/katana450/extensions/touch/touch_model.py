@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import Hand, SceneObject
+from katana450.arm.control.scene_objects import Hand, SceneObject, same
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.touch.foundation import PadPressure
@@ -38,6 +38,31 @@ UP = np.array((0.0, 0.0, 1.0))
 
 CLOSED_ANGLE = -0.43
 """[rad] Finger joint of the Katana450 below which the fingers touch each other."""
+
+
+class PadReport(TypedDict):
+    """The touch of one pad.
+
+    Attributes:
+        finger: name of its link.
+        force: [N].
+        centre: centre of pressure along and across the pad [m]; None without a force.
+        pressure: 16 by 8 pressures [Pa], row by row from the palm; empty without a force.
+    """
+
+    finger: str
+    force: float
+    centre: tuple[float, float] | None
+    pressure: list[float]
+
+
+class TouchReport(TypedDict):
+    """The touch of a gripper: squeeze [rad], greatest force of a finger [N], pads, and sensors."""
+
+    squeeze: float
+    force_limit: float
+    pads: list[PadReport]
+    sensors: dict[str, int]
 
 
 class TouchModel:
@@ -165,12 +190,8 @@ class TouchModel:
         values["conductivity"] = 255 if state.gripper <= CLOSED_ANGLE else 0
         return GripperSensors(**values)
 
-    def report(self, state: State) -> dict[str, Any]:
-        """Return squeeze, force limit, pads and sensors of ``state`` for the answer to a query.
-
-        Each pad has its finger, its ``force`` [N], its ``centre`` [m] and, while it is pressed, its
-        16 by 8 pressures [Pa], row by row from the palm.
-        """
+    def report(self, state: State) -> TouchReport:
+        """Return the touch in ``state`` for the answer to a query."""
         squeeze = self.squeeze(state)
         pads = (
             [_untouched(pad) for pad in self.pads]
@@ -189,7 +210,8 @@ class TouchModel:
         if held is None or grip is None:
             return None
         last = self._last_body
-        if last is None or last[0] is not held or last[1] != grip:
+        # By its values: states from a pipe have new objects when any of them has changed.
+        if last is None or last[1] != grip or not (last[0] is held or same((last[0],), (held,))):
             pose = held.T_collision_shape
             body = SqueezedBody(
                 self.pads, body_of(held), pose, self._finger_poses, grip, self.force_limit
@@ -216,11 +238,11 @@ def touch_model(
     return TouchModel(world, hand, (pads[0], pads[1]), masses) if len(pads) == 2 else None
 
 
-def _untouched(pad: Pad) -> dict[str, Any]:
+def _untouched(pad: Pad) -> PadReport:
     return {"finger": pad.finger, "force": 0.0, "centre": None, "pressure": []}
 
 
-def _pad_report(pad: PadPressure) -> dict[str, Any]:
+def _pad_report(pad: PadPressure) -> PadReport:
     return {
         "finger": pad.finger,
         "force": pad.force,

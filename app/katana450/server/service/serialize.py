@@ -108,7 +108,7 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         margins=None if tool is None else margins(arm.margins),
         holding=None if arm.holding is None else arm.holding.tolist(),
         touching=list(touching(hand, now)),
-        touch=None if model is None else model.report(now),
+        touch=None if model is None else dict(model.report(now)),
         held=None if now.held is None else now.held.name,
         branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
         priority=None if tool is None else now.priority.value,
