@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from multiprocessing.connection import Listener
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes import link
+from katana450.extensions.recording.episodes.episode_folder import EpisodeMarker
 from katana450.platform_support import pipe_address
 from tests.recording.episode_bench import Bench
 
@@ -36,6 +38,33 @@ def test_interrupted_episode_waits_until_its_ring_is_found(
     assert "is kept as unfinished" in capsys.readouterr().out
     assert not bench.folder.markers()
     bench.keeper = bench.made()
+
+
+def test_end_of_an_interrupted_episode_keeps_the_files_of_a_new_one(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.move(50)
+    read, reading, may_end = bench.folder.markers, threading.Event(), threading.Event()
+
+    def slowly() -> list[EpisodeMarker]:
+        found = read()
+        if threading.current_thread() is finishing:
+            reading.set()
+            assert may_end.wait(5.0)
+        return found
+
+    monkeypatch.setattr(bench.folder, "markers", slowly)
+    # As the thread that finishes interrupted episodes.
+    finishing = threading.Thread(target=bench.keeper._running.hold_needed)
+    starting = threading.Thread(target=lambda: bench.ask(do="start", task="stir"))
+    finishing.start()
+    assert reading.wait(5.0)
+    starting.start()
+    starting.join(0.2)
+    may_end.set()
+    finishing.join()
+    starting.join()
+    assert bench.ring.held == bench.ring.newest
 
 
 def test_process_that_hangs_is_not_waited_for(

@@ -25,7 +25,7 @@ from katana450.arm.control.lease import Role
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.live import record_end, ring
+from katana450.extensions.recording.live import record_end, ring, route
 from katana450.extensions.recording.live.record_end import RecordEnd, lost_records
 from katana450.extensions.recording.live.record_wire import RecordDeserializer
 from katana450.extensions.recording.live.ring import Ring
@@ -136,6 +136,22 @@ def test_viewers_get_no_recording(folder: Path, role: Role) -> None:
     # An operator passes the check of the role, and learns that the folder is still empty.
     assert caught.value.status_code == (403 if role is Role.VIEWER else 409)
     assert ("may watch" if role is Role.VIEWER else "has no recording") in caught.value.detail
+
+
+def test_script_leaves_no_file_even_if_nobody_takes_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def made(*command: str) -> None:
+        Path(command[-1]).write_bytes(b"recorded")
+
+    monkeypatch.setattr(route, "_record", made)
+    context = RouteContext(None, None, lambda _: Identity("session", "Ada", Role.OPERATOR))  # type: ignore[arg-type]
+    store = RecordingStore(folder)
+    request = Request({"type": "http", "query_string": b"", "headers": []})
+    answer = asyncio.run(recording_routes(context, store)[1].endpoint(request))
+    assert answer.body == b"recorded"
+    # The answer was not sent: the connection broke.
+    assert not [each for each in store.new_path().parent.iterdir() if each.is_dir()]
 
 
 def _keeps(folder: Path, kept: Path, command: str) -> bool:

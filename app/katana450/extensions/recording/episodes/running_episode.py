@@ -202,6 +202,8 @@ class RunningEpisode:
 
     def hold_needed(self) -> None:
         """Hold the files of the ring that this and interrupted episodes still need."""
-        markers = self._folder.markers()
-        firsts = [each.first for each in markers if each.ring == self._ring_folder]
-        self._ring.held = min(firsts, default=None)
+        # Under the lock: interrupted episodes are finished in another thread.
+        with self._ring.lock:
+            markers = self._folder.markers()
+            firsts = [each.first for each in markers if each.ring == self._ring_folder]
+            self._ring.held = min(firsts, default=None)

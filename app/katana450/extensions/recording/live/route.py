@@ -56,7 +56,8 @@ def recording_routes(context: RouteContext, store: RecordingStore) -> list[Route
                     part = ("--from", "0", "--to", "inf")
                     await _record("again", str(kept), *part, *described, "--out", str(again))
                     text = await asyncio.to_thread(again.read_bytes)
-                    return Response(text, media_type="application/yaml", background=remove)
+                    await remove()
+                    return Response(text, media_type="application/yaml")
             except BaseException:
                 await remove()
                 raise
