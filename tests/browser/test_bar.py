@@ -133,6 +133,19 @@ def test_stop_is_always_visible_and_the_largest_button(
     clear_stop(page, truth)
 
 
+WATCH_SHIFTS = """() => {
+  window.shifts = [];
+  new PerformanceObserver(list => {
+    for (const shift of list.getEntries())
+      for (const {node} of shift.sources)
+        if (node) window.shifts.push({
+          value: shift.value, at: shift.startTime, node: node.id || node.nodeName,
+          css: String(node.className), in_bar: Boolean(node.parentElement?.closest('header'))});
+  }).observe({type: 'layout-shift'});
+}"""
+"""Script that collects the parts of the page that change their places by themselves."""
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("size", ROOM)
 def test_bar_keeps_its_height_and_the_reason_its_room(
@@ -156,6 +169,8 @@ def test_bar_keeps_its_height_and_the_reason_its_room(
         assert not [each for each in found["cut"] if "long name" not in each], state
 
     look("free")
+    # The panel has its size by now.
+    page.page.evaluate(WATCH_SHIFTS)
     take(page)
     look("driving")
     with (
@@ -181,6 +196,9 @@ def test_bar_keeps_its_height_and_the_reason_its_room(
         page.press_in_bar("Refuse")
         clear_stop(page, truth)
     assert len(heights) == 1, heights
+    # The scene and the panel stay where they are, whatever the bar says.
+    shifts = page.page.evaluate("window.shifts")
+    assert not [each for each in shifts if not each["in_bar"]], shifts
     assert page.errors == []
 
 
