@@ -70,16 +70,23 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
         page.locator("[role=slider]").wait_for(state="attached", timeout=60_000)
         page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
         assert page.evaluate(FAINTEST) == "1"
-        page.locator("button").first.click()
+        assert page.locator("#caption").inner_text() == "katana450: m, 4.0 s"
+        page.get_by_role("button", name="Pause").click()
         for fraction in (0.2, 0.9, 0.5):
             box = page.locator(TRACK).bounding_box()
             assert box is not None
             page.mouse.click(box["x"] + fraction * box["width"], box["y"] + 0.5 * box["height"])
-            # The player may still take one step; then it rests.
             page.wait_for_timeout(500)
             t = float(page.evaluate(NOW))
             assert t == pytest.approx(fraction * SECONDS, abs=0.15)
             assert pan(page) == pytest.approx(TURN * t / SECONDS, abs=0.02)
+        # A seek while it plays does not pause it.
+        page.get_by_role("button", name="Play").click()
+        box = page.locator(TRACK).bounding_box()
+        assert box is not None
+        page.mouse.click(box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"])
+        page.wait_for_function(f"() => ({NOW})() > {0.5 * SECONDS}")
+        page.get_by_role("button", name="Pause").wait_for()
         assert not errors
         assert all(url.startswith(("file:", "blob:", "data:")) for url in requested)
     finally:
@@ -105,6 +112,19 @@ def test_recording_keeps_its_brightness_after_seeking(browser: Browser, recordin
             page.wait_for_timeout(300)
             assert brightness(page) == pytest.approx(before, rel=0.1)
         assert page.evaluate("() => window.images") == images
+    finally:
+        page.close()
+
+
+def test_page_of_one_pose_has_no_slider(browser: Browser, tmp_path: Path) -> None:
+    path = tmp_path / "pose.html"
+    assert main(["export", "html", "--out", str(path)]) == 0
+    page = browser.new_page(viewport={"width": 480, "height": 320})
+    try:
+        page.goto(f"{path.as_uri()}?fixedDpr=0.5")
+        page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
+        assert page.locator("#caption").inner_text() == "katana450: one pose"
+        assert not page.locator(TRACK).is_visible()
     finally:
         page.close()
 

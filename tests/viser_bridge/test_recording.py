@@ -1,4 +1,4 @@
-"""The text that is replaced in viser's page of a recording occurs exactly once."""
+"""Each text that is replaced in viser's page of a recording occurs exactly once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import viser
 import zstandard
 
-from katana450.server.viser_bridge.recording_page import KEEP_LIGHT
+from katana450.server.viser_bridge.recording_page import PLAYER
 
 PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 
@@ -37,11 +37,15 @@ def program() -> str:
     return unpacked[int(found[2]) :].decode("utf-8")
 
 
-def test_reset_of_the_light_is_found_once_in_the_player() -> None:
-    pattern = re.search(r"const reset = /(.*)/;", KEEP_LIGHT)
-    assert pattern
+def test_each_change_of_the_player_is_found_once() -> None:
     text = program()
-    places = [found.start() for found in re.finditer(pattern[1], text)]
-    assert len(places) == 1
+    # The patterns of JavaScript, with its backreferences and groups, are those of Python.
+    patterns = re.findall(r"^    \[/(.*)/,(?: |$)", PLAYER, re.MULTILINE)
+    assert len(patterns) == 3
+    light, seek, play = ([at.start() for at in re.finditer(each, text)] for each in patterns)
+    assert len(light) == len(seek) == len(play) == 1
     # Next to it the player hides all nodes, before it plays from the start.
-    assert "useSceneTree.getAll()" in text[places[0] : places[0] + 200]
+    assert "useSceneTree.getAll()" in text[light[0] : light[0] + 200]
+    # All are in the player.
+    assert 0 < seek[0] - light[0] < 3000
+    assert 0 < play[0] - light[0] < 4000

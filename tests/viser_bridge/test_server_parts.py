@@ -302,4 +302,6 @@ def test_page_of_a_recording_has_the_title_that_is_replaced(server: viser.ViserS
     with part("<title>Viser</title>"):
         page = server.get_scene_serializer().as_html()
         assert page.count(TITLE) == 1
-        assert "<title>A &lt;run&gt;</title>" in titled(page, "A <run>")
+        changed = titled(page, "A <run>", "A </script>")
+        assert "<title>A &lt;run&gt;</title>" in changed
+        assert "A </script>" not in changed

@@ -1,8 +1,9 @@
-"""The page that viser makes for a recording, changed to have our title and constant light."""
+"""The page that viser makes for a recording, changed to say what it shows and to play on."""
 
 from __future__ import annotations
 
 import html
+import json
 
 from katana450.errors import ConfigurationError
 
@@ -16,27 +17,44 @@ viser draws faintly until the light of the room is loaded. If drawing takes as l
 miscounts and the picture stays faint. A recording loads the light again each time.
 """
 
-KEEP_LIGHT = """<script>{
+PLAYER = """<script>{
   const append = document.head.appendChild;
+  const replaced = [
+    [/[\\w$]+\\.useEnvironment\\.set\\([\\w$]+\\(\\)\\)/, 'void 0'],
+    [/(\\.currentTime=([\\w$]+),[\\w$]+\\(\\2\\)),[\\w$]+\\(!0\\)/, '$1'],
+    [/(size:`md`,variant:`subtle`,)(onClick:\\(\\)=>[\\w$]+\\(!([\\w$]+)\\))/,
+     '$1"aria-label":$3?`Play`:`Pause`,$2'],
+  ];
   document.head.appendChild = function (node) {
     if (node.type === 'module') {
       delete document.head.appendChild;
-      const reset = /[\\w$]+\\.useEnvironment\\.set\\([\\w$]+\\(\\)\\)/;
-      node.textContent = node.textContent.replace(reset, 'void 0');
+      for (const [part, by] of replaced) node.textContent = node.textContent.replace(part, by);
     }
     return append.call(this, node);
   };
 }</script>"""
-"""Script that keeps the light of the room when the recording is played from the start again.
+"""Script that changes viser's player before it runs; its program is unpacked in the browser.
 
-viser's player sets its own environment map before it plays the messages from the start, also to
-seek backwards. Our map is then decoded again, and the scene is nearly black until that is done.
-viser's program is unpacked in the browser, so the script changes it there, before it runs.
+1. The player sets its own environment map before it plays the messages from the start, also to seek
+   backwards. Our map is then decoded again, and the scene is nearly black until that is done.
+2. Seeking pauses it without a word. Now it plays on from there.
+3. The button that plays and pauses has no name for screen readers.
 """
 
+CAPTION = """<style>#caption {{ position: fixed; left: 1em; bottom: 4em; z-index: 2; margin: 0;
+  padding: 0.3em 0.7em; border-radius: 0.4em; font: 14px system-ui, sans-serif; color: #1e293b;
+  background: rgb(255 255 255 / 80%); pointer-events: none }}</style>
+<script>addEventListener('DOMContentLoaded', () => {{
+  const caption = document.createElement('p');
+  caption.id = 'caption';
+  caption.textContent = {text};
+  document.body.append(caption);
+}})</script>"""
+"""Element that says what is shown."""
 
-def titled(page: str, title: str) -> str:
-    """Return the ``page`` of viser's serializer with ``title`` and constant light.
+
+def titled(page: str, title: str, caption: str) -> str:
+    """Return the ``page`` of viser's serializer with ``title``, ``caption`` and constant light.
 
     Raises ConfigurationError if viser's page has another structure.
     """
@@ -44,4 +62,5 @@ def titled(page: str, title: str) -> str:
         raise ConfigurationError(
             f"viser's page must contain {TITLE} once: install the pinned version of viser."
         )
-    return page.replace(TITLE, f"<title>{html.escape(title)}</title>{CLEAR}{KEEP_LIGHT}")
+    shown = CAPTION.format(text=json.dumps(caption).replace("<", "\\u003c"))
+    return page.replace(TITLE, f"<title>{html.escape(title)}</title>{CLEAR}{PLAYER}{shown}")
