@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Route
 
-from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.export.vrml import vrml_files
+from katana450.extensions.export.vrml import vrml_files, world_of
+from katana450.extensions.export.vrml_views import views
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
@@ -40,19 +40,21 @@ TURN = """async turns => {
 
 @pytest.mark.skipif(SCRIPT is None, reason=f"{X_ITE} is not here; `make exchange` brings it")
 def test_x_ite_draws_what_we_do(browser: Browser, tmp_path: Path) -> None:
-    """Open the file at the first pose, then turn its joints to the others."""
+    """Open the file of each pose, turn its joints to another one and back."""
     assert SCRIPT is not None
     script, katana = SCRIPT, load(URDF_PATH)
     page = browser.new_page(viewport={"width": SIZE, "height": SIZE})
-    world = vrml_files(katana, katana.values(POSES[0]))["katana450.wrl"]
+    worlds = [
+        vrml_files(katana, world_of(katana, katana.values(pose)))["katana450.wrl"] for pose in POSES
+    ]
 
     def answer(route: Route) -> None:
         name = route.request.url.removeprefix(f"{HOST}/")
         own = script.parent / name
         if name == "":
             route.fulfill(body=PAGE, content_type="text/html")
-        elif name == "katana450.wrl":
-            route.fulfill(body=world, content_type="model/vrml")
+        elif name.endswith(".wrl"):
+            route.fulfill(body=worlds[int(name[0])], content_type="model/vrml")
         elif own.is_file():
             route.fulfill(path=own)
         else:
@@ -61,12 +63,14 @@ def test_x_ite_draws_what_we_do(browser: Browser, tmp_path: Path) -> None:
     try:
         page.route(f"{HOST}/**", answer)
         page.goto(f"{HOST}/")
-        page.evaluate(LOAD, f"{HOST}/katana450.wrl")
-        for pose in POSES:
-            page.evaluate(TURN, turns(katana, pose))
+        for number, pose in enumerate(POSES):
+            page.evaluate(LOAD, f"{HOST}/{number}.wrl")
+            for turned in (POSES[number - 1], pose):
+                page.evaluate(TURN, turns(katana, turned))
             picture = tmp_path / "picture.png"
             page.screenshot(path=picture)
-            ours = silhouette(placed(URDF_PATH, katana.values(pose)), camera(katana))
+            values = katana.values(pose)
+            ours = silhouette(placed(URDF_PATH, values), views(katana, values)["All"])
             assert overlap(seen(picture), ours) >= 0.98
     finally:
         page.close()

@@ -23,6 +23,8 @@ LONGEST = 3.0
         ("c", "viewer.c"),
         ("glb", "katana450.glb"),
         ("urdf", "katana450_description.zip"),
+        ("mjcf", "katana450_mjcf.zip"),
+        ("usd", "katana450.usda"),
     ],
 )
 def test_every_format_is_written_quickly(
@@ -47,6 +49,8 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
     [
         (("c", "--trajectory", "m.csv"), "c has no motion"),
         (("urdf", "--pose", "0,0"), "urdf has no pose"),
+        (("usd", "--trajectory", "m.csv"), "Use --trajectory with vrml or glb or html"),
+        (("mjcf", "--license", "MIT"), "mjcf states no licence"),
         (("glb", "--pose", "0,0,9"), "axis_3 cannot be at 9 rad"),
         (("glb", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
         (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),

@@ -28,8 +28,8 @@ from tests.recording.sessions import drag, record_session
 PRINTED_URL = "http://127.0.0.1:8080"
 SECONDS = 120
 
-# Languages that a test below runs or reads.
-CHECKED = {"console", "csv", "json", "python", "sh", "toml", "yaml"}
+# Languages that a test below runs or reads; tests/exchange/test_c_kinematics.py compiles C.
+CHECKED = {"c", "console", "csv", "json", "python", "sh", "toml", "yaml"}
 # Other languages, and why nothing runs them.
 NOT_CHECKED = {
     "text": "a diagram, or a summary of options, which is compared with the help",
@@ -46,6 +46,8 @@ ELSEWHERE = {
     "docker": "needs a container service; .ci/image builds and runs the image without one",
     "export": "sets a variable for docker",
     "git": "reads the history, which an archive of the sources does not have",
+    "colcon": "tests/exchange/test_ros2_package.py",
+    "ros2": "needs ROS 2, which is not here",
     "./viewer": "tests/exchange compiles and runs it",
     "make": "tests/exchange runs the Makefile that is exported with the viewer",
     "KEY=": "test_requests_of_the_shell_are_answered",

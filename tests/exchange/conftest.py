@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,11 +10,15 @@ import pytest
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
+from katana450.cli.main import main
 from katana450.extensions.importers import shape_file
 from katana450.extensions.importers.shape_file import SECONDS
 from katana450.resources import URDF_PATH
 
 GANTRY = Path(__file__).parent / "gantry.urdf"
+
+LARGEST_PACKAGE = 800_000
+"""[bytes] Maximum size of the zip of the Katana's ROS package."""
 
 POSES = (
     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -47,3 +52,14 @@ def katana() -> Robot:
 @pytest.fixture(scope="session")
 def gantry() -> Robot:
     return load(GANTRY)
+
+
+@pytest.fixture(scope="session")
+def ros_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the Katana's ROS package as the command writes it and unzip unpacks it."""
+    where = tmp_path_factory.mktemp("workspace")
+    assert main(["export", "urdf", "--out", str(where)]) == 0
+    archive = where / "katana450_description.zip"
+    assert archive.stat().st_size < LARGEST_PACKAGE
+    zipfile.ZipFile(archive).extractall(where / "src")
+    return where / "src" / "katana450_description"

@@ -53,7 +53,8 @@ def silhouette(meshes: list[tuple[str, trimesh.Trimesh]], view: InitialCamera) -
     back = view.eye - view.target
     back = back / np.linalg.norm(back)
     right = np.cross((0.0, 0.0, 1.0), back)
-    right /= np.linalg.norm(right)
+    # Seen from above, x is to the right.
+    right = right / np.linalg.norm(right) if np.any(right) else np.array((1.0, 0.0, 0.0))
     R = np.stack((right, np.cross(back, right), back))
     width = SIZE * FINE
     reach = width / 2.0 / np.tan(FIELD_OF_VIEW / 2.0)

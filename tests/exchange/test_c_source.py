@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from pathlib import Path
@@ -86,10 +87,36 @@ def test_clang_and_cmake_build_any_mechanism(tmp_path: Path, gantry: Robot) -> N
     assert overlap(theirs, ours) >= 0.98
 
 
+@needs(*VIEWER, "cmake")
+def test_linux_preset_builds_the_kinematics_and_the_viewer(tmp_path: Path, gantry: Robot) -> None:
+    folder = written(tmp_path / "c", gantry, GANTRY_POSE)
+    presets = json.loads((folder / "CMakePresets.json").read_text())["configurePresets"]
+    windows = [each for each in presets if each["generator"].startswith("Visual Studio")]
+    assert all(each["condition"]["rhs"] == "Windows" for each in windows)
+    assert len(windows) == 2
+    # Those of Windows are read too, and not offered.
+    listed = run("cmake", "--list-presets", folder=folder)
+    assert "linux" in listed
+    assert "visual-studio" not in listed
+    run("cmake", "--preset", "linux", folder=folder)
+    run("cmake", "--build", "--preset", "linux", folder=folder)
+    assert (folder / "build" / "linux" / "viewer").is_file()
+    assert (folder / "build" / "linux" / "libkinematics.a").is_file()
+
+
+@needs("gcc", "make", "cmake")
+def test_kinematics_build_without_opengl(tmp_path: Path, katana: Robot) -> None:
+    folder = written(tmp_path / "c", katana, ())
+    run("cmake", "-S", folder, "-B", tmp_path / "build", "-DVIEWER=OFF")
+    run("cmake", "--build", tmp_path / "build")
+    assert (tmp_path / "build" / "libkinematics.a").is_file()
+    assert not (tmp_path / "build" / "viewer").exists()
+
+
 @needs("clang", "/usr/include/GL/freeglut.h")
 def test_clang_has_no_warnings_for_the_arm(tmp_path: Path, katana: Robot) -> None:
     sources = sorted(written(tmp_path / "c", katana, ()).glob("*.c"))
-    assert len(sources) == 12
+    assert len(sources) == 14
     words = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only")
     run("clang", *words, *sources)
 

@@ -40,6 +40,8 @@ void glRotated(double angle, double x, double y, double z);
 #endif
 """
 
+COMPILED = ("viewer.c", "robot.c", "frames.c", "arm_kinematics.c")
+
 MAIN = """\
 #include "robot.h"
 #include "PART.h"
@@ -70,6 +72,16 @@ int main()
     return 0;
 }
 """
+
+
+@needs("g++", "/usr/include/GL/freeglut.h")
+def test_viewer_and_kinematics_compile_as_cplusplus(tmp_path: Path, katana: Robot) -> None:
+    """Visual C++ takes files named .c as C, but as C++ in a project that says so."""
+    files = c_files(katana, katana.values(()))
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    strict = ("-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only")
+    run("g++", "-std=c++98", *strict, "-x", "c++", *COMPILED, folder=tmp_path)
 
 
 @needs("gcc", "g++")

@@ -15,12 +15,13 @@ import trimesh
 import yourdfpy
 
 from katana450.arm.robot.robot import Robot
+from katana450.cli.main import main
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
-from tests.exchange.tools import needs, run
+from tests.exchange.tools import GLTF_VALIDATOR, needs, needs_package, run
 
 UPRIGHT = so3.rotation_x(-np.pi / 2.0)
 
@@ -136,3 +137,27 @@ def test_another_program_reads_it_with_its_motion(tmp_path: Path, katana: Robot)
     assert "pan_link" in converted
     assert converted.count("OrientationInterpolator {") == len(katana.joints)
     assert converted.count("TimeSensor {") == 1
+
+
+VALIDATE = """
+const [folder, file] = process.argv.slice(1);
+const bytes = new Uint8Array(require("fs").readFileSync(file));
+require(folder).validateBytes(bytes).then(found => console.log(JSON.stringify(found.issues)));
+"""
+
+
+@pytest.mark.long
+@needs_package(GLTF_VALIDATOR)
+@needs("node")
+@pytest.mark.parametrize("urdf", [URDF_PATH, GANTRY])
+def test_validator_of_gltf_finds_nothing(tmp_path: Path, urdf: Path) -> None:
+    """Links without a shape are empty nodes, which it mentions."""
+    (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,0.3\n")
+    motion = ["--trajectory", str(tmp_path / "m.csv")]
+    assert main(["export", "glb", "--urdf", str(urdf), "--out", str(tmp_path), *motion]) == 0
+    (path,) = tmp_path.glob("*.glb")
+    script = GLTF_VALIDATOR.file
+    assert script is not None
+    issues = json.loads(run("node", "-e", VALIDATE, script.parent, path))
+    assert {each["code"] for each in issues["messages"]} <= {"NODE_EMPTY"}
+    assert issues["numErrors"] == issues["numWarnings"] == 0

@@ -16,8 +16,8 @@ from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.urdf_package import package_files
-from katana450.extensions.export.vrml import vrml_files
-from katana450.extensions.export.vrml_text import read_world
+from katana450.extensions.export.vrml import vrml_files, world_of
+from katana450.extensions.importers.vrml_reader import read_world
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
@@ -88,7 +88,7 @@ def test_drivable_mechanisms_can_be_exported(tmp_path: Path, seed: int) -> None:
     robot = load(path)
     values = robot.joint_values(robot.joint_group.upper, 0.0)
     made = (
-        vrml_files(robot, values),
+        vrml_files(robot, world_of(robot, values)),
         c_files(robot, values),
         glb_files(robot, values, None),
         package_files(path),

@@ -6,9 +6,6 @@ Other programs get the unpacked files unchanged.
 from __future__ import annotations
 
 import io
-import json
-import os
-import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
@@ -23,29 +20,20 @@ import yourdfpy
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.export.urdf_package import Maintainer, package_files
+from katana450.extensions.export.ros2.manifest import Maintainer
+from katana450.extensions.export.urdf_package import package_files
 from katana450.resources import URDF_PATH
-from tests.exchange.conftest import GANTRY, POSES
-from tests.exchange.tools import needs_pybullet, pybullet, run
+from tests.exchange.conftest import GANTRY
 
-LARGEST_ZIP = 800_000
-"""[bytes] Maximum size of the Katana's package."""
-
-MASS, BOX_MASS = 9.271, 4.471
-"""[kg] Mass of the robot, and of the link that stands on the table."""
+MASS = 9.271
+"""[kg] Mass of the robot."""
 
 SHAPES = 53
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the package as the command writes it and unzip unpacks it."""
-    where = tmp_path_factory.mktemp("ros")
-    assert main(["export", "urdf", "--out", str(where)]) == 0
-    archive = where / "katana450_description.zip"
-    assert archive.stat().st_size < LARGEST_ZIP
-    zipfile.ZipFile(archive).extractall(where)
-    return where / "katana450_description"
+def folder(ros_package: Path) -> Path:
+    return ros_package
 
 
 @pytest.fixture(scope="module")
@@ -103,54 +91,6 @@ def test_mujoco_lets_the_arm_fall_on_its_hinges(model: mujoco.MjModel) -> None:
         mujoco.mj_step(model, data)
     assert np.isfinite(data.qpos).all()
     assert data.joint("axis_1").qpos[0] > 0.05
-
-
-LOAD = """
-import json, sys
-import pybullet as bullet
-bullet.connect(bullet.DIRECT)
-robot = bullet.loadURDF(sys.argv[1], useFixedBase=True, flags=bullet.URDF_USE_SELF_COLLISION)
-joints = range(bullet.getNumJoints(robot))
-names = [bullet.getJointInfo(robot, k)[12].decode() for k in joints]
-turning = [k for k in joints if bullet.getJointInfo(robot, k)[2] == bullet.JOINT_REVOLUTE]
-for k, value in zip(turning, json.loads(sys.argv[2]), strict=True):
-    bullet.resetJointState(robot, k, value)
-visuals = bullet.getVisualShapeData(robot)
-places = {names[k]: bullet.getLinkState(robot, k, computeForwardKinematics=1)[4] for k in joints}
-bullet.resetSimulation()
-robot = bullet.loadURDF(sys.argv[1], useFixedBase=True, flags=bullet.URDF_USE_SELF_COLLISION)
-bullet.performCollisionDetection()
-print("\\n" + json.dumps({
-    "places": places,
-    "colours": [[names[v[1]] if v[1] >= 0 else "base_link", *v[7]] for v in visuals],
-    "mass": sum(bullet.getDynamicsInfo(robot, k)[0] for k in joints),
-    "contacts": [c[3:5] for c in bullet.getContactPoints(robot, robot)],
-}))
-"""
-
-
-@needs_pybullet
-def test_pybullet_loads_the_same_robot(
-    tmp_path: Path, urdf: Path, katana: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pose = (0.4, -1.187, 1.484, 0.14, 0.5, 0.2, 0.2)
-    monkeypatch.setenv("PYTHONPATH", os.fspath(pybullet() or ""))
-    # Another folder, so that no name is found by the present folder.
-    printed = run(sys.executable, "-c", LOAD, urdf, json.dumps(pose), folder=tmp_path)
-    found = json.loads(printed.splitlines()[-1])
-    frames = katana.frames(katana.values(POSES[1]))
-    assert set(found["places"]) == {link.name for link in katana.links[1:]}
-    for link, place in found["places"].items():
-        np.testing.assert_allclose(place, frames[link][:3, 3], atol=1e-6, err_msg=link)
-    assert found["mass"] == pytest.approx(MASS - BOX_MASS, abs=1e-9)
-    assert found["contacts"] == []
-    shown = [
-        [link.name, *(round(part, 4) for part in shape.material.colour)]
-        for link in katana.links
-        for shape in link.shapes
-    ]
-    colours = [[name, *np.round(rgba[:3], 4).tolist()] for name, *rgba in found["colours"]]
-    assert sorted(colours) == sorted(shown)
 
 
 def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(

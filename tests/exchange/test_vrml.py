@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
@@ -28,7 +27,9 @@ from katana450.extensions.export.vrml_node import (
     Value,
     World,
 )
-from katana450.extensions.export.vrml_text import HEADER, read_world, world_text
+from katana450.extensions.export.vrml_text import HEADER, world_text
+from katana450.extensions.export.vrml_views import views
+from katana450.extensions.importers.vrml_reader import read_world
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
@@ -162,7 +163,7 @@ def test_parts_are_placed_as_with_all_joints_at_zero(katana: Robot) -> None:
 
 
 def test_every_link_with_a_shape_has_a_file(gantry: Robot) -> None:
-    files = vrml_files(gantry, gantry.values(()))
+    files = vrml_files(gantry, world_of(gantry, gantry.values(())))
     parts = ("floor", "cart", "mast", "left_finger", "right_finger", "thumb")
     assert sorted(files) == sorted(["gantry_2.wrl", *(f"parts/{part}.wrl" for part in parts)])
     for content in files.values():
@@ -252,8 +253,8 @@ def test_another_program_draws_the_reference_picture(
     tmp_path: Path, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     values = katana.values(pose)
-    ours = silhouette(placed(URDF_PATH, values), camera(katana))
-    theirs = picture(tmp_path, vrml_files(katana, values)["katana450.wrl"])
+    ours = silhouette(placed(URDF_PATH, values), views(katana, values)["All"])
+    theirs = picture(tmp_path, vrml_files(katana, world_of(katana, values))["katana450.wrl"])
     assert overlap(seen(theirs), ours) >= 0.98
 
 
@@ -263,7 +264,7 @@ def test_the_motion_plays_by_itself(tmp_path: Path, gantry: Robot) -> None:
     (tmp_path / "m.csv").write_text(f"t,rail,turn,grip\n0,0,0,0\n3,{end}\n")
     motion = load_motion(tmp_path / "m.csv", gantry)
     half = gantry.values([value / 2.0 for value in GANTRY_POSE])
-    ours = silhouette(placed(GANTRY, half), camera(gantry))
-    content = vrml_files(gantry, gantry.values(()), motion)["gantry_2.wrl"]
+    ours = silhouette(placed(GANTRY, half), views(gantry, motion.start)["All"])
+    content = vrml_files(gantry, world_of(gantry, gantry.values(()), motion))["gantry_2.wrl"]
     assert overlap(seen(picture(tmp_path, content, time=1.5)), ours) >= 0.98
     assert overlap(seen(picture(tmp_path, content, time=0.0)), ours) < 0.9

@@ -14,42 +14,102 @@ import tarfile
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
+
+PIVY = "/usr/share/doc/python3-pivy"
+"""Coin for the Python of the system, a library that reads VRML worlds."""
 
 PACKAGES = {
     "gcc": "gcc",
     "g++": "g++",
     "make": "make",
+    "nm": "binutils",
     "clang": "clang",
     "cmake": "cmake",
     "/usr/include/GL/freeglut.h": "freeglut3-dev",
     "/usr/share/doc/libgl1-mesa-dri": "libgl1-mesa-dri",
+    "/usr/share/doc/libegl1": "libegl1",
     "xvfb-run": "xvfb",
     "xauth": "xauth",
     "xdotool": "xdotool",
     "tovrmlx3d": "view3dscene",
     "view3dscene": "view3dscene",
     "firefox-esr": "firefox-esr",
+    "node": "nodejs",
+    "check_urdf": "liburdfdom-tools",
+    PIVY: "python3-pivy",
+    "colcon": "colcon",
+    "/usr/share/doc/python3-colcon-cmake": "python3-colcon-cmake",
+    "/usr/share/doc/python3-colcon-recursive-crawl": "python3-colcon-recursive-crawl",
+    "/usr/share/doc/python3-colcon-ros": "python3-colcon-ros",
+    "/usr/share/doc/ament-cmake": "ament-cmake",
 }
 """Programs and files, and the Debian packages that provide them."""
 
-X_ITE = "x_ite@15.0.1"
-"""A browser of VRML and X3D worlds in JavaScript, from npm."""
+CACHE = Path(__file__).parents[2] / ".cache"
 
-X_ITE_FOLDER = Path(__file__).parents[2] / ".cache" / X_ITE
 
-PYBULLET = "pybullet==3.2.7"
-"""A simulator of robots, from PyPI; its wheel of 103 MB is too large for the other tests."""
+class Package(NamedTuple):
+    """A package of a registry, unpacked into a folder of its own; no dependency of the project.
 
-PYBULLET_FOLDER = Path(__file__).parents[2] / ".cache" / PYBULLET
+    Attributes:
+        name: name and version, as its installer takes them.
+        found: a file of it, as a pattern in its folder.
+        alone: whether it needs no other packages.
+    """
 
-VTK = "vtk==9.7.2"
-"""A library that reads VRML worlds, from PyPI; not among the project's dependencies."""
+    name: str
+    found: str
+    alone: bool = True
 
-VTK_FOLDER = Path(__file__).parents[2] / ".cache" / VTK
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def folder(self) -> Path:
+        return CACHE / self.name
+
+    @property
+    def file(self) -> Path | None:
+        """The file, if present."""
+        return next(self.folder.glob(self.found), None)
+
+
+X_ITE = Package("x_ite@15.0.1", "package/dist/x_ite.min.js")
+"""A browser of VRML and X3D worlds."""
+
+THREE = Package("three@0.187.0", "package/build/three.module.js")
+"""A library that draws scenes in browsers, with loaders of GLB and VRML."""
+
+GLTF_VALIDATOR = Package("gltf-validator@2.0.0-dev.3.10", "package/index.js")
+"""The validator of the makers of glTF."""
+
+NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR)
+"""Packages of npm; nothing of them is executed when they are unpacked."""
+
+PYBULLET = Package("pybullet==3.2.7", "pybullet*.so")
+"""A simulator of robots; its wheel of 103 MB is too large for the other tests."""
+
+VTK = Package("vtk==9.7.2", "vtkmodules/__init__.py")
+"""A library that reads VRML worlds."""
+
+PINOCCHIO = Package(
+    "pin==4.1.0", "cmeel.prefix/lib/python*/site-packages/pinocchio/__init__.py", alone=False
+)
+"""A library of rigid body dynamics that reads URDF."""
+
+USD = Package("usd-core==26.11", "pxr/Usd/__init__.py")
+"""The library of Universal Scene Description."""
+
+WHEELS = (PYBULLET, VTK, PINOCCHIO, USD)
+"""Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
+
+COLCON = ("cmake", "make", *(name for name in PACKAGES if "colcon" in name or "ament" in name))
+"""Programs and files that are needed to build ROS 2 packages."""
 
 VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
 """Programs and files that are needed to build and run the C viewer."""
@@ -63,13 +123,12 @@ def missing(names: Sequence[str]) -> list[str]:
 
 def x_ite() -> Path | None:
     """Return the path of its script, if present."""
-    script = X_ITE_FOLDER / "package" / "dist" / "x_ite.min.js"
-    return script if script.is_file() else None
+    return X_ITE.file
 
 
 def vtk_folder() -> Path | None:
     """Return the folder of its modules, if present."""
-    return VTK_FOLDER if (VTK_FOLDER / "vtkmodules").is_dir() else None
+    return VTK.folder if VTK.file else None
 
 
 def needs(*names: str) -> pytest.MarkDecorator:
@@ -80,14 +139,11 @@ def needs(*names: str) -> pytest.MarkDecorator:
     )
 
 
-def pybullet() -> Path | None:
-    """Return the folder to import it from, if present."""
-    return PYBULLET_FOLDER if any(PYBULLET_FOLDER.glob("pybullet*.so")) else None
-
-
-needs_pybullet = pytest.mark.skipif(
-    pybullet() is None, reason=f"{PYBULLET} is not here; `make exchange` brings it"
-)
+def needs_package(package: Package) -> pytest.MarkDecorator:
+    """Return a mark that skips a test with the reason if ``package`` is missing."""
+    return pytest.mark.skipif(
+        package.file is None, reason=f"{package} is not here; `make exchange` brings it"
+    )
 
 
 def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -> str:
@@ -112,23 +168,31 @@ def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -
     return printed
 
 
-def fetch_x_ite() -> None:
-    """Download and unpack it; nothing of it is executed."""
-    X_ITE_FOLDER.mkdir(parents=True, exist_ok=True)
-    pack = ["npm", "pack", X_ITE, "--silent"]
+def fetch_npm(package: Package) -> str:
+    """Download and unpack ``package``; return why that was not possible."""
+    if shutil.which("npm") is None:
+        return "npm is not here"
+    package.folder.mkdir(parents=True, exist_ok=True)
+    pack = ["npm", "pack", package.name, "--silent"]
     print("Running:", *pack, flush=True)
-    with suppress(subprocess.TimeoutExpired):
-        subprocess.run(pack, cwd=X_ITE_FOLDER, check=False, timeout=120.0, capture_output=True)
-    for archive in X_ITE_FOLDER.glob("*.tgz"):
+    try:
+        done = subprocess.run(
+            pack, cwd=package.folder, check=False, timeout=120.0, capture_output=True, text=True
+        )
+    except subprocess.TimeoutExpired:
+        return "it took more than 120 s"
+    for archive in package.folder.glob("*.tgz"):
         with tarfile.open(archive) as packed:
-            packed.extractall(X_ITE_FOLDER, filter="data")
+            packed.extractall(package.folder, filter="data")
         archive.unlink()
+    return done.stderr.strip().rpartition("\n")[2]
 
 
-def fetch(package: str, folder: Path) -> str:
-    """Unpack the wheel of ``package`` into ``folder``; return why that was not possible."""
+def fetch_wheel(package: Package) -> str:
+    """Unpack the wheel of ``package``; return why that was not possible."""
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "install"]
-    place = ["--no-deps", "--only-binary=:all:", "--target", str(folder), package]
+    alone = ["--no-deps"] if package.alone else []
+    place = [*alone, "--only-binary=:all:", "--target", str(package.folder), package.name]
     print("Running:", *pip, *place, flush=True)
     try:
         done = subprocess.run(
@@ -139,25 +203,30 @@ def fetch(package: str, folder: Path) -> str:
     return done.stderr.strip().rpartition("\n")[2]
 
 
+def install(packages: Sequence[str]) -> None:
+    """Install Debian packages; those that this system does not have are left out."""
+    environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+    get = ["apt-get", "install", "--yes", "--quiet=2", "--no-install-recommends"]
+    # One by one, because one unknown name would refuse all of them.
+    for command in (["apt-get", "update", "--quiet=2"], *([*get, name] for name in packages)):
+        print("Running:", *command, flush=True)
+        with suppress(subprocess.TimeoutExpired):
+            subprocess.run(
+                command, env=environment, stdout=subprocess.DEVNULL, check=False, timeout=600.0
+            )
+
+
 def main() -> None:
     """Print the programs that the tests use; install missing ones first if root can."""
     packages = missing(list(PACKAGES))
     if packages and shutil.which("apt-get") and os.geteuid() == 0:
-        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
-        install = ["apt-get", "install", "--yes", "--quiet=2", "--no-install-recommends", *packages]
-        for command in (["apt-get", "update", "--quiet=2"], install):
-            print("Running:", *command, flush=True)
-            with suppress(subprocess.TimeoutExpired):
-                subprocess.run(
-                    command, env=environment, stdout=subprocess.DEVNULL, check=False, timeout=600.0
-                )
-    if x_ite() is None and shutil.which("npm"):
-        fetch_x_ite()
-    print("X_ITE for the tests:", x_ite() or f"not here; npm brings {X_ITE}")
-    why = "" if pybullet() else fetch(PYBULLET, PYBULLET_FOLDER)
-    print("PyBullet for the tests:", pybullet() or f"not here; {why}")
-    why = "" if vtk_folder() else fetch(VTK, VTK_FOLDER)
-    print("VTK for the tests:", vtk_folder() or f"not here; {why}")
+        install(packages)
+    for fetch, each in (
+        *((fetch_npm, package) for package in NPM_PACKAGES),
+        *((fetch_wheel, package) for package in WHEELS),
+    ):
+        why = "" if each.file else fetch(each)
+        print(f"{each} for the tests:", each.folder if each.file else f"not here; {why}")
     packages = missing(list(PACKAGES))
     print(
         f"Some tests are skipped; on Debian and Ubuntu: apt-get install {' '.join(packages)}"

@@ -26,10 +26,11 @@ from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
 from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
+from katana450.extensions.export.placed_object import initial_objects
 from katana450.extensions.export.vrml import world_of
-from katana450.extensions.export.vrml_node import FIELDS
+from katana450.extensions.export.vrml_node import FIELDS, Node, World
 from katana450.extensions.export.vrml_nodes import VrmlNodes
-from katana450.maths.geometry import so3
+from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.settings import Settings
@@ -87,16 +88,89 @@ def test_names_types_and_values_are_those_of_the_file(
         assert world[name].kind == file[name].kind
         for field in world[name].fields:
             assert FIELDS[file[name].kind][field.field].value == field.type
-            shown: Any = file[name].get(field.field)
-            np.testing.assert_allclose(np.array(field.value), shown, rtol=0, atol=5e-5)
-    # The server has every joint and appearance of the file.
-    dressed = ("Switch", "Material")
-    assert {name for name, node in file.items() if node.kind in dressed} == {
-        name for name, node in world.items() if node.kind in dressed
-    } - objects
-    assert set(robot.joints) <= world.keys()
+            # The links in a file have their places with all joints at zero.
+            if not world[name].of.startswith("link") or file[name].kind != "Transform":
+                shown: Any = file[name].get(field.field)
+                np.testing.assert_allclose(np.array(field.value), shown, rtol=0, atol=5e-5)
+    # The server has every Transform and appearance of the file.
+    for kinds in (("Transform",), ("Switch", "Material")):
+        assert {name for name, node in file.items() if node.kind in kinds} == {
+            name for name, node in world.items() if node.kind in kinds
+        } - objects
     # Names that are invalid or taken are changed.
     assert {"left_cube", "left_cube_look", "pan_link_look_2", "pan_link_look_paint"} <= objects
+
+
+def test_export_has_the_objects_of_a_new_server_by_the_same_names(robot: Robot) -> None:
+    session = describe_robot(Settings(), URDF_PATH, None).session
+    state = session.begin(session.ready, 0.0, 0.0)
+    angles = robot.joint_values(state.q, state.gripper)
+    file = world_of(robot, angles, None, initial_objects(robot))
+    kinds = ("Transform", "Switch", "Material")
+    named = {name: node for name, node in file.named().items() if node.kind in kinds}
+    world = {
+        node.node: node
+        for node in VrmlNodes(robot, session.environment).world(state).nodes
+        if node.kind in kinds
+    }
+    assert {"cup", "basin", "tcp", "flange", "cup_look", "cup_paint"} <= world.keys()
+    assert world.keys() == named.keys()
+    # By the Transforms of the file, every link and object is where the server says.
+    poses = absolute_poses(file)
+    for name, node in world.items():
+        if node.kind == "Transform" and not node.of.startswith("joint"):
+            fields = {field.field: field.value for field in node.fields}
+            x, y, z, angle = np.array(fields["rotation"]).tolist()
+            T = se3.from_rotation_translation(
+                so3.exp(angle * np.array((x, y, z))), np.array(fields["translation"])
+            )
+            np.testing.assert_allclose(T, poses[name], rtol=0, atol=1e-7, err_msg=name)
+
+
+def absolute_poses(world: World) -> dict[str, Any]:
+    """Return the pose (4, 4) of each named Transform below the Transform that turns z up."""
+    found = {}
+
+    def field(node: Node, name: str, default: Any) -> Any:
+        value = node.get(name)
+        return default if value is None else value
+
+    def visit(node: Node, T: Any) -> None:
+        if node.kind == "Transform":
+            *axis, angle = field(node, "rotation", (0.0, 0.0, 1.0, 0.0))
+            T = T @ se3.from_rotation_translation(
+                so3.exp(angle * np.array(axis)), field(node, "translation", (0.0, 0.0, 0.0))
+            )
+            found[node.name or ""] = T
+        for child in field(node, "children", ()):
+            if isinstance(child, Node):
+                visit(child, T)
+
+    upright = next(node for node in world.nodes if node.kind == "Transform")
+    for child in field(upright, "children", ()):
+        visit(child, np.eye(4))
+    return found
+
+
+def test_tool_is_set_by_its_name(nodes: VrmlNodes, state: State, robot: Robot) -> None:
+    """A position alone keeps the target of the rotation, as the handle does."""
+    place, offset = [0.3, 0.1, 0.25], robot.require_arm().T_base_shoulder[:3, 3]
+    command = nodes.command(state, [setting(state.tool, "translation", place)])
+    assert isinstance(command, cmd.MoveTool)
+    # Commands are in {S}, in the shoulder.
+    np.testing.assert_allclose(command.position, place - offset, rtol=0, atol=1e-15)
+    turn = [0.0, 0.0, 1.0, 0.5]
+    command = nodes.command(state, [setting(state.tool, "rotation", turn)])
+    assert isinstance(command, cmd.SetPose)
+    now = robot.frames(robot.joint_values(state.q, state.gripper))[state.tool]
+    np.testing.assert_allclose(command.T[:3, 3], now[:3, 3] - offset, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(command.T[:3, :3], so3.rotation_z(0.5), rtol=0, atol=1e-15)
+    both = [setting(state.tool, "rotation", turn), setting(state.tool, "translation", place)]
+    command = nodes.command(state, both)
+    assert isinstance(command, cmd.SetPose)
+    np.testing.assert_allclose(command.T[:3, 3], place - offset, rtol=0, atol=1e-15)
+    with pytest.raises(InputError, match="either joints or the tool"):
+        nodes.command(state, [*both, setting("axis_2", "rotation", [0, 1, 0, -1.0])])
 
 
 @settings(max_examples=50)
@@ -156,8 +230,8 @@ def test_all_fields_of_a_message_are_one_command(nodes: VrmlNodes, state: State)
     ("node", "field", "value", "reason"),
     [
         ("axis_9", "rotation", [0, 1, 0, 0.1], "no node 'axis_9'"),
-        ("axis_2", "scale", [1, 1, 1], "is a Transform with rotation, center"),
-        ("axis_2", "center", [0, 0, 0], "can be read but not set"),
+        ("axis_2", "scale", [1, 1, 1], "is a Transform with rotation; it has no field 'scale'"),
+        ("pan_link", "translation", [0, 0, 0], "not the tool frame of the arm and cannot be set"),
         (
             "axis_2",
             "rotation",
@@ -172,7 +246,7 @@ def test_all_fields_of_a_message_are_one_command(nodes: VrmlNodes, state: State)
         ("axis_2", "rotation", None, "has no default"),
         ("finger_left_joint", "rotation", [0, 0, -1, 0.1], "follows finger_right_joint. Set that"),
         ("left_cube", "translation", [0, 0, 5], "more than 2 m"),
-        ("left_cube", "translation", None, "no default place"),
+        ("left_cube", "translation", None, "left/cube has no default"),
         ("left_cube", "rotation", [0, 0, 0, 1], "an axis of length 0"),
         ("pan_link_look", "whichChoice", [1, 0], "a number"),
         ("pan_link_look", "whichChoice", 7, "-1 for hidden"),
@@ -190,10 +264,10 @@ def test_one_invalid_field_refuses_the_whole_set_request(
 
 names = st.sampled_from(
     ["axis_1", "axis_5", "finger_right_joint", "finger_left_joint", "left_cube", "pan_link_look",
-     "pan_link_paint", "left_cube_paint", "base_link_look", "axis", ""]
+     "pan_link_paint", "left_cube_paint", "base_link_look", "tcp", "pan_link", "axis", ""]
 )  # fmt: skip
 fields = st.sampled_from(
-    ["rotation", "translation", "center", "whichChoice", "diffuseColor", "transparency", "x"]
+    ["rotation", "translation", "whichChoice", "diffuseColor", "transparency", "x"]
 )
 numbers = st.floats() | st.sampled_from([0.0, 1.0, -1.0, 0.5])
 anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
@@ -278,7 +352,8 @@ def all_joints(q: dict[str, float]) -> dict[str, Any]:
     return {"node": node, "field": "rotation", "value": rotation(node, angle), "more": more}
 
 
-def test_arm_is_driven_by_name_over_tcp(server: AppServer) -> None:
+def test_arm_is_driven_by_name_over_tcp(server: AppServer, arm: MountedArm) -> None:
+    T_base_shoulder = arm.T_base_shoulder
     with speaking(server, "VR Sink") as lines:
         before = lines.answer(do="query")["q"]
         done = lines.answer(do="set", **all_joints(THERE))
@@ -288,10 +363,21 @@ def test_arm_is_driven_by_name_over_tcp(server: AppServer) -> None:
         assert abs(soon - before[0]) < 0.1
         arrived(lines, done["ticket"])
         more = [{"node": name, "field": "rotation"} for name in THERE]
-        values = lines.answer(do="get", node="axis_2", field="center", more=more)["values"]
-        assert [each["node"] for each in values] == ["axis_2", *THERE]
+        values = lines.answer(do="get", node="tcp", field="translation", more=more)["values"]
+        assert [each["node"] for each in values] == ["tcp", *THERE]
+        tool = values[0]["value"]
+        # The root's frame stands on the table, {S} is in the shoulder.
+        T = T_base_shoulder @ np.array(lines.answer(do="query")["T"])
+        np.testing.assert_allclose(tool, T[:3, 3], rtol=0, atol=1e-9)
         for each, (name, angle) in zip(values[1:], THERE.items(), strict=True):
             np.testing.assert_allclose(each["value"], rotation(name, angle), rtol=0, atol=1e-9)
+        # The tool is set by its name too.
+        place = [tool[0], tool[1], tool[2] + 0.01]
+        done = lines.answer(do="set", node="tcp", field="translation", value=place)
+        arrived(lines, done["ticket"])
+        values = lines.answer(do="get", node="tcp", field="translation")["values"]
+        np.testing.assert_allclose(values[0]["value"], place, rtol=0, atol=1e-6)
+        lines.answer(do="set", **all_joints(THERE))
         # Either all fields are set or none.
         bad = all_joints({**THERE, "axis_1": 0.0})
         bad["more"][-1]["value"] = [0, 1, 0, 0.1]

@@ -20,7 +20,7 @@ from katana450.arm.robot.visual import GREY
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.vrml import vrml_files
+from katana450.extensions.export.vrml import vrml_files, world_of
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
@@ -132,7 +132,11 @@ def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(yourdfpy.URDF, "load", parsed)
     robot = load(path)
     values = robot.values(())
-    for files in (vrml_files(robot, values), c_files(robot, values), glb_files(robot, values)):
+    for files in (
+        vrml_files(robot, world_of(robot, values)),
+        c_files(robot, values),
+        glb_files(robot, values),
+    ):
         assert all(files.values())
     # One pass of the checks, one of yourdfpy.
     assert len(opened) == 2

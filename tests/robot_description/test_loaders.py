@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
+import xml.etree.ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -77,17 +76,19 @@ def test_mujoco_couples_the_fingers(model: mujoco.MjModel) -> None:
     assert coupled == {"finger_right_joint", "finger_left_joint"}
 
 
-def test_mujoco_reads_the_stl_files_as_shapes(tmp_path: Path) -> None:
-    text = re.sub(
-        r"<visual>\s*<geometry><mesh filename=\"meshes/(\w+)\.glb\"/></geometry>\s*</visual>",
-        r'<collision><geometry><mesh filename="stl/\1.stl"/></geometry></collision>',
-        re.sub(r"<collision>.*?</collision>", "", URDF_PATH.read_text("utf-8"), flags=re.DOTALL),
-    )
-    (tmp_path / "stl").symlink_to(URDF_PATH.parent / "stl")
-    (tmp_path / URDF_PATH.name).write_text(text, "utf-8")
-    shaped = mujoco.MjModel.from_xml_path(str(tmp_path / URDF_PATH.name))
-    assert shaped.nmesh == LINKS_WITH_SHAPE
-    assert shaped.ngeom == LINKS_WITH_SHAPE
+def test_mujoco_reads_the_stl_files_as_shapes() -> None:
+    """Load the files unchanged; the exported package is loaded in tests/exchange."""
+    folder = URDF_PATH.parent / "stl"
+    root = ET.Element("mujoco")
+    ET.SubElement(root, "compiler", meshdir=str(folder))
+    asset, world = ET.SubElement(root, "asset"), ET.SubElement(root, "worldbody")
+    for path in sorted(folder.glob("*.stl")):
+        ET.SubElement(asset, "mesh", name=path.stem, file=path.name, inertia="shell")
+        ET.SubElement(world, "geom", type="mesh", mesh=path.stem)
+    shaped = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    assert (shaped.nmesh, shaped.ngeom) == (LINKS_WITH_SHAPE, LINKS_WITH_SHAPE)
+    sizes = shaped.mesh_vert.reshape(-1, 3)
+    assert 0.05 < np.ptp(sizes, axis=0).max() < 0.5
 
 
 def test_a_dropped_arm_keeps_its_energy(model: mujoco.MjModel) -> None:

@@ -6,7 +6,6 @@ the numbers of its vertices, of its normals and of its texture points, which no 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from importlib import resources
 
@@ -15,11 +14,13 @@ import numpy as np
 from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.export.c_kinematics import kinematics_files
+from katana450.extensions.export.c_text import comment, double, text
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.rows import distinct_rows
 from katana450.maths.geometry.arrays import FloatArray
 
-TEMPLATES = ("viewer.c", "Makefile", "CMakeLists.txt")
+TEMPLATES = ("viewer.c", "Makefile", "CMakeLists.txt", "CMakePresets.json", "vcpkg.json")
 """Files that are copied unchanged."""
 
 DIGITS, NORMAL_DIGITS = 5, 3
@@ -31,7 +32,8 @@ RESERVED = frozenset(
         *("else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long"),
         *("register", "restrict", "return", "short", "signed", "sizeof", "static", "struct"),
         *("switch", "typedef", "union", "unsigned", "void", "volatile", "while", "robot"),
-        *("viewer", "main", "con", "prn", "aux", "nul"),
+        *("viewer", "kinematics", "links_data", "arm_data", "frames", "arm_kinematics"),
+        *("main", "con", "prn", "aux", "nul"),
     ]
 )
 """Keywords of C, file names of the project, and names that Windows reserves."""
@@ -52,6 +54,7 @@ def c_files(robot: Robot, values: Mapping[str, float]) -> dict[str, bytes]:
         files |= _part(link, names[link.name])
     files["robot.h"] = _header(robot)
     files["robot.c"] = _source(robot, names, values)
+    files |= kinematics_files(robot)
     folder = resources.files("katana450.extensions.export") / "c"
     files |= {name: (folder / name).read_text(encoding="utf-8") for name in TEMPLATES}
     return {name: text.encode() for name, text in files.items()}
@@ -75,7 +78,7 @@ def _part(link: Link, name: str) -> dict[str, str]:
     )
     header = "\n".join(
         (
-            f"/* The link {_comment(link.name)}: metres in its own frame. */",
+            f"/* The link {comment(link.name)}: metres in its own frame. */",
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
@@ -110,7 +113,7 @@ def _part(link: Link, name: str) -> dict[str, str]:
             f"    {{{first}, {len(shape.faces)}, {{{colour}, 1.0f}}, "
             f"{_single(round(material.gleam, 4))}, "
             f"{_single(round(96.0 * (1.0 - material.rough), 2))}}}, "
-            f"/* {_comment(material.name)} */"
+            f"/* {comment(material.name)} */"
         )
         first += len(shape.faces)
     source = "\n".join(
@@ -177,7 +180,7 @@ void NAME_draw(void)
 
 def _header(robot: Robot) -> str:
     return f"""\
-/* {_comment(robot.name)}: its joints, and a function that draws the whole robot. */
+/* {comment(robot.name)}: its joints, and a function that draws the whole robot. */
 #ifndef ROBOT_H
 #define ROBOT_H
 
@@ -191,7 +194,7 @@ def _header(robot: Robot) -> str:
 extern "C" {{
 #endif
 
-#define ROBOT_NAME {_text(robot.name)}
+#define ROBOT_NAME {text(robot.name)}
 #define ROBOT_JOINTS {len(robot.driven)}
 
 /* slides: nonzero if values are in m, else they are in rad. */
@@ -224,10 +227,10 @@ void robot_draw(const double q[]);
 def _source(robot: Robot, names: Mapping[str, str], values: Mapping[str, float]) -> str:
     view = camera(robot)
     joints = [robot.joints[name] for name in robot.driven]
-    start = ", ".join(_double(values[joint.name]) for joint in joints)
+    start = ", ".join(double(values[joint.name]) for joint in joints)
     table = "".join(
-        f"    {{{_text(joint.name)}, {int(joint.slides)}, "
-        f"{_double(joint.lower)}, {_double(joint.upper)}}},\n"
+        f"    {{{text(joint.name)}, {int(joint.slides)}, "
+        f"{double(joint.lower)}, {double(joint.upper)}}},\n"
         for joint in joints
     )
     lines = "\n".join(_drawn(robot, robot.links[0], names))
@@ -247,7 +250,7 @@ const double robot_start[ROBOT_JOINTS + 1] = {{{start + ", " if start else ""}0.
 
 const double robot_eye[3] = {{{_triple(view.eye)}}};
 const double robot_target[3] = {{{_triple(view.target)}}};
-const double robot_field_of_view = {_double(FIELD_OF_VIEW)};
+const double robot_field_of_view = {double(FIELD_OF_VIEW)};
 
 static const double DEGREES = 57.29577951308232;
 
@@ -264,11 +267,11 @@ void robot_draw(const double q[])
 
 def _drawn(robot: Robot, link: Link, names: Mapping[str, str]) -> Iterator[str]:
     """Yield statements that draw a link and its children; they leave the frame changed."""
-    yield f"    /* {_comment(link.name)} */"
+    yield f"    /* {comment(link.name)} */"
     T = link.T_parent_link
     if not np.array_equal(T[:3, :3], np.eye(3)):
         # OpenGL stores matrices by columns.
-        numbers = ", ".join(_double(value) for value in T.T.ravel())
+        numbers = ", ".join(double(value) for value in T.T.ravel())
         yield f"    {{ static const double place[16] = {{{numbers}}}; glMultMatrixd(place); }}"
     elif T[:3, 3].any():
         yield f"    glTranslated({_triple(T[:3, 3])});"
@@ -294,9 +297,9 @@ def _shows(robot: Robot, link: Link) -> bool:
 def _moved(robot: Robot, joint: Joint) -> str:
     value = f"q[{robot.driven.index(joint.leader)}]"
     if (joint.factor, joint.offset) != (1.0, 0.0):
-        value = f"({_double(joint.factor)} * {value} + {_double(joint.offset)})"
+        value = f"({double(joint.factor)} * {value} + {double(joint.offset)})"
     if joint.slides:
-        x, y, z = (f"{_double(part)} * {value}" for part in joint.axis)
+        x, y, z = (f"{double(part)} * {value}" for part in joint.axis)
         return f"glTranslated({x}, {y}, {z});"
     return f"glRotated(DEGREES * {value}, {_triple(joint.axis)});"
 
@@ -310,23 +313,5 @@ def _single(value: float) -> str:
     return f"{round(float(value), 4)!r}f"
 
 
-def _double(value: float) -> str:
-    if math.isinf(value):
-        return "HUGE_VAL" if value > 0.0 else "-HUGE_VAL"
-    return repr(float(value) + 0.0)
-
-
 def _triple(values: FloatArray) -> str:
-    return ", ".join(_double(value) for value in values)
-
-
-def _text(text: str) -> str:
-    """Return ``text`` as a string literal of C, with any characters."""
-    plain = (
-        chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode()
-    )
-    return f'"{"".join(plain)}"'
-
-
-def _comment(text: str) -> str:
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ").replace("\\", "/")
+    return ", ".join(double(value) for value in values)

@@ -9,21 +9,13 @@ from typing import TYPE_CHECKING
 
 from katana450.errors import InputError
 from katana450.extension import CliCommand, Extension, ServeExtension
+from katana450.extensions.export.formats import FORMATS, named
 from katana450.resources import URDF_PATH
 
 if TYPE_CHECKING:
     from katana450.arm.control.scene_objects import Environment
     from katana450.arm.robot.robot import Robot
     from katana450.server.service.nodes import Nodes
-
-FORMATS = {
-    "vrml": "a VRML97 world and one file per part, for LabVIEW, Simulink and X3D browsers",
-    "c": "C arrays and a draw function per link, and an OpenGL viewer with its Makefile",
-    "glb": "binary glTF 2.0, for browsers, Blender and game engines",
-    "urdf": "a zip of a ROS package with the URDF and its meshes",
-    "html": "a page that plays a run, with a time slider; it needs no server",
-}
-"""Export formats and their descriptions."""
 
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +37,17 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         "--pose=0,-1.2,1.4,0.1,0,0.2 (default: all at zero)",
     )
     parser.add_argument(
+        "--plain",
+        action="store_true",
+        help="vrml and x3d: shapes without a Switch, for three.js and other programs that skip it",
+    )
+    parser.add_argument(
+        "--no-objects",
+        dest="objects",
+        action="store_false",
+        help="vrml and x3d: leave out the cup and the basin of a new server",
+    )
+    parser.add_argument(
         "--license",
         metavar="NAME",
         help="urdf: licence of the robot that package.xml states, such as Apache-2.0 (default: MIT "
@@ -61,7 +64,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help="vrml, glb and html: motion that the file plays; .csv with the columns "
+        help="vrml, x3d, glb and html: motion that the file plays; .csv with the columns "
         "t,theta1,...,theta5,gripper or .json with lists of these names, or trace.csv of a report",
     )
     motion.add_argument(
@@ -80,21 +83,26 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    if options.format != "urdf" and (options.license or options.maintainer):
+    row = FORMATS[options.format]
+    if not row.licensed and (options.license or options.maintainer):
+        names = " or ".join(named(lambda each: each.licensed))
         raise InputError(
-            f"{options.format} states no licence and no maintainer. Use these options with urdf."
+            f"{options.format} states no licence and no maintainer. Use these options with {names}."
         )
-    if options.format == "html":
+    if not row.scene and (options.plain or not options.objects):
+        names = " or ".join(named(lambda each: each.scene))
+        raise InputError(f"{options.format} has no Switch and no objects. Use {names}.")
+    if row.files is None:
         from katana450.extensions.export.page import write_page
 
         return write_page(options)
     from katana450.extensions.export.export import export
 
-    return export(options)
+    return export(options, row.files)
 
 
 def _listed() -> str:
-    return "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
+    return "; ".join(f"{name}: {row.help}" for name, row in FORMATS.items())
 
 
 def named_address(text: str) -> tuple[str, str]:

@@ -9,25 +9,32 @@ the colours.
 from __future__ import annotations
 
 import copy
-import io
 import xml.etree.ElementTree as ET
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
 from katana450.arm.robot.description import checked
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual, mesh_file
 from katana450.errors import RobotDescriptionError
+from katana450.extensions.export.archive import zipped
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.obj_text import LIBRARY, mtl_text, obj_text
-
-EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Time stamp of every file in the zip: the same robot gives the same bytes."""
+from katana450.extensions.export.ros2.control import control_xacro, controllers_yaml
+from katana450.extensions.export.ros2.display import (
+    RVIZ,
+    control_launch,
+    display_launch,
+    rviz_text,
+)
+from katana450.extensions.export.ros2.groups import groups_of
+from katana450.extensions.export.ros2.manifest import Maintainer, cmake_text, manifest_text
+from katana450.extensions.export.ros2.srdf import srdf_text
 
 CONVERTED = (".glb", ".gltf")
 """Suffixes of meshes that become OBJ; others are copied unchanged."""
@@ -38,39 +45,6 @@ MUJOCO = {"strippath": "true", "meshdir": "../meshes", "fusestatic": "false"}
 
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Attributes of an inertia."""
-
-CMAKE = """\
-cmake_minimum_required(VERSION 3.8)
-project({name} NONE)
-find_package(ament_cmake REQUIRED)
-install(DIRECTORY {folders} DESTINATION share/${{PROJECT_NAME}})
-ament_package()
-"""
-"""Template of CMakeLists.txt."""
-
-MANIFEST = """\
-<?xml version="1.0"?>
-<package format="3">
-  <name>{name}</name>
-  <version>0.1.0</version>
-  <description>URDF and meshes of {robot}</description>
-  <maintainer email={email}>{maintainer}</maintainer>
-  <license>{license}</license>
-  <buildtool_depend>ament_cmake</buildtool_depend>
-  <export>
-    <build_type>ament_cmake</build_type>
-  </export>
-</package>
-"""
-"""Template of package.xml."""
-
-
-class Maintainer(NamedTuple):
-    """The person that `package.xml` names as responsible for the package."""
-
-    name: str
-    email: str
-
 
 UNSTATED_LICENSE = "TODO: License declaration"
 """Placeholder for an unknown licence, as in ROS's package generator."""
@@ -105,22 +79,32 @@ def package_files(
     package = f"{plain.lower()}_description"
     _weigh_frames(root)
     meshes = _with_meshes(root, path.parent, f"package://{package}/")
-    manifest = MANIFEST.format(
-        name=package,
-        robot=escape(robot),
-        license=escape(license_name),
-        maintainer=escape(maintainer.name),
-        email=quoteattr(maintainer.email),
-    )
     files = {
-        "package.xml": manifest.encode(),
-        "CMakeLists.txt": CMAKE.format(
-            name=package, folders="urdf meshes" if meshes else "urdf"
-        ).encode(),
         f"urdf/{plain}.urdf": ET.tostring(root, encoding="utf-8", xml_declaration=True),
         **meshes,
+        **_launched(load(path), package, plain),
     }
-    return {f"{package}.zip": _zipped({f"{package}/{n}": c for n, c in files.items()})}
+    files = {
+        "package.xml": manifest_text(package, robot, license_name, maintainer).encode(),
+        "CMakeLists.txt": cmake_text(package, files).encode(),
+        **files,
+    }
+    return {f"{package}.zip": zipped({f"{package}/{n}": c for n, c in files.items()})}
+
+
+def _launched(robot: Robot, package: str, plain: str) -> dict[str, bytes]:
+    """Return the files by which ROS shows and drives ``robot``; ``plain`` is its name in files."""
+    xacro = f"{plain}.control.xacro"
+    controllers = ["joint_state_broadcaster", *(group.controller for group in groups_of(robot))]
+    texts = {
+        f"urdf/{xacro}": control_xacro(robot, f"{plain}.urdf"),
+        "config/controllers.yaml": controllers_yaml(robot),
+        f"config/{plain}.srdf": srdf_text(robot),
+        "launch/display.launch.py": display_launch(package, f"{plain}.urdf"),
+        "launch/control.launch.py": control_launch(package, xacro, controllers),
+        f"rviz/{RVIZ}": rviz_text(robot),
+    }
+    return {name: text.encode() for name, text in texts.items()}
 
 
 def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes]:
@@ -250,13 +234,3 @@ def _configure_mujoco(root: ET.Element) -> None:
     if compiler is None:
         compiler = ET.SubElement(extension, "compiler")
     compiler.attrib.update(MUJOCO)
-
-
-def _zipped(files: dict[str, bytes]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, content in sorted(files.items()):
-            entry = zipfile.ZipInfo(name, EPOCH)
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
-    return buffer.getvalue()

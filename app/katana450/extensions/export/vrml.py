@@ -1,30 +1,35 @@
 """A robot as a VRML97 world, in the structure of the paper's LabVIEW and Simulink scenes.
 
-Geometry is given in the root's frame with all joints at zero, as a CAD program exports an assembly.
-Each joint is a Transform whose `center` is a point of its axis and whose `rotation` is about that
-axis. The nested Transforms are therefore the product of exponentials, link by link.
+Each joint is a Transform whose `rotation` is about its axis in the root's frame, between two that
+bring a point of the axis to the origin and back: VTK ignores `center`. The nested Transforms are
+therefore the product of exponentials, link by link. Each link is a Transform with its pose while
+all joints are at zero, so that a program that computes absolute poses finds the frame of the link.
 
 The shapes of a link are in a Switch: 0 shows them as made, 1 painted in one colour, -1 hides them.
+A plain world has the shapes alone, for programs that skip a Switch.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.initial_camera import FIELD_OF_VIEW
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.errors import InputError
 from katana450.extensions.export.names import distinct
+from katana450.extensions.export.placed_object import PlacedObject
 from katana450.extensions.export.trajectory_file import RecordedMotion
-from katana450.extensions.export.vrml_names import VrmlNames
+from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
 from katana450.extensions.export.vrml_text import world_text
+from katana450.extensions.export.vrml_views import looking, views
+from katana450.extensions.export.x3d_text import x3d_text
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -33,6 +38,9 @@ DIGITS = 5
 
 NORMAL_DIGITS = 3
 """Decimal places of a normal."""
+
+SURFACE = "_surface"
+"""Put, with a number, behind the name of a link or object for its face sets."""
 
 SKY = (0.87, 0.89, 0.92)
 """Colour of the background."""
@@ -43,19 +51,52 @@ Z_UP = (1.0, 0.0, 0.0, -math.pi / 2.0)
 _TURN = so3.rotation_x(-math.pi / 2.0)
 
 
+class _Writing:
+    """State of the writing of one world.
+
+    Attributes:
+        robot: the robot.
+        names: its names in the world.
+        objects: names of the Transform and the appearance of each object, by its own name.
+        plain: whether the world has no Switch.
+        surface: suffix, before a number, of the name of a link or object for its face sets.
+        materials: the materials that have a node already.
+    """
+
+    def __init__(self, robot: Robot, objects: Sequence[PlacedObject], *, plain: bool) -> None:
+        self.robot = robot
+        self.names = VrmlNames(robot)
+        self.objects = self.names.objects([each.name for each in objects])
+        self.plain = plain
+        placed = [name for name, _ in self.objects.values()]
+        self.surface = self.names.unused_suffix(SURFACE, placed)
+        self.materials: set[Material] = set()
+
+
 def world_of(
-    robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
+    robot: Robot,
+    values: Mapping[str, float],
+    motion: RecordedMotion | None = None,
+    objects: Sequence[PlacedObject] = (),
+    *,
+    plain: bool = False,
 ) -> World:
     """Return the whole robot at the joint ``values`` [rad, m], or playing ``motion``.
 
     A motion also sets the static pose to its first sample, for programs that do not play it.
+    ``objects`` stand around the robot. A ``plain`` world has no Switch.
     """
     values = values if motion is None else motion.start
-    names = VrmlNames(robot)
-    root = _link(robot, robot.links[0], values, names, set())
+    writing = _Writing(robot, objects, plain=plain)
+    names = writing.names
+    contents = [_link(writing, robot.links[0], values)]
+    for each in objects:
+        name, dressed = writing.objects[each.name]
+        shown = _dressed(writing, each.shapes, each.colour, name, dressed)
+        contents.append(Node("Transform", (*_pose(each.T), ("children", shown)), name))
     nodes = [
-        *_surroundings(robot),
-        Node("Transform", (("rotation", Z_UP), ("children", (root,)))),
+        *_surroundings(robot, values),
+        Node("Transform", (("rotation", Z_UP), ("children", tuple(contents)))),
     ]
     routes: list[Route] = []
     if motion is not None:
@@ -70,132 +111,147 @@ def world_of(
     return World(tuple(nodes), tuple(routes))
 
 
-def vrml_files(
-    robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
-) -> dict[str, bytes]:
-    """Return name and content of the file of the robot, and of one file per link with shapes."""
+def vrml_files(robot: Robot, world: World) -> dict[str, bytes]:
+    """Return name and content of the file of ``world``, and of one file per link with shapes."""
     (whole,) = distinct([robot.name])
-    files = {f"{whole}.wrl": world_text(world_of(robot, values, motion)).encode()}
+    files = {f"{whole}.wrl": world_text(world).encode()}
     links = [link for link in robot.links if link.shapes]
     for link, name in zip(links, distinct(link.name for link in links), strict=True):
         files[f"parts/{name}.wrl"] = world_text(part_world(robot, link)).encode()
     return files
 
 
+def x3d_files(robot: Robot, world: World) -> dict[str, bytes]:
+    """Return name and content of the file of ``world``."""
+    (whole,) = distinct([robot.name])
+    return {f"{whole}.x3d": x3d_text(world).encode()}
+
+
 def part_world(robot: Robot, link: Link) -> World:
     """Return one link at its place with all joints at zero, z up; all of them form the robot."""
-    names = VrmlNames(robot)
-    shapes = _shapes(robot, link, names, set())
-    part = Node("Group", (("children", tuple(shapes)),), names.links[link.name])
+    writing = _Writing(robot, (), plain=True)
     title = Node("WorldInfo", (("title", f"{robot.name} {link.name}"),))
-    return World((title, Node("Transform", (("rotation", Z_UP), ("children", (part,))))))
+    placed = (_placed(writing, link),)
+    return World((title, Node("Transform", (("rotation", Z_UP), ("children", placed)))))
 
 
-def _surroundings(robot: Robot) -> list[Node]:
-    view = camera(robot)
-    R = _TURN @ _looking(view.target - view.eye)
-    w = so3.log(R)
-    angle = float(np.linalg.norm(w))
-    axis = w / angle if angle else np.array([0.0, 0.0, 1.0])
-    return [
+def _surroundings(robot: Robot, values: Mapping[str, float]) -> list[Node]:
+    nodes = [
         Node(
             "WorldInfo",
             (("title", robot.name), ("info", ("Metres and radians; z of the root is up.",))),
         ),
         Node("NavigationInfo", (("type", ("EXAMINE", "ANY")),)),
         Node("Background", (("skyColor", SKY),)),
-        Node(
-            "Viewpoint",
-            (
-                ("position", _rounded(_TURN @ view.eye, 6)),
-                ("orientation", _rounded([*axis, angle], 9)),
-                ("fieldOfView", FIELD_OF_VIEW),
-                ("description", "All of it"),
-            ),
-        ),
         Node("DirectionalLight", (("direction", (0.3, -1.0, -0.4)), ("intensity", 0.6))),
     ]
+    for title, view in views(robot, values).items():
+        nodes.append(
+            Node(
+                "Viewpoint",
+                (
+                    ("position", _rounded(_TURN @ view.eye, 6)),
+                    ("orientation", _axis_angle(_TURN @ looking(view.target - view.eye))),
+                    ("fieldOfView", FIELD_OF_VIEW),
+                    ("description", title),
+                ),
+            )
+        )
+    return nodes
 
 
-def _looking(direction: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) in the root of a camera along ``direction`` (3,).
-
-    Its x points right, y up and -z ahead.
-    """
-    back = -direction / np.linalg.norm(direction)
-    right = np.cross((0.0, 0.0, 1.0), back)
-    right /= np.linalg.norm(right)
-    return np.column_stack((right, np.cross(back, right), back))
-
-
-def _link(
-    robot: Robot,
-    link: Link,
-    values: Mapping[str, float],
-    names: VrmlNames,
-    written: set[Material],
-) -> Node:
-    """Return the node of a link with all its children; ``written`` collects the materials."""
-    own = _switch(robot, link, names, written)
-    children_nodes = [_link(robot, other, values, names, written) for other in robot.children(link)]
-    center = ("center", _rounded(robot.home[link.name][:3, 3], 9))
-    children = ("children", (*own, *children_nodes))
+def _link(writing: _Writing, link: Link, values: Mapping[str, float]) -> Node:
+    """Return the node of a link and its joint, with those of all links that it carries."""
+    robot = writing.robot
+    # In the order of the file, so that a material is defined where it is first used.
+    contents = (
+        _placed(writing, link),
+        *(_link(writing, other, values) for other in robot.children(link)),
+    )
     if link.joint is None:
-        return Node("Transform", (center, children), names.links[link.name])
-    group = Node("Group", (children,), names.links[link.name])
-    moved = _moved(robot, link.joint, values[link.joint.name])
-    return Node("Transform", (center, moved, ("children", (group,))), names.joints[link.joint.name])
+        return _group(contents) if len(contents) > 1 else contents[0]
+    axis = robot.axis(link.joint)
+    name, value = writing.names.joints[link.joint.name], values[link.joint.name]
+    if link.joint.slides:
+        moved: tuple[str, Value] = ("translation", _rounded(value * axis, 9))
+        return Node("Transform", (moved, ("children", contents)), name)
+    point = robot.home[link.name][:3, 3]
+    back = _shifted(-point, contents)
+    turned = (("rotation", (*_rounded(axis, 9), value)), ("children", (back,)))
+    return _shifted(point, (Node("Transform", turned, name),))
 
 
-def _switch(robot: Robot, link: Link, names: VrmlNames, written: set[Material]) -> tuple[Node, ...]:
-    """Return the Switch of a link: its shapes as made, and again to be painted."""
-    if not link.shapes:
-        return ()
-    dressed = names.dressed[link.name]
-    colours = (("diffuseColor", _rounded(link.colour, 4)), ("transparency", 0.0))
+def _shifted(by: FloatArray, children: tuple[Node, ...]) -> Node:
+    return Node("Transform", (("translation", _rounded(by, 9)), ("children", children)))
+
+
+def _group(children: Sequence[Node]) -> Node:
+    return Node("Group", (("children", tuple(children)),))
+
+
+def _placed(writing: _Writing, link: Link) -> Node:
+    """Return the Transform of a link with its shapes, as placed with all joints at zero."""
+    names = writing.names
+    name, dressed = names.links[link.name], names.dressed.get(link.name)
+    shown = () if dressed is None else _dressed(writing, link.shapes, link.colour, name, dressed)
+    pose = _pose(writing.robot.home[link.name])
+    return Node("Transform", (*pose, ("children", shown)), name)
+
+
+def _pose(T: FloatArray) -> tuple[tuple[str, Value], ...]:
+    """Return the fields of a Transform with the pose ``T`` (4, 4)."""
+    return ("translation", _rounded(T[:3, 3], 9)), ("rotation", _axis_angle(T[:3, :3]))
+
+
+def _axis_angle(R: FloatArray) -> tuple[float, ...]:
+    w = so3.log(R)
+    angle = float(np.linalg.norm(w))
+    return _rounded([*(w / angle if angle else (0.0, 0.0, 1.0)), angle], 9)
+
+
+def _dressed(
+    writing: _Writing,
+    shapes: Sequence[VisualMesh],
+    colour: Sequence[float],
+    name: str,
+    dressed: NodeNames,
+) -> tuple[Node, ...]:
+    """Return the Switch of a link or object: its shapes as made, and again to be painted.
+
+    A plain world has the shapes as made alone.
+    """
+    made = [_shape(writing, shape) for shape in shapes]
+    if writing.plain:
+        return tuple(made)
+    colours = (("diffuseColor", _rounded(colour, 4)), ("transparency", 0.0))
     paint: Node | Use = Node("Material", colours, dressed.paint)
-    made: list[Node] = []
     painted: list[Node] = []
-    for number, shape in enumerate(_shapes(robot, link, names, written)):
-        name = f"{names.links[link.name]}{names.surface}{number}"
+    for number, shape in enumerate(made):
+        surface_name = f"{name}{writing.surface}{number}"
         look, (field, surface) = shape.fields
         assert isinstance(surface, Node)
-        made.append(replace(shape, fields=(look, (field, replace(surface, name=name)))))
+        made[number] = replace(shape, fields=(look, (field, replace(surface, name=surface_name))))
         one = Node("Appearance", (("material", paint),))
-        painted.append(Node("Shape", (("appearance", one), (field, Use(name)))))
+        painted.append(Node("Shape", (("appearance", one), (field, Use(surface_name)))))
         paint = Use(dressed.paint)
-    choices = tuple(Node("Group", (("children", tuple(each)),)) for each in (made, painted))
+    choices = (_group(made), _group(painted))
     return (Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.appearance),)
 
 
-def _moved(robot: Robot, joint: Joint, value: float) -> tuple[str, Value]:
-    axis = robot.axis(joint)
-    if joint.slides:
-        return "translation", _rounded(value * axis, 9)
-    return "rotation", (*_rounded(axis, 9), value)
-
-
-def _shapes(robot: Robot, link: Link, names: VrmlNames, written: set[Material]) -> list[Node]:
-    T = robot.home[link.name]
-    return [_shape(shape, T, names, written) for shape in link.shapes]
-
-
-def _shape(shape: VisualMesh, T: FloatArray, names: VrmlNames, written: set[Material]) -> Node:
-    name = names.appearance(shape.material)
+def _shape(writing: _Writing, shape: VisualMesh) -> Node:
+    name = writing.names.appearances.get(shape.material)
     appearance: Node | Use
-    if shape.material in written:
+    if name is not None and shape.material in writing.materials:
         appearance = Use(name)
     else:
-        written.add(shape.material)
+        writing.materials.add(shape.material)
         appearance = Node("Appearance", (("material", _material(shape.material)),), name)
-    points = shape.vertices @ T[:3, :3].T + T[:3, 3]
-    normals = shape.normals @ T[:3, :3].T
     index = np.column_stack((shape.faces, np.full(len(shape.faces), -1)))
     surface = Node(
         "IndexedFaceSet",
         (
-            ("coord", Node("Coordinate", (("point", _rounded(points, DIGITS)),))),
-            ("normal", Node("Normal", (("vector", _rounded(normals, NORMAL_DIGITS)),))),
+            ("coord", Node("Coordinate", (("point", _rounded(shape.vertices, DIGITS)),))),
+            ("normal", Node("Normal", (("vector", _rounded(shape.normals, NORMAL_DIGITS)),))),
             ("coordIndex", tuple(index.ravel().tolist())),
         ),
     )

@@ -36,7 +36,7 @@ class VrmlNames:
         dressed: names of the appearance of each link with a shape.
         clock: name of the TimeSensor of a motion.
         way: suffix of a joint's name for its interpolator.
-        surface: suffix, before a number, of a link's name for its face sets.
+        appearances: name of the Appearance of each material.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -59,19 +59,19 @@ class VrmlNames:
         self.dressed: Mapping[str, NodeNames] = {
             name: NodeNames(next(unused), next(unused)) for name in shown
         }
-        self._appearances = {material: next(unused) for material in ordered}
+        self.appearances: Mapping[Material, str] = {each: next(unused) for each in ordered}
         self.clock = next(unused)
-        self.way = "_motion"
-        while any(f"{joint}{self.way}" in self._made for joint in self.joints.values()):
-            self.way += "_"
-        self.surface = "_surface"
-        """Put, with a number, behind a link's name for its face sets."""
-        while any(f"{link}{self.surface}" in name for link in links for name in self._made):
-            self.surface += "_"
+        self.way = self.unused_suffix("_motion")
 
-    def appearance(self, material: Material) -> str:
-        """Return the name of the Appearance of ``material``."""
-        return self._appearances[material]
+    def unused_suffix(self, suffix: str, others: Sequence[str] = ()) -> str:
+        """Return ``suffix``, longer if a name with it would begin another name of the world.
+
+        ``others``: names of the world beside those of the robot.
+        """
+        taken = [name.lower() for name in (*self._made, *others)]
+        while any(f"{name}{suffix}" in other for name in taken for other in taken):
+            suffix += "_"
+        return suffix
 
     def objects(self, names: Sequence[str]) -> Mapping[str, tuple[str, NodeNames]]:
         """Return the names of the Transform and the appearance of each object.

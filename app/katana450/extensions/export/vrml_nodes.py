@@ -1,6 +1,7 @@
 """The VRML world of a running arm by DEF names: the values that can be read and set.
 
-Setting a joint's rotation makes it the target of a motion; it never sets the position itself.
+Setting a joint's rotation, or the pose of the tool, makes it the target of a motion; it never sets
+the position itself.
 Settings of objects and paints become commands as well. The names are those of the exported files.
 """
 
@@ -9,8 +10,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -24,55 +23,18 @@ from katana450.arm.robot.link import Joint
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
+from katana450.extensions.export.vrml_gripper_nodes import gripper_nodes
+from katana450.extensions.export.vrml_named import FieldOrders, FieldValue, NamedField, NamedNode
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import WIDTHS, Type
-from katana450.extensions.touch.foundation import PadPressure
-from katana450.extensions.touch.gripper_sensors import INDICES
-from katana450.extensions.touch.pad import COLUMNS, ROWS
 from katana450.extensions.touch.touch_model import TouchModel
-from katana450.maths.geometry import so3
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
 from katana450.server.service.nodes import Nodes
 
 AXIS_TOLERANCE = 1e-6
 """[rad] Maximum angle between the axis of a rotation and that of the joint."""
-
-FieldValue = float | list[float]
-"""The value of a field: one number or several."""
-
-
-class _Orders:
-    """The commands of one message, collected until all of it is parsed."""
-
-    def __init__(self, state: State) -> None:
-        self.state = state
-        self.axes: dict[int, float] = {}
-        self.others: list[cmd.Command] = []
-
-    def command(self) -> cmd.Command:
-        """Return all of them as one command."""
-        turned = (cmd.SetAxes(tuple(self.axes.items())),) if self.axes else ()
-        commands = (*turned, *self.others)
-        return commands[0] if len(commands) == 1 else cmd.Batch(commands)
-
-
-@dataclass(frozen=True, eq=False)
-class _Field:
-    """A field: its type, the function that reads it, and one that sets it if that is possible."""
-
-    type: Type
-    read: Callable[[State], FieldValue]
-    put: Callable[[_Orders, FieldValue | None], None] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Node:
-    """A node: its kind, the object that it belongs to, and its fields."""
-
-    kind: str
-    of: str
-    fields: Mapping[str, _Field]
 
 
 class VrmlNodes(Nodes):
@@ -89,9 +51,11 @@ class VrmlNodes(Nodes):
         self._gripper = next((f for f in self._fingers if robot.joints[f].leader == f), None)
         self._surroundings = environment
         self._names = VrmlNames(robot)
+        # The newest state whose links were placed, and their poses.
+        self._placed: tuple[State | None, Mapping[str, FloatArray]] = (None, {})
         self._fixed = self._of_the_robot()
         # The nodes for the present objects, with the names of these objects as the key.
-        self._known: tuple[tuple[str, ...], Mapping[str, _Node]] = ((), self._fixed)
+        self._known: tuple[tuple[str, ...], Mapping[str, NamedNode]] = ((), self._fixed)
 
     def world(self, state: State) -> answers.World:
         """Return all nodes with their present values."""
@@ -128,7 +92,7 @@ class VrmlNodes(Nodes):
 
     def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:
         """Return the command for all settings. Raises InputError with the reason of a refusal."""
-        orders = _Orders(state)
+        orders = FieldOrders(state)
         for each in settings:
             name = f"{each.node}.{each.field}"
             field = self._field(state, each.node, each.field)
@@ -136,9 +100,28 @@ class VrmlNodes(Nodes):
                 raise InputError(f"{name} can be read but not set.")
             field.put(orders, None if each.value is None else _fitting(name, field, each.value))
         self._check_carried(orders)
-        return orders.command()
+        commands = (*self._motion(orders), *orders.others)
+        return commands[0] if len(commands) == 1 else cmd.Batch(commands)
 
-    def _check_carried(self, orders: _Orders) -> None:
+    def _motion(self, orders: FieldOrders) -> tuple[cmd.Command, ...]:
+        """Return the command for the arm, if any. Raises InputError for two targets."""
+        if orders.position is None and orders.R is None:
+            return (cmd.SetAxes(tuple(orders.axes.items())),) if orders.axes else ()
+        if orders.axes:
+            raise InputError("One message sets either joints or the tool. Leave one of them out.")
+        T = np.array(self._pose(orders.state, orders.state.tool))
+        T[:3, 3] = T[:3, 3] if orders.position is None else orders.position
+        T[:3, :3] = T[:3, :3] if orders.R is None else orders.R
+        T = se3.inverse(self._robot.require_arm().T_base_shoulder) @ T
+        return (cmd.MoveTool(T[:3, 3]) if orders.R is None else cmd.SetPose(T),)
+
+    def _pose(self, state: State, link: str) -> FloatArray:
+        """Return the pose (4, 4) of a link in the root's frame [m]."""
+        if state is not self._placed[0]:
+            self._placed = state, self._robot.frames(self._values(state))
+        return self._placed[1][link]
+
+    def _check_carried(self, orders: FieldOrders) -> None:
         """Raise InputError if an object has no support after all moves."""
         moves = [each for each in orders.others if isinstance(each, cmd.MoveObject)]
         objects = functools.reduce(with_moved_object, moves, orders.state).objects
@@ -147,7 +130,7 @@ class VrmlNodes(Nodes):
             if is_loose(scene_object):
                 check_carried(self._surroundings.table, objects, scene_object)
 
-    def _field(self, state: State, node: str, field: str) -> _Field:
+    def _field(self, state: State, node: str, field: str) -> NamedField:
         found = self._nodes(state).get(node)
         if found is None:
             raise InputError(
@@ -158,7 +141,7 @@ class VrmlNodes(Nodes):
             raise InputError(f"{node!r} is a {found.kind} with {known}; it has no field {field!r}.")
         return found.fields[field]
 
-    def _nodes(self, state: State) -> Mapping[str, _Node]:
+    def _nodes(self, state: State) -> Mapping[str, NamedNode]:
         names = tuple(scene_object.name for scene_object in state.objects)
         if names != self._known[0]:
             nodes = dict(self._fixed)
@@ -168,9 +151,10 @@ class VrmlNodes(Nodes):
             self._known = (names, nodes)
         return self._known[1]
 
-    def _of_the_robot(self) -> dict[str, _Node]:
-        nodes: dict[str, _Node] = {}
+    def _of_the_robot(self) -> dict[str, NamedNode]:
+        nodes: dict[str, NamedNode] = {}
         for link in self._robot.links:
+            nodes[self._names.links[link.name]] = self._link(link.name)
             if link.joint is not None:
                 nodes[self._names.joints[link.joint.name]] = self._joint(link.joint)
             if link.shapes:
@@ -178,10 +162,10 @@ class VrmlNodes(Nodes):
                 nodes |= _dress(link.name, f"link {link.name}", dressed, link.colour)
         hand = self._surroundings.hand
         if hand is not None and isinstance(hand.grip_model, TouchModel):
-            nodes |= _touch(hand.grip_model)
+            nodes |= gripper_nodes(hand.grip_model)
         return nodes
 
-    def _joint(self, joint: Joint) -> _Node:
+    def _joint(self, joint: Joint) -> NamedNode:
         axis = self._robot.axis(joint)
         name = joint.name
 
@@ -189,12 +173,11 @@ class VrmlNodes(Nodes):
             value = self._values(state)[name]
             return [*(value * axis).tolist()] if joint.slides else [*axis.tolist(), value]
 
-        def put(orders: _Orders, value: FieldValue | None) -> None:
-            if not isinstance(value, list):
-                raise InputError(f"{name} has no default. Give a value.")
+        def put(orders: FieldOrders, value: FieldValue | None) -> None:
+            given = _given(name, value)
             if joint.leader != name:
                 raise InputError(f"{name} follows {joint.leader}. Set that joint.")
-            amount = _along(name, axis, value) if joint.slides else _about(name, axis, value)
+            amount = _along(name, axis, given) if joint.slides else _about(name, axis, given)
             if name in self._axes:
                 orders.axes[self._axes[name]] = amount
             elif name == self._gripper:
@@ -206,12 +189,42 @@ class VrmlNodes(Nodes):
 
         moved = "translation" if joint.slides else "rotation"
         kind = Type.VECTOR if joint.slides else Type.ROTATION
-        link = next(link for link in self._robot.links if link.joint is joint)
-        center: list[float] = self._robot.home[link.name][:3, 3].tolist()
-        fields = {moved: _Field(kind, read, put), "center": _Field(Type.VECTOR, lambda _: center)}
-        return _Node("Transform", f"joint {name}", fields)
+        return NamedNode("Transform", f"joint {name}", {moved: NamedField(kind, read, put)})
 
-    def _object(self, name: str) -> _Node:
+    def _link(self, link: str) -> NamedNode:
+        """Return the node of a link with its pose in the root's frame; that of the tool is set."""
+
+        def translation(state: State) -> FieldValue:
+            return [*self._pose(state, link)[:3, 3].tolist()]
+
+        def rotation(state: State) -> FieldValue:
+            return _axis_angle(self._pose(state, link)[:3, :3])
+
+        def check_tool(orders: FieldOrders) -> None:
+            if self._robot.arm is None or link != orders.state.tool:
+                raise InputError(
+                    f"{link} is not the tool frame of the arm and cannot be set. Set "
+                    f"{orders.state.tool or 'a joint'}."
+                )
+
+        def move(orders: FieldOrders, value: FieldValue | None) -> None:
+            check_tool(orders)
+            orders.position = np.array(_given(link, value))
+
+        def turn(orders: FieldOrders, value: FieldValue | None) -> None:
+            check_tool(orders)
+            orders.R = _rotation(link, _given(link, value))
+
+        return NamedNode(
+            "Transform",
+            f"link {link}",
+            {
+                "translation": NamedField(Type.VECTOR, translation, move),
+                "rotation": NamedField(Type.ROTATION, rotation, turn),
+            },
+        )
+
+    def _object(self, name: str) -> NamedNode:
         def pose(state: State) -> FloatArray:
             scene_object = _known_object(state, name)
             return self._surroundings.pose(scene_object, state.x)
@@ -222,86 +235,56 @@ class VrmlNodes(Nodes):
         def translation(state: State) -> FieldValue:
             return [*pose(state)[:3, 3].tolist()]
 
-        def move(orders: _Orders, value: FieldValue | None) -> None:
+        def move(orders: FieldOrders, value: FieldValue | None) -> None:
             position = np.array(_out_of_the_hand(orders, name, value))
             orders.others.append(cmd.MoveObject(name, position=position))
 
-        def turn(orders: _Orders, value: FieldValue | None) -> None:
+        def turn(orders: FieldOrders, value: FieldValue | None) -> None:
             R = _rotation(name, _out_of_the_hand(orders, name, value))
             orders.others.append(cmd.MoveObject(name, R=R))
 
-        return _Node(
+        return NamedNode(
             "Transform",
             f"object {name}",
             {
-                "translation": _Field(Type.VECTOR, translation, move),
-                "rotation": _Field(Type.ROTATION, rotation, turn),
+                "translation": NamedField(Type.VECTOR, translation, move),
+                "rotation": NamedField(Type.ROTATION, rotation, turn),
             },
         )
 
 
-def _touch(model: TouchModel) -> dict[str, _Node]:
-    """Return the nodes of the pads and of the sensors of the gripper, which the files lack."""
-
-    def pad(number: int) -> _Node:
-        def value(state: State, of: Callable[[PadPressure], FieldValue], none: FieldValue) -> Any:
-            squeeze = model.squeeze(state)
-            return none if squeeze is None else of(squeeze.pads[number])
-
-        nothing = [0.0] * (ROWS * COLUMNS)
-        fields = {
-            "force": _Field(Type.FLOAT, lambda state: value(state, lambda at: at.force, 0.0)),
-            "centre": _Field(
-                Type.PAIR,
-                lambda state: value(state, lambda at: [*(at.centre or (0.0, 0.0))], [0.0, 0.0]),
-            ),
-            "pressure": _Field(
-                Type.FLOAT_LIST,
-                lambda state: value(state, lambda at: at.pressure.ravel().tolist(), nothing),
-            ),
-        }
-        return _Node("Touch", f"link {model.pads[number].finger}", fields)
-
-    def sensor(name: str) -> _Field:
-        return _Field(Type.INT, lambda state: float(model.sensors(state).named()[name]))
-
-    sensors = {name: sensor(name) for name in INDICES}
-    pads = {f"touch_{each.finger.split('_')[1]}": pad(n) for n, each in enumerate(model.pads)}
-    return {**pads, "gripper_sensors": _Node("Sensors", "gripper", sensors)}
-
-
-def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, _Node]:
+def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, NamedNode]:
     """Return the Switch of a link or object, and the Material of its paint."""
 
-    def put(trait: AppearanceTrait) -> Callable[[_Orders, FieldValue | None], None]:
-        def changed(orders: _Orders, value: FieldValue | None) -> None:
+    def put(trait: AppearanceTrait) -> Callable[[FieldOrders, FieldValue | None], None]:
+        def changed(orders: FieldOrders, value: FieldValue | None) -> None:
             trait_value = tuple(value) if isinstance(value, list) else value
             orders.others.append(cmd.SetAppearance(name, trait, trait_value))
 
         return changed
 
     return {
-        dressed.appearance: _Node(
+        dressed.appearance: NamedNode(
             "Switch",
             of,
             {
-                "whichChoice": _Field(
+                "whichChoice": NamedField(
                     Type.INT,
                     lambda state: float(appearance_of(state, name).choice.value),
                     put(AppearanceTrait.CHOICE),
                 )
             },
         ),
-        dressed.paint: _Node(
+        dressed.paint: NamedNode(
             "Material",
             of,
             {
-                "diffuseColor": _Field(
+                "diffuseColor": NamedField(
                     Type.COLOR,
                     lambda state: list(appearance_of(state, name).colour or colour),
                     put(AppearanceTrait.COLOUR),
                 ),
-                "transparency": _Field(
+                "transparency": NamedField(
                     Type.FLOAT,
                     lambda state: appearance_of(state, name).transparency,
                     put(AppearanceTrait.TRANSPARENCY),
@@ -311,7 +294,7 @@ def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, 
     }
 
 
-def _fitting(name: str, field: _Field, value: FieldValue) -> FieldValue:
+def _fitting(name: str, field: NamedField, value: FieldValue) -> FieldValue:
     """Return ``value`` if it fits the type of the field. Raises InputError."""
     numbers = value if isinstance(value, list) else [value]
     if len(numbers) != WIDTHS[field.type] or isinstance(value, list) != (len(numbers) > 1):
@@ -322,12 +305,16 @@ def _fitting(name: str, field: _Field, value: FieldValue) -> FieldValue:
     return value
 
 
-def _out_of_the_hand(orders: _Orders, name: str, value: FieldValue | None) -> list[float]:
+def _out_of_the_hand(orders: FieldOrders, name: str, value: FieldValue | None) -> list[float]:
     """Return ``value`` if the object can be moved. Raises InputError."""
     if _known_object(orders.state, name).held:
         raise InputError(f"{name!r} is held. Open the gripper first.")
+    return _given(name, value)
+
+
+def _given(name: str, value: FieldValue | None) -> list[float]:
     if not isinstance(value, list):
-        raise InputError(f"{name} has no default place. Give a place.")
+        raise InputError(f"{name} has no default. Give a value.")
     return value
 
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node, Route, Value
-from katana450.extensions.export.vrml_text import HEADER, Reader
+from katana450.extensions.export.vrml_text import HEADER
 from katana450.extensions.importers.surface import MAX_COPIES, MeshBuilder, MeshReading, MeshSurface
+from katana450.extensions.importers.vrml_reader import Reader
 from katana450.extensions.importers.vrml_solids import (
     MAKERS,
     number,

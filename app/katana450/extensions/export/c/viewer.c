@@ -146,7 +146,7 @@ static void draw(void)
 static int write_picture(const char *name)
 {
     size_t row = 3 * (size_t)width;
-    unsigned char *pixels = malloc(row * (size_t)height);
+    unsigned char *pixels = (unsigned char *)malloc(row * (size_t)height);
     FILE *file = fopen(name, "wb");
     int y, whole = pixels != NULL && file != NULL;
     if (whole) {
@@ -291,7 +291,7 @@ static void follow(void)
     while ((got = recv(link_socket, line + filled, sizeof line - 1 - filled, 0)) > 0) {
         filled += (size_t)got;
         line[filled] = '\0';
-        while ((end = memchr(line, '\n', filled)) != NULL) {
+        while ((end = (char *)memchr(line, '\n', filled)) != NULL) {
             *end = '\0';
             if (!too_long)
                 take_state(line);

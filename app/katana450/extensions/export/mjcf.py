@@ -1,0 +1,313 @@
+"""A robot as MJCF, MuJoCo's own format, with its meshes in a zip.
+
+The model has actuators, sites, keyframes and contact rules, which a URDF cannot state. Frames
+without mass on fixed joints, such as the tool point, are sites. Joints that follow another are
+coupled by an equality.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
+from katana450.arm.robot.visual import PrimitiveShape, Visual
+from katana450.extensions.export.archive import zipped
+from katana450.extensions.export.excluded_pairs import excluded_pairs
+from katana450.extensions.export.home import home_of
+from katana450.extensions.export.names import distinct
+from katana450.extensions.export.obj_text import obj_text
+from katana450.extensions.export.physics import Drive, Inertial, drives_of, inertials_of, is_frame
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+
+WORLD = "world"
+"""Name that MuJoCo keeps for its own root."""
+
+TIMESTEP = 0.001
+"""[s] Step of the simulation, small enough for the drives of the lightest links."""
+
+LEAST_MASS, LEAST_INERTIA = "1e-4", "1e-8"
+"""[kg, kg m^2] Minimum of a moving body, for robots whose file states no masses."""
+
+SITE_RADIUS = "0.004"
+"""[m] Radius with which a frame is drawn."""
+
+COUPLING = {"solref": "0.004 1", "solimp": "0.99 0.999 0.0001"}
+"""Attributes of a stiff equality; its time constant [s] is a few steps."""
+
+VISUAL = {"type": "mesh", "group": "2", "contype": "0", "conaffinity": "0", "mass": "0"}
+"""Attributes of a geometry that is only seen."""
+
+SCENE = {
+    "texture": {
+        "type": "skybox",
+        "builtin": "gradient",
+        "rgb1": "0.87 0.89 0.92",
+        "rgb2": "0.5 0.55 0.6",
+        "width": "32",
+        "height": "192",
+    },
+    "light": {"pos": "1 -1 2.5", "dir": "-0.4 0.4 -1", "castshadow": "true"},
+    "geom": {"name": "floor", "type": "plane", "size": "2 2 0.05", "rgba": "0.75 0.77 0.8 1"},
+}
+"""Sky, light and floor of the scene."""
+
+
+def mjcf_files(robot: Robot, path: Path) -> dict[str, bytes]:
+    """Return name and content of the zip for ``robot``, whose URDF file is at ``path``."""
+    model = _Model(robot, path)
+    (name,) = distinct([robot.name])
+    files = {
+        f"{name}.xml": _text(model.root()),
+        "scene.xml": _text(_scene(f"{name}.xml", robot)),
+        **{f"meshes/{file}.obj": text.encode() for file, text in model.meshes.items()},
+    }
+    return {f"{name}_mjcf.zip": zipped({f"{name}/{each}": files[each] for each in files})}
+
+
+class _Model:
+    """The parts of one model.
+
+    Attributes:
+        meshes: text of each mesh by its name.
+    """
+
+    def __init__(self, robot: Robot, path: Path) -> None:
+        self.meshes: dict[str, str] = {}
+        self._robot = robot
+        self._inertials = inertials_of(path)
+        self._drives = drives_of(robot, path)
+        self._assets = ET.Element("asset")
+        shown = dict.fromkeys(shape.material for link in robot.links for shape in link.shapes)
+        names = distinct(material.name for material in shown)
+        self._materials: dict[Material, str] = dict(zip(shown, names, strict=True))
+        self._files: list[str] = []
+
+    def root(self) -> ET.Element:
+        """Return the element <mujoco>."""
+        robot = self._robot
+        root = ET.Element("mujoco", model=robot.name)
+        ET.SubElement(
+            root,
+            "compiler",
+            angle="radian",
+            meshdir="meshes",
+            autolimits="true",
+            boundmass=LEAST_MASS,
+            boundinertia=LEAST_INERTIA,
+        )
+        ET.SubElement(root, "option", integrator="implicitfast", timestep=repr(TIMESTEP))
+        root.append(self._assets)
+        for material, name in self._materials.items():
+            ET.SubElement(
+                self._assets,
+                "material",
+                name=name,
+                rgba=_numbers((*material.colour, 1.0), 4),
+                specular=_numbers([material.gleam], 4),
+                shininess=_numbers([1.0 - material.rough], 4),
+            )
+        self._add_body(ET.SubElement(root, "worldbody"), robot.links[0])
+        contact = ET.SubElement(root, "contact")
+        for first, second, _ in excluded_pairs(robot):
+            ET.SubElement(contact, "exclude", body1=_body(first), body2=_body(second))
+        self._add_couplings(root)
+        self._add_actuators(root)
+        self._add_keyframes(root)
+        return root
+
+    def _add_body(self, parent: ET.Element, link: Link) -> None:
+        place = _place(link.T_parent_link)
+        if is_frame(self._robot, link, self._inertials):
+            ET.SubElement(
+                parent, "site", {"name": link.name, "size": SITE_RADIUS, "group": "4", **place}
+            )
+            return
+        body = ET.SubElement(parent, "body", {"name": _body(link.name), **place})
+        inertial = self._inertials.get(link.name)
+        if inertial is not None:
+            body.append(_inertial(inertial))
+        if link.joint is not None:
+            body.append(_joint(link.joint, self._drives[link.joint.name]))
+        for shape in link.shapes:
+            material = self._materials[shape.material]
+            mesh = self._mesh(f"{link.name}_{material}", [shape], inertia="shell")
+            ET.SubElement(body, "geom", {"mesh": mesh, "material": material, **VISUAL})
+        for collision in link.collisions:
+            body.append(self._collision(link, collision))
+        for child in self._robot.children(link):
+            self._add_body(body, child)
+
+    def _collision(self, link: Link, collision: Visual) -> ET.Element:
+        """Return the geometry of a collision shape."""
+        geom = ET.Element("geom", group="3", mass="0")
+        source = collision.source
+        size = _primitive(source) if isinstance(source, PrimitiveShape) else None
+        if size is not None:
+            geom.attrib.update(size, **_place(collision.T_body_visual))
+        else:
+            shapes = shapes_of(collision)
+            geom.attrib.update(type="mesh", mesh=self._mesh(f"{link.name}_hull", shapes))
+        return geom
+
+    def _mesh(self, name: str, shapes: Sequence[VisualMesh], **options: str) -> str:
+        """Add a mesh to the files; return its name."""
+        self._files.append(name)
+        name = distinct(self._files)[-1]
+        self.meshes[name] = obj_text(shapes, None)
+        ET.SubElement(self._assets, "mesh", {"name": name, "file": f"{name}.obj", **options})
+        return name
+
+    def _add_couplings(self, root: ET.Element) -> None:
+        followers = [j for j in self._robot.joints.values() if j.leader != j.name]
+        if not followers:
+            return
+        equality = ET.SubElement(root, "equality")
+        for joint in followers:
+            ET.SubElement(
+                equality,
+                "joint",
+                {
+                    "name": f"{joint.name}_follows",
+                    "joint1": joint.name,
+                    "joint2": joint.leader,
+                    "polycoef": _numbers((joint.offset, joint.factor, 0.0, 0.0, 0.0)),
+                    **COUPLING,
+                },
+            )
+
+    def _add_actuators(self, root: ET.Element) -> None:
+        actuators = ET.SubElement(root, "actuator")
+        for name in self._robot.driven:
+            joint, drive = self._robot.joints[name], self._drives[name]
+            limits = _range(joint)
+            ET.SubElement(
+                actuators,
+                "position",
+                {
+                    "name": name,
+                    "joint": name,
+                    "kp": _numbers([drive.stiffness], 3),
+                    "dampratio": "1",
+                    **({"ctrlrange": limits} if limits else {}),
+                },
+            )
+
+    def _add_keyframes(self, root: ET.Element) -> None:
+        frames = ET.SubElement(root, "keyframe")
+        for name, values in keyframes(self._robot).items():
+            ET.SubElement(
+                frames,
+                "key",
+                name=name,
+                qpos=_numbers([values[joint.name] for joint in self._in_order()]),
+                ctrl=_numbers([values[joint] for joint in self._robot.driven]),
+            )
+
+    def _in_order(self) -> Iterator[Joint]:
+        """Yield the joints in the order in which MuJoCo numbers them: depth first."""
+        waiting = [self._robot.links[0]]
+        while waiting:
+            link = waiting.pop()
+            if link.joint is not None:
+                yield link.joint
+            waiting += reversed(self._robot.children(link))
+
+
+def keyframes(robot: Robot) -> dict[str, Mapping[str, float]]:
+    """Return the values of all joints [rad or m] at zero, and for an arm at the app's home."""
+    found = {} if robot.arm is None else {"home": home_of(robot)}
+    return {**found, "zero": robot.every({})}
+
+
+def _body(link: str) -> str:
+    return f"{link}_link" if link == WORLD else link
+
+
+def _inertial(inertial: Inertial) -> ET.Element:
+    moments, axes = inertial.principal
+    return ET.Element(
+        "inertial",
+        mass=repr(inertial.mass),
+        pos=_numbers(inertial.T_link_inertia[:3, 3]),
+        quat=_numbers(so3.to_quaternion(axes)),
+        diaginertia=_numbers(moments),
+    )
+
+
+def _joint(joint: Joint, drive: Drive) -> ET.Element:
+    limits = _range(joint)
+    return ET.Element(
+        "joint",
+        {
+            "name": joint.name,
+            "type": "slide" if joint.slides else "hinge",
+            "axis": _numbers(joint.axis),
+            "armature": _numbers([drive.armature], 7),
+            "damping": _numbers([drive.damping], 5),
+            "frictionloss": _numbers([drive.friction]),
+            **({"range": limits} if limits else {}),
+        },
+    )
+
+
+def _range(joint: Joint) -> str:
+    """Return the limits of ``joint`` as text; empty if it has none."""
+    ends = (joint.lower, joint.upper)
+    return _numbers(ends) if np.isfinite(ends).all() else ""
+
+
+def _primitive(shape: PrimitiveShape) -> dict[str, str] | None:
+    """Return type and size of a box, cylinder or sphere; None for other shapes."""
+    options = shape.options
+    match shape.kind:
+        case "box":
+            return {"type": "box", "size": _numbers(0.5 * np.asarray(options["extents"]))}
+        case "cylinder" if "height" in options:
+            return {
+                "type": "cylinder",
+                "size": _numbers((options["radius"], 0.5 * options["height"])),
+            }
+        case "icosphere":
+            return {"type": "sphere", "size": _numbers([options["radius"]])}
+    return None
+
+
+def _scene(model: str, robot: Robot) -> ET.Element:
+    """Return a scene that shows ``model`` on a floor."""
+    root = ET.Element("mujoco", model=f"{robot.name} on a floor")
+    ET.SubElement(root, "include", file=model)
+    ET.SubElement(ET.SubElement(root, "asset"), "texture", SCENE["texture"])
+    world = ET.SubElement(root, "worldbody")
+    ET.SubElement(world, "light", SCENE["light"])
+    ET.SubElement(world, "geom", SCENE["geom"])
+    return root
+
+
+def _place(T: FloatArray) -> dict[str, str]:
+    """Return position and quaternion of a pose (4, 4) [m], without those that are zero."""
+    found = {}
+    if T[:3, 3].any():
+        found["pos"] = _numbers(T[:3, 3])
+    if not np.array_equal(T[:3, :3], np.eye(3)):
+        found["quat"] = _numbers(so3.to_quaternion(T[:3, :3]))
+    return found
+
+
+def _numbers(values: Sequence[float] | FloatArray, digits: int | None = None) -> str:
+    """Return numbers as text, exactly or with ``digits`` significant digits."""
+    return " ".join(
+        repr(float(value) + 0.0) if digits is None else f"{value:.{digits}g}" for value in values
+    )
+
+
+def _text(root: ET.Element) -> bytes:
+    ET.indent(root)
+    text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"

@@ -1,0 +1,190 @@
+"""Masses, and properties of joints, that a URDF states and kinematics do not need."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.robot.description import checked
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.robot import Robot
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+
+SAG = 1e-3
+"""[rad, m] Maximum displacement of a joint at rest by the weight that it carries."""
+
+INERTIA_RATIO = 0.2
+"""Inertia of a joint's drive, as a fraction of the largest inertia that it moves."""
+
+DAMPING_RATIO = 0.05
+"""Damping ratio of a joint whose URDF states no damping, with its drive as the spring."""
+
+MAX_FREQUENCY = 400.0
+"""[rad/s] Maximum natural frequency of a joint on its drive, so that simulations stay stable."""
+
+MIN_LOAD = 0.01
+"""[N m, N] Least weight for which a drive is made, for joints that carry no mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """The mass of a link.
+
+    Attributes:
+        mass: [kg].
+        T_link_inertia: (4, 4) pose of the frame of ``moments``, its origin the centre of mass [m].
+        moments: (3, 3) inertia [kg m^2].
+    """
+
+    mass: float
+    T_link_inertia: FloatArray
+    moments: FloatArray
+
+    @property
+    def principal(self) -> tuple[FloatArray, FloatArray]:
+        """The principal moments (3,) [kg m^2], and their right-handed axes (3, 3) in the link."""
+        values, axes = np.linalg.eigh(self.moments)
+        axes = axes * np.sign(np.linalg.det(axes))
+        return values, self.T_link_inertia[:3, :3] @ axes
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A position controller of a joint, and the losses of the joint.
+
+    None of the numbers is of a real motor, except damping and friction that the URDF states. The
+    stiffness is as low as `SAG` allows.
+
+    Attributes:
+        stiffness: [N m/rad or N/m].
+        armature: inertia of the drive, seen at the joint [kg m^2 or kg].
+        damping: [N m s/rad or N s/m].
+        friction: [N m or N].
+    """
+
+    stiffness: float
+    armature: float
+    damping: float
+    friction: float
+
+
+def inertials_of(path: Path) -> dict[str, Inertial]:
+    """Return the masses of the links of the URDF file at ``path`` that state one above 0."""
+    found: dict[str, Inertial] = {}
+    for link in ET.fromstring(checked(path)).iterfind("link"):
+        inertial, mass = link.find("inertial"), link.find("inertial/mass")
+        if inertial is None or mass is None or float(mass.get("value", "0")) <= 0.0:
+            continue
+        ixx, ixy, ixz, iyy, iyz, izz = _numbers(
+            inertial.find("inertia"), ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        )
+        found[link.get("name", "")] = Inertial(
+            float(mass.get("value", "0")),
+            _origin(inertial.find("origin")),
+            np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]),
+        )
+    return found
+
+
+def is_frame(robot: Robot, link: Link, inertials: Mapping[str, Inertial]) -> bool:
+    """Return whether ``link`` is only a frame on another: fixed, without mass, shape and children.
+
+    ``inertials``: the masses of the links of ``robot`` that have one.
+    """
+    return not (
+        link.parent is None
+        or link.joint is not None
+        or link.name in inertials
+        or link.collisions
+        or robot.children(link)
+        or any(len(shape.faces) for shape in link.shapes)
+    )
+
+
+def drives_of(robot: Robot, path: Path) -> dict[str, Drive]:
+    """Return a drive for each movable joint of ``robot``, whose URDF file is at ``path``."""
+    inertials = inertials_of(path)
+    stated = {
+        joint.get("name", ""): _numbers(joint.find("dynamics"), ("damping", "friction"))
+        for joint in ET.fromstring(checked(path)).iterfind("joint")
+    }
+    carried = {
+        joint.name: _carried(robot, link, joint, inertials) for link, joint in moved_links(robot)
+    }
+    found: dict[str, Drive] = {}
+    for _, joint in moved_links(robot):
+        # A drive carries the joints that follow it too.
+        moved = [
+            (abs(other.factor), *carried[other.name])
+            for other in robot.joints.values()
+            if joint.name in (other.name, other.leader)
+        ]
+        load = sum(factor * weight for factor, weight, _ in moved)
+        inertia = sum(factor * factor * mass for factor, _, mass in moved)
+        stiffness = max(load, MIN_LOAD) / SAG
+        armature = max(INERTIA_RATIO * inertia, stiffness / MAX_FREQUENCY**2 - inertia)
+        damping, friction = stated.get(joint.name, (0.0, 0.0))
+        spring = DAMPING_RATIO * 2.0 * float(np.sqrt(stiffness * (inertia + armature)))
+        found[joint.name] = Drive(stiffness, armature, damping or spring, friction)
+    return found
+
+
+def moved_links(robot: Robot) -> Iterator[tuple[Link, Joint]]:
+    """Yield every link that has a movable joint, with the joint."""
+    for link in robot.links:
+        if link.joint is not None:
+            yield link, link.joint
+
+
+def _carried(
+    robot: Robot, link: Link, joint: Joint, inertials: Mapping[str, Inertial]
+) -> tuple[float, float]:
+    """Return upper bounds on the weight [N m or N] and the inertia that ``joint`` moves."""
+    load = inertia = 0.0
+    farthest = {link.name: 0.0}
+    for other in robot.links:
+        if other.name != link.name:
+            if other.parent not in farthest:
+                continue
+            step = float(np.linalg.norm(other.T_parent_link[:3, 3])) + _travel(other)
+            farthest[other.name] = farthest[other.parent] + step
+        inertial = inertials.get(other.name)
+        if inertial is not None:
+            offset = float(np.linalg.norm(inertial.T_link_inertia[:3, 3]))
+            arm = 1.0 if joint.slides else farthest[other.name] + offset
+            load += GRAVITY * inertial.mass * arm
+            own = 0.0 if joint.slides else float(np.linalg.eigvalsh(inertial.moments)[-1])
+            inertia += inertial.mass * arm * arm + own
+    return load, inertia
+
+
+def _travel(link: Link) -> float:
+    """Return the maximum distance [m] that the joint of ``link`` slides from zero."""
+    joint = link.joint
+    if joint is None or not joint.slides:
+        return 0.0
+    ends = [abs(end) for end in (joint.lower, joint.upper) if np.isfinite(end)]
+    return max(ends, default=0.0)
+
+
+def _numbers(element: ET.Element | None, names: Sequence[str]) -> tuple[float, ...]:
+    """Return the numbers in attributes of ``element``; 0 for absent ones."""
+    return tuple(0.0 if element is None else float(element.get(name, "0")) for name in names)
+
+
+def _origin(element: ET.Element | None) -> FloatArray:
+    """Return the pose (4, 4) of an element <origin> [m]."""
+    if element is None:
+        return np.eye(4)
+    xyz, rpy = (
+        [float(part) for part in element.get(name, "0 0 0").split()] for name in ("xyz", "rpy")
+    )
+    return se3.from_rotation_translation(so3.from_rpy(*rpy), xyz)

@@ -1,0 +1,241 @@
+"""Tests of the exported MuJoCo model: loaded as shipped, it carries its weight and is the arm."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from katana450.arm.robot.robot import Robot
+from katana450.cli.main import main
+from katana450.extensions.export.mjcf import keyframes
+from katana450.extensions.export.physics import SAG
+from katana450.extensions.export.playback import of_script
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.resources import URDF_PATH
+from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
+
+MASS = 9.271
+"""[kg] Mass of the robot."""
+
+OWN_ARM = Path(__file__).parents[2] / "examples" / "my_own_arm.urdf"
+
+SEEN = 2
+"""Group of the geometries that are seen and do not collide."""
+
+LARGEST_ZIP = 1_200_000
+"""[bytes]"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the model as the command writes it and unzip unpacks it."""
+    where = tmp_path_factory.mktemp("mjcf")
+    assert main(["export", "mjcf", "--out", str(where)]) == 0
+    archive = where / "katana450_mjcf.zip"
+    assert archive.stat().st_size < LARGEST_ZIP
+    zipfile.ZipFile(archive).extractall(where)
+    return where / "katana450"
+
+
+@pytest.fixture(scope="module")
+def model(folder: Path) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(folder / "katana450.xml"))
+
+
+def set_values(model: mujoco.MjModel, data: mujoco.MjData, values: dict[str, float]) -> None:
+    for name, value in values.items():
+        data.joint(name).qpos[0] = value
+    mujoco.mj_kinematics(model, data)
+
+
+def test_model_has_the_parts_of_the_arm(model: mujoco.MjModel, katana: Robot) -> None:
+    assert {model.actuator(k).name for k in range(model.nu)} == set(katana.driven)
+    assert {"tcp", "grasp", "flange"} <= {model.site(k).name for k in range(model.nsite)}
+    assert [model.key(k).name for k in range(model.nkey)] == ["home", "zero"]
+    assert model.neq == 1
+    assert model.body_mass.sum() == pytest.approx(MASS, abs=1e-9)
+    assert (model.dof_armature > 0.0).all()
+    assert (model.dof_damping > 0.0).all()
+    for name, joint in katana.joints.items():
+        np.testing.assert_allclose(model.joint(name).range, (joint.lower, joint.upper))
+    # Neighbours, which overlap at their hinges, and the pairs that never meet.
+    assert model.nexclude > 20
+
+
+def test_every_link_is_where_our_kinematics_have_it(model: mujoco.MjModel, katana: Robot) -> None:
+    data = mujoco.MjData(model)
+    random = np.random.default_rng(450)
+    for _ in range(50):
+        pose = [
+            random.uniform(katana.joints[name].lower, katana.joints[name].upper)
+            for name in katana.driven
+        ]
+        values = katana.values(pose)
+        set_values(model, data, values)
+        frames = katana.frames(values)
+        for link, T in frames.items():
+            there = data.site(link) if link in sites(model) else data.body(link)
+            np.testing.assert_allclose(there.xpos, T[:3, 3], atol=1e-9, err_msg=link)
+            np.testing.assert_allclose(there.xmat.reshape(3, 3), T[:3, :3], atol=1e-9)
+
+
+def test_surfaces_are_where_ours_are(model: mujoco.MjModel, katana: Robot) -> None:
+    """MuJoCo moves each mesh into the frame of its inertia; its geometry brings it back."""
+    data = mujoco.MjData(model)
+    values = katana.values(POSES[1])
+    set_values(model, data, values)
+    frames = katana.frames(values)
+    for link in katana.links:
+        if not link.shapes:
+            continue
+        T = frames[link.name]
+        ours = np.concatenate([s.vertices @ T[:3, :3].T + T[:3, 3] for s in link.shapes])
+        theirs = np.concatenate(
+            [
+                corners(model, data, number)
+                for number in range(model.ngeom)
+                if model.geom_bodyid[number] == model.body(link.name).id
+                and model.geom_group[number] == SEEN
+            ]
+        )
+        np.testing.assert_allclose(theirs.min(axis=0), ours.min(axis=0), atol=1.5e-5)
+        np.testing.assert_allclose(theirs.max(axis=0), ours.max(axis=0), atol=1.5e-5)
+
+
+def corners(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> FloatArray:
+    """Return the vertices (n, 3) [m] of a geometry that is a mesh."""
+    mesh = model.geom_dataid[geom]
+    start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    vertices = model.mesh_vert[start : start + count]
+    placed: FloatArray = vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    return placed
+
+
+def sites(model: mujoco.MjModel) -> set[str]:
+    return {model.site(k).name for k in range(model.nsite)}
+
+
+@pytest.mark.parametrize("key", ["home", "zero"])
+def test_keyframes_are_postures_without_contact(
+    model: mujoco.MjModel, katana: Robot, key: str
+) -> None:
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
+    mujoco.mj_forward(model, data)
+    values = keyframes(katana)[key]
+    for name in katana.joints:
+        assert data.joint(name).qpos[0] == values[name]
+    for name in katana.driven:
+        assert data.actuator(name).ctrl[0] == values[name]
+    assert data.ncon == 0
+
+
+@pytest.mark.parametrize("key", ["home", "zero"])
+def test_arm_holds_itself_for_five_seconds(model: mujoco.MjModel, key: str) -> None:
+    """At rest no joint sags by more than the promised `SAG`."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
+    mujoco.mj_forward(model, data)
+    start, tool = data.qpos.copy(), data.site("tcp").xpos.copy()
+    sag = drop = 0.0
+    while data.time < 5.0:
+        mujoco.mj_step(model, data)
+        sag = max(sag, float(np.abs(data.qpos - start).max()))
+        drop = max(drop, float(np.linalg.norm(data.site("tcp").xpos - tool)))
+    print(f"{key}: sag {1e3 * sag:.3f} mrad, tool {1e3 * drop:.3f} mm")
+    # When the weight comes on, the joints swing a little further.
+    assert 0.0 < sag < 1.5 * SAG
+    assert drop < 2e-3
+    assert float(np.abs(data.qpos - start).max()) < SAG
+    assert float(np.abs(data.qvel).max()) < 1e-6
+
+
+def test_circle_is_replayed(model: mujoco.MjModel, katana: Robot) -> None:
+    """The joint angles of the demo bring the site `tcp` to our own tool poses."""
+    shown = of_script("circle", URDF_PATH)
+    arm = katana.require_arm()
+    data = mujoco.MjData(model)
+    worst = 0.0
+    for number in range(0, len(shown.states), 10):
+        state = shown.states[number]
+        values = katana.joint_values(state.q, state.gripper)
+        set_values(model, data, values)
+        T = katana.frames(values)[arm.default_tool]
+        worst = max(worst, float(np.abs(data.site("tcp").xpos - T[:3, 3]).max()))
+        turned = so3.angle(data.site("tcp").xmat.reshape(3, 3), T[:3, :3])
+        assert turned < 1e-6
+    assert len(shown.states) > 500
+    assert worst < 1e-6
+
+
+@pytest.mark.long
+def test_drives_follow_the_circle(model: mujoco.MjModel, katana: Robot) -> None:
+    """The actuators, given the joint angles of the demo, follow with a small lag."""
+    shown = of_script("circle", URDF_PATH)
+    data = mujoco.MjData(model)
+    first = katana.joint_values(shown.states[0].q, shown.states[0].gripper)
+    set_values(model, data, first)
+    worst = 0.0
+    steps = round(1.0 / shown.rate / model.opt.timestep)
+    for state in shown.states[:300]:
+        values = katana.joint_values(state.q, state.gripper)
+        for name in katana.driven:
+            data.actuator(name).ctrl[0] = values[name]
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+        worst = max(
+            worst, *(abs(float(data.joint(name).qpos[0]) - values[name]) for name in values)
+        )
+    assert worst < 0.02
+
+
+def test_fingers_move_together(model: mujoco.MjModel) -> None:
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    data.actuator("finger_right_joint").ctrl[0] = -0.3
+    while data.time < 1.0:
+        mujoco.mj_step(model, data)
+    right, left = (float(data.joint(f"finger_{side}_joint").qpos[0]) for side in ("right", "left"))
+    assert right == pytest.approx(-0.3, abs=2e-3)
+    assert left == pytest.approx(right, abs=2e-3)
+
+
+def test_scene_has_a_floor(folder: Path) -> None:
+    model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    assert model.geom("floor").type[0] == mujoco.mjtGeom.mjGEOM_PLANE
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+
+
+def test_another_mechanism_is_a_model_too(tmp_path: Path, gantry: Robot) -> None:
+    """It has sliding, endless and following joints, primitive shapes, and no mass."""
+    assert main(["export", "mjcf", "--urdf", str(GANTRY), "--out", str(tmp_path)]) == 0
+    zipfile.ZipFile(tmp_path / "gantry_2_mjcf.zip").extractall(tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "gantry_2" / "gantry_2.xml"))
+    data = mujoco.MjData(model)
+    values = gantry.values(GANTRY_POSE)
+    set_values(model, data, values)
+    for link, T in gantry.frames(values).items():
+        np.testing.assert_allclose(data.body(link).xpos, T[:3, 3], atol=1e-9, err_msg=link)
+    assert model.neq == 2
+    assert [model.key(k).name for k in range(model.nkey)] == ["zero"]
+
+
+def test_an_arm_without_masses_holds_itself_too(tmp_path: Path) -> None:
+    """Its URDF states none, although it has collision shapes."""
+    assert main(["export", "mjcf", "--urdf", str(OWN_ARM), "--out", str(tmp_path)]) == 0
+    zipfile.ZipFile(tmp_path / "my_own_arm_mjcf.zip").extractall(tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "my_own_arm" / "my_own_arm.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    start = data.qpos.copy()
+    while data.time < 1.0:
+        mujoco.mj_step(model, data)
+    assert float(np.abs(data.qpos - start).max()) < SAG

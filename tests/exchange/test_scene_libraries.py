@@ -1,0 +1,173 @@
+"""Tests of VRML worlds in VTK and Coin: numbers and poses that both read as they are meant."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from katana450.arm.robot.robot import Robot
+from katana450.cli.main import main
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.trajectory_file import RecordedMotion, load_motion
+from katana450.extensions.export.vrml import vrml_files, world_of
+from katana450.extensions.export.vrml_names import VrmlNames
+from katana450.extensions.export.vrml_views import views
+from katana450.resources import URDF_PATH
+from tests.exchange.conftest import GANTRY_POSE, POSES
+from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
+from tests.exchange.tools import PIVY, SCREEN, VTK, needs, needs_package, run
+
+WORD = re.compile(r'"(?:[^"\\]|\\.)*"|[^\s,\[\]{}"]+')
+
+NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?")
+
+DRAW = """\
+import json, sys
+folder, world, picture, eye, target, size = sys.argv[1:]
+sys.path.insert(0, folder)
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkIOImage import vtkPNGWriter
+from vtkmodules.vtkIOImport import vtkVRMLImporter
+from vtkmodules.vtkRenderingCore import vtkRenderWindow, vtkWindowToImageFilter
+window = vtkRenderWindow()
+window.SetOffScreenRendering(1)
+window.SetSize(int(size), int(size))
+importer = vtkVRMLImporter()
+importer.SetFileName(world)
+importer.SetRenderWindow(window)
+importer.Update()
+importer.GetRenderer().SetBackground(0, 1, 0)
+camera = importer.GetRenderer().GetActiveCamera()
+camera.SetPosition(*json.loads(eye))
+camera.SetFocalPoint(*json.loads(target))
+camera.SetViewUp(0, 1, 0)
+camera.SetViewAngle(40)
+importer.GetRenderer().ResetCameraClippingRange()
+window.Render()
+seen = vtkWindowToImageFilter()
+seen.SetInput(window)
+seen.ReadFrontBufferOff()
+writer = vtkPNGWriter()
+writer.SetInputConnection(seen.GetOutputPort())
+writer.SetFileName(picture)
+writer.Write()
+"""
+
+TRIANGLES = """\
+import array, sys
+from pivy import coin
+source = coin.SoInput()
+assert source.openFile(sys.argv[1])
+world = coin.SoDB.readAll(source)
+world.ref()
+numbers = array.array("d")
+def keep(_, action, *corners):
+    matrix = action.getModelMatrix()
+    for corner in corners:
+        numbers.extend(matrix.multVecMatrix(corner.getPoint()).getValue())
+action = coin.SoCallbackAction()
+action.addTriangleCallback(coin.SoVRMLIndexedFaceSet.getClassTypeId(), keep, None)
+action.apply(world)
+numbers.tofile(open(sys.argv[2], "wb"))
+"""
+
+PYTHON = "/usr/bin/python3"
+"""The Python of the system, which has the packages of the system."""
+
+
+@pytest.fixture
+def motion(tmp_path: Path, gantry: Robot) -> RecordedMotion:
+    names = gantry.driven
+    lines = (
+        ",".join(("t", *names)),
+        ",".join(map(str, (0.0, *GANTRY_POSE))),
+        ",".join(["1.0"] + ["0.0"] * len(names)),
+    )
+    text = "\n".join(lines)
+    (tmp_path / "m.csv").write_text(text)
+    return load_motion(tmp_path / "m.csv", gantry)
+
+
+def test_every_number_has_a_digit_before_its_point(katana: Robot) -> None:
+    """VTK reads .0122 as 0."""
+    numbers = 0
+    for content in vrml_files(
+        katana, world_of(katana, katana.values((0.01, -0.02, 0.03)))
+    ).values():
+        for word in WORD.findall(content.decode().partition("\n")[2]):
+            if word[0] in "+-.0123456789":
+                assert NUMBER.fullmatch(word), word
+                numbers += 1
+    assert numbers > 100_000
+
+
+def test_static_pose_is_the_first_sample_of_the_motion(
+    gantry: Robot, motion: RecordedMotion
+) -> None:
+    start = gantry.values(GANTRY_POSE)
+    assert motion.start == pytest.approx(start)
+    rest = gantry.values(())
+    moving = world_of(gantry, rest, motion).named()
+    standing = world_of(gantry, start).named()
+    for name in VrmlNames(gantry).joints.values():
+        assert moving[name] == standing[name]
+    (with_motion,), (without,) = (
+        glb_files(gantry, rest, motion).values(),
+        glb_files(gantry, start).values(),
+    )
+    assert nodes(with_motion) == nodes(without)
+
+
+def nodes(glb: bytes) -> list[object]:
+    """Return the nodes of a binary glTF file."""
+    length = int.from_bytes(glb[12:16], "little")
+    found: list[object] = json.loads(glb[20 : 20 + length])["nodes"]
+    return found
+
+
+def exported(folder: Path, pose: tuple[float, ...]) -> Path:
+    """Return the world that the command writes of the arm alone."""
+    values = ",".join(map(str, pose))
+    options = ["--no-objects", "--out", str(folder), f"--pose={values}"]
+    assert main(["export", "vrml", *options]) == 0
+    return folder / "katana450.wrl"
+
+
+@pytest.mark.long
+@needs_package(VTK)
+@needs("xvfb-run", "xauth")
+@pytest.mark.parametrize("pose", POSES)
+def test_vtk_draws_what_we_do(tmp_path: Path, katana: Robot, pose: tuple[float, ...]) -> None:
+    world, picture = exported(tmp_path, pose), tmp_path / "picture.png"
+    view = views(katana, katana.values(pose))["All"]
+    # VRML has y up, the root has z up.
+    eye, target = (json.dumps([x, z, -y]) for x, y, z in np.array([view.eye, view.target]).tolist())
+    (tmp_path / "draw.py").write_text(DRAW)
+    words = (tmp_path / "draw.py", VTK.folder, world, picture, eye, target, str(SIZE))
+    run(*SCREEN, sys.executable, *words)
+    ours = silhouette(placed(URDF_PATH, katana.values(pose)), view)
+    assert overlap(seen(picture), ours) >= 0.98
+
+
+@pytest.mark.long
+@needs(PIVY)
+@pytest.mark.parametrize("pose", POSES)
+def test_coin_places_every_triangle(tmp_path: Path, katana: Robot, pose: tuple[float, ...]) -> None:
+    """Its pictures stay black without a graphics card, so its triangles are compared."""
+    (tmp_path / "triangles.py").write_text(TRIANGLES)
+    found = tmp_path / "triangles.bin"
+    run(PYTHON, tmp_path / "triangles.py", exported(tmp_path, pose), found)
+    points = np.fromfile(found).reshape(-1, 3)
+    points = np.column_stack((points[:, 0], -points[:, 2], points[:, 1]))
+    expected = np.concatenate(
+        [mesh.triangles.reshape(-1, 3) for _, mesh in placed(URDF_PATH, katana.values(pose))]
+    )
+    assert len(points) == len(expected)
+    for some, others in ((points, expected), (expected, points)):
+        assert cKDTree(others).query(some)[0].max() < 2e-5
