@@ -24,6 +24,10 @@ TOLERANCES = (1e-4, 3e-4, 1e-3)
 """[rad] Largest distances of the trajectory from the recorded setpoints; a larger one if the script
 would be too long."""
 
+REST_FRACTION, REST_TOLERANCE = 0.05, 2e-6
+"""[1], [rad] Near the ends of a motion the distance is at most this fraction of what is moved, plus
+a rounding: an object that leaves the table by micrometres must not dip into it."""
+
 MIN_REST = 0.1
 """[s] Shorter rests belong to the motion."""
 
@@ -210,18 +214,20 @@ def postures(t: FloatArray, q: FloatArray, tolerance: float) -> IntArray:
     Args:
         t: (N,) times [s], rising.
         q: (N, 5) setpoints [rad].
-        tolerance: maximum difference of a joint [rad].
+        tolerance: maximum difference of a joint [rad]; near the first and the last state less.
     """
     count = len(t)
+    moved = np.minimum(np.abs(q - q[0]), np.abs(q - q[-1])).max(axis=1)
+    allowed = np.minimum(tolerance, REST_FRACTION * moved + REST_TOLERANCE)
     wanted = np.linspace(t[0], t[-1], max(math.ceil((t[-1] - t[0]) / FIRST_SPACING), 1) + 1)
     chosen = np.unique(np.append(np.minimum(np.searchsorted(t, wanted), count - 1), (0, count - 1)))
     while len(chosen) < count:
         found = CubicSpline(t[chosen], q[chosen]).values_at(t - t[0])
-        off = np.abs(found - q).max(axis=1)
+        excess = np.abs(found - q).max(axis=1) - allowed
         added = [
-            first + 1 + int(np.argmax(off[first + 1 : last]))
+            first + 1 + int(np.argmax(excess[first + 1 : last]))
             for first, last in zip(chosen[:-1].tolist(), chosen[1:].tolist(), strict=True)
-            if last > first + 1 and float(off[first + 1 : last].max()) > tolerance
+            if last > first + 1 and float(excess[first + 1 : last].max()) > 0.0
         ]
         if not added:
             break
