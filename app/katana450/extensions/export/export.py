@@ -47,7 +47,7 @@ def _check(options: argparse.Namespace) -> None:
     kind: str = options.format
     row = FORMATS[kind]
     if options.trajectory is not None and not row.animated:
-        names = " or ".join(named(lambda each: each.animated))
+        names = ", ".join(named(lambda each: each.animated))
         raise InputError(f"{kind} has no motion. Use --trajectory with {names}.")
     if options.run is not None:
         raise InputError(f"{kind} has no run. Use --run with html.")
