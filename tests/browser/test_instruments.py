@@ -359,12 +359,13 @@ def test_instruments_follow_sliders_and_theme_of_visers_page(
     dial(page, "axis-4").focus()
     page.page.keyboard.press("PageUp")
     page.wait_until(
-        lambda: page.slider_value("Axis 4") == pytest.approx(start + 10.0, abs=0.06), "the slider"
+        lambda: page.slider_value("4 wrist bend") == pytest.approx(start + 10.0, abs=0.06),
+        "the slider",
     )
     truth.wait(10.0, mood="ok")
-    page.drag_slider("Axis 4", start)
+    page.drag_slider("4 wrist bend", start)
     page.wait_until(
-        lambda: goal(page, "axis-4") == pytest.approx(page.slider_value("Axis 4"), abs=0.01),
+        lambda: goal(page, "axis-4") == pytest.approx(page.slider_value("4 wrist bend"), abs=0.01),
         "the knob",
     )
 
