@@ -9,18 +9,18 @@ from katana450.extensions.kinematics.options import add_fk_options, add_ik_optio
 
 
 def _fk(options: Namespace) -> int:
-    from katana450.extensions.kinematics.json_lines import Kinematics, answer_lines
+    from katana450.extensions.kinematics.json_lines import JsonKinematics, answer_lines
 
     in_base_frame = options.frame == "base"
-    return answer_lines(Kinematics(options.urdf, options.tool, in_base_frame=in_base_frame).fk)
+    return answer_lines(JsonKinematics(options.urdf, options.tool, in_base_frame=in_base_frame).fk)
 
 
 def _ik(options: Namespace) -> int:
-    from katana450.extensions.kinematics.json_lines import Kinematics, answer_lines
+    from katana450.extensions.kinematics.json_lines import JsonKinematics, answer_lines
     from katana450.maths.kinematics.priority import Priority
 
     return answer_lines(
-        Kinematics(
+        JsonKinematics(
             options.urdf,
             options.tool,
             in_base_frame=options.frame == "base",

@@ -32,7 +32,7 @@ from katana450.maths.kinematics.projection import project
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 
 
-class Kinematics:
+class JsonKinematics:
     """Forward and inverse kinematics of the arm in a URDF, on plain JSON values."""
 
     def __init__(

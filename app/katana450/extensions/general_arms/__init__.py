@@ -1,0 +1,1 @@
+"""Inverse kinematics of arms beyond the five-axis family: closed forms, and a fallback."""

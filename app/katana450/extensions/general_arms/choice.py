@@ -1,0 +1,70 @@
+"""The choice of the kinematics of a chain: a closed form where one exists, else numerical."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+from katana450 import tolerances
+from katana450.errors import RobotDescriptionError
+from katana450.extensions.general_arms.closed_form import ClosedForm
+from katana450.extensions.general_arms.links import exact_chain, links_of
+from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
+
+
+class ExactArm(NamedTuple):
+    """A chain without the rounding of its file, and sentences for people on what was changed."""
+
+    chain: Chain
+    notes: tuple[str, ...]
+
+
+@lru_cache(maxsize=64)
+def kinematics_of(chain: Chain) -> Kinematics:
+    """Return the inverse kinematics of `chain`; the result is cached.
+
+    Five axes of the family have the core's closed form. Four, six and seven axes have those of this
+    package if their axes meet or are parallel as these need. All others are solved numerically, and
+    `Kinematics.method` says which condition they miss. A closed form takes the angles and lengths
+    that are rounded in a file as exact; `exact_arm` gives the chain that it solves.
+    """
+    links = links_of(chain)
+    why = f"there is no closed form for {chain.n} axes"
+    if chain.n == 5:
+        try:
+            arm_of(chain)
+        except RobotDescriptionError as error:
+            why = str(error).removeprefix("The closed-form kinematics do not cover this arm: ")
+            why = why.partition(". For right")[0].removesuffix(".")
+        else:
+            return FiveAxisKinematics(chain)
+    elif chain.n in (4, 6, 7):
+        closed = (SevenAxes if chain.n == 7 else ClosedForm).of(chain, links)
+        if not isinstance(closed, str):
+            return closed
+        why = closed
+    return Numerical(chain, links_of(chain, exact=False), why)
+
+
+def exact_arm(described: Chain) -> ExactArm:
+    """Return the chain with exact axes for which the closed form of `described` holds.
+
+    An arm that is solved numerically stays as it is.
+    """
+    if isinstance(kinematics_of(described), Numerical | FiveAxisKinematics):
+        return ExactArm(described, ())
+    links = links_of(described)
+    angle, length = links.rounding
+    chain = exact_chain(described, links)
+    if max(angle, length) <= tolerances.FAMILY_EXACT:
+        return ExactArm(chain, ())
+    note = (
+        f"Its axes miss right angles, parallels or meeting points by {math.degrees(angle):.2g} deg "
+        f"and {1e3 * length:.2g} mm at most; the nearest exact arm is used."
+    )
+    return ExactArm(chain, (note,))

@@ -1,0 +1,291 @@
+"""Inverse kinematics in closed form of arms with four or six axes, and of whole arrays of poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.errors import InputError
+from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
+from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
+from katana450.extensions.general_arms.parallel_axes import (
+    four_axes,
+    pointed,
+    six_axes,
+    why_not_parallel,
+)
+from katana450.extensions.general_arms.posture import GeneralPosture
+from katana450.extensions.general_arms.spherical_wrist import (
+    Angles,
+    Solve,
+    crossing_shoulder,
+    is_crossing_shoulder,
+    is_parallel_shoulder,
+    parallel_shoulder,
+    why_not_spherical,
+)
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.se3 import Rows
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.turns import in_turn, nearest_turn
+
+SHOULDERS, ELBOWS, WRISTS = ("front", "back"), ("up", "down"), ("plus", "minus")
+"""Parts of the names of branches, in the order in which the formulas return them. The tool, or the
+wrist's centre, is in front of the plane through axis 1 along axis 2, or behind it. The elbow is on
+one or the other side of the line from shoulder to wrist. alpha5 is positive or negative."""
+
+
+def branch_names(n: int, *, wrist_first: bool = False, shoulder_last: bool = False) -> list[str]:
+    """Return the names of the 4 or 8 branches in the order of the formulas."""
+    if n == 4:
+        return [f"{shoulder}-{elbow}" for shoulder in SHOULDERS for elbow in ELBOWS]
+    if wrist_first:
+        return [f"{s}-{e}-{w}" for s in SHOULDERS for w in WRISTS for e in ELBOWS]
+    if shoulder_last:
+        return [f"{s}-{e}-{w}" for e in ELBOWS for s in SHOULDERS for w in WRISTS]
+    return [f"{s}-{e}-{w}" for s in SHOULDERS for e in ELBOWS for w in WRISTS]
+
+
+class Form(NamedTuple):
+    """A closed form that solves certain links.
+
+    Attributes:
+        method: in words.
+        links: the links as the formulas read them.
+        build: makes the function solve(rows, free) of the module of the formulas.
+        branches: names in the order of the solutions.
+        keeps_tool_point: whether rows hold the place of the tool point, not of the last frame.
+    """
+
+    method: str
+    links: DHLinks
+    build: Callable[[DHLinks, Operations], Solve]
+    branches: tuple[str, ...]
+    keeps_tool_point: bool = False
+
+    def rows(self, T: FloatArray) -> Rows:
+        """Return the rows that the formulas read, for `T` (4, 4) = T_S_tool."""
+        if not self.keeps_tool_point:
+            return self.links.rows(T)
+        here: FloatArray = self.links.T_1_S @ T
+        here[:3, :3] = here[:3, :3] @ self.links.T_n_tool[:3, :3].T
+        rows: Rows = here.tolist()
+        return rows
+
+    def columns(self, T: FloatArray) -> list[list[FloatArray]]:
+        """Return the same rows of many poses `T` (N, 4, 4): an array (N,) in place of a number."""
+        here = self.links.T_1_S @ T
+        if self.keeps_tool_point:
+            here[:, :3, :3] = here[:, :3, :3] @ self.links.T_n_tool[:3, :3].T
+        else:
+            here = here @ self.links.T_tool_n
+        return [[here[:, i, j] for j in range(4)] for i in range(4)]
+
+
+def form_of(links: DHLinks) -> Form | str:
+    """Return the closed form of four or six axes, or the condition that these links miss."""
+    if links.n == 4:
+        missing = why_not_parallel(links)
+        return missing or Form(
+            "closed form for four axes: pan and three parallel axes",
+            pointed(links),
+            four_axes,
+            tuple(branch_names(4)),
+            keeps_tool_point=True,
+        )
+    if links.n != 6:
+        return f"it has {links.n} axes"
+    if is_parallel_shoulder(links):
+        return Form(
+            "closed form for six axes with a spherical wrist",
+            links,
+            parallel_shoulder,
+            tuple(branch_names(6)),
+        )
+    if is_crossing_shoulder(links):
+        return Form(
+            "closed form for six axes with a spherical wrist and a shoulder whose axes meet",
+            links,
+            crossing_shoulder,
+            tuple(branch_names(6, shoulder_last=True)),
+        )
+    parallel = why_not_parallel(links)
+    if not parallel:
+        return Form(
+            "closed form for six axes, three of them parallel",
+            links,
+            six_axes,
+            tuple(branch_names(6, wrist_first=True)),
+        )
+    return f"{why_not_spherical(links)}, and {parallel}"
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """Inverse kinematics of one chain in closed form: all branches of every pose.
+
+    Attributes:
+        chain: the chain.
+        form: the closed form, of the chain or of the chain seen from the tool.
+        is_reversed: whether it is that of the chain seen from the tool.
+    """
+
+    chain: Chain
+    form: Form
+    is_reversed: bool = False
+
+    @staticmethod
+    def of(chain: Chain, links: DHLinks) -> ClosedForm | str:
+        """Return the closed form of `chain`, or the conditions that it misses."""
+        form = form_of(links)
+        if isinstance(form, Form):
+            return ClosedForm(chain, form)
+        if chain.n != 6:
+            return form
+        mirrored = form_of(links_of(reversed_chain(chain)))
+        if isinstance(mirrored, Form):
+            method = f"{mirrored.method}, seen from the tool"
+            return ClosedForm(chain, mirrored._replace(method=method), is_reversed=True)
+        return form
+
+    @property
+    def method(self) -> str:
+        """The method in words."""
+        return self.form.method
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """Names of the branches, in the order of the solutions."""
+        return self.form.branches
+
+    @cached_property
+    def _solve(self) -> Solve:
+        return self.form.build(self.form.links, FLOATS)
+
+    @cached_property
+    def _solve_arrays(self) -> Solve:
+        return self.form.build(self.form.links, ARRAYS)
+
+    @cached_property
+    def _turned(self) -> Callable[[Angles], tuple[float, ...]]:
+        lower, upper = self.chain.lower.tolist(), self.chain.upper.tolist()
+        order = range(self.chain.n - 1, -1, -1) if self.is_reversed else range(self.chain.n)
+        shifts = [self.form.links.shift[k] for k in order]
+        # A joint with a range of at least one turn about zero holds every angle in (-pi, pi].
+        narrow = [
+            (k, low, high)
+            for k, (low, high) in enumerate(zip(lower, upper, strict=True))
+            if low > -math.pi or high < math.pi
+        ]
+        remainder, tau = math.remainder, math.tau
+        places = list(zip(order, shifts, strict=True))
+
+        def turned(alpha: Angles) -> tuple[float, ...]:
+            q = [remainder(alpha[k] - shift, tau) for k, shift in places]
+            for k, low, high in narrow:
+                if not low <= q[k] <= high:
+                    q[k] = in_turn(q[k], low, high)
+            return tuple(q)
+
+        return turned
+
+    def solve(self, T: FloatArray, free: Sequence[float] | None = None) -> list[tuple[float, ...]]:
+        """Return the joint angles of all branches for the pose `T` (4, 4), without checks.
+
+        For loops over many poses. `free` (n,) [rad] are the angles that are taken where the pose
+        leaves them free; None for zeros. Each angle is in the turn inside its limits if there is
+        one, else in [-pi, pi].
+        """
+        if self.is_reversed:
+            T = se3.inverse(T)
+            free = None if free is None else free[::-1]
+        shift = self.form.links.shift
+        alpha = shift if free is None else tuple(map(float.__add__, free, shift))
+        turned = self._turned
+        return [turned(each) for each in self._solve(self.form.rows(T), alpha)]
+
+    def inverse(
+        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
+    ) -> list[GeneralPosture]:
+        """Return a posture for each of `branches`; see `Kinematics.inverse`.
+
+        Where no exact posture exists, the postures come as near as the subproblems can: the tool
+        point, or the wrist's centre, nearest along the links. Their errors give the difference.
+        Two branches coincide where they meet.
+        """
+        pose = np.array(se3.validated_rows(T))
+        hint = None if q_hint is None else self.chain.check_q(q_hint)
+        found = self.solve(pose, None if hint is None else hint.tolist())
+        if hint is not None and (self.chain.upper - self.chain.lower > math.tau).any():
+            found = [tuple(nearest_turn(self.chain, np.array(q), hint).tolist()) for q in found]
+        return [
+            GeneralPosture(self.chain, pose, q, branch)
+            for q, branch in zip(found, self.branches, strict=True)
+        ]
+
+    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
+        """Return the joint angles (N, branches, n) [rad] for poses `T` (N, 4, 4) [m].
+
+        As `solve` for each. Raises InputError for the first invalid pose.
+        """
+        poses = validated_poses(T)
+        if self.is_reversed:
+            poses = _inverses(poses)
+        with np.errstate(all="ignore"):
+            found = self._solve_arrays(self.form.columns(poses), self.form.links.shift)
+        zeros = np.zeros(len(poses))
+        alpha = np.array([[each + zeros for each in angles] for angles in found])
+        q = alpha.transpose(2, 0, 1) - self.form.links.shift
+        return in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
+
+
+def validated_poses(T: npt.ArrayLike) -> FloatArray:
+    """Return poses (N, 4, 4) as `se3.validated` each. Raises InputError for the first bad."""
+    try:
+        poses = np.asarray(T, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"The poses are not a regular array of numbers: {error}.") from error
+    if poses.ndim != 3 or poses.shape[1:] != (4, 4):
+        raise InputError(f"The poses have shape {poses.shape}; it must be (N, 4, 4).")
+    clean = [se3.validated(each, f"Pose {number}") for number, each in enumerate(poses)]
+    return np.array(clean).reshape(-1, 4, 4)
+
+
+def in_limits_turns(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return `q` (..., n) [rad], each angle in the turn inside its limits, else in [-pi, pi]."""
+    q = q - math.tau * np.round(q / math.tau)
+    for turn in (math.tau, -math.tau):
+        other = q + turn
+        outside = (q < chain.lower) | (q > chain.upper)
+        fits = outside & (other >= chain.lower) & (other <= chain.upper)
+        q = np.where(fits, other, q)
+    return q
+
+
+def errors_of(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the errors (N, k) [m], [rad] of joint angles `q` (N, k, n) for poses `T` (N, 4, 4)."""
+    count, k, n = q.shape
+    reached = forward_batch(chain, q.reshape(-1, n)).reshape(count, k, 4, 4)
+    distance = np.linalg.norm(reached[..., :3, 3] - T[:, None, :3, 3], axis=-1)
+    R = reached[..., :3, :3].swapaxes(-1, -2) @ T[:, None, :3, :3]
+    sine = 0.5 * np.linalg.norm(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
+        axis=0,
+    )
+    return distance, np.arctan2(sine, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0))
+
+
+def _inverses(T: FloatArray) -> FloatArray:
+    result = np.zeros_like(T)
+    result[:, :3, :3] = T[:, :3, :3].swapaxes(1, 2)
+    result[:, :3, 3] = -(result[:, :3, :3] @ T[:, :3, 3:])[:, :, 0]
+    result[:, 3, 3] = 1.0
+    return result

@@ -1,0 +1,258 @@
+"""The dimensions of a chain by Denavit and Hartenberg, which every closed form here reads.
+
+    T_S_tool(q) = T_S_1 Rz(alpha1) L1 Rz(alpha2) L2 ... Rz(alphan) T_n_tool
+    L_i = Tz(d_i) Tx(a_i) Rx(t_i),   alpha_i = q_i + shift_i
+
+z_i lies along axis i with its sign. x_i lies along the common normal of axes i and i + 1, at which
+a_i >= 0 is their distance and t_i the angle from one to the other. d_i is the distance along axis i
+between its two normals. Parallel axes have many normals: the one with d_i = 0 is taken. d_1 and
+shift_1 are 0.
+
+Source: Denavit & Hartenberg (1955); Craig, Introduction to Robotics, ch. 3, for the order of terms.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.se3 import Rows
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.turns import wrapped
+
+Numbers = tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DHLinks:
+    """The dimensions of a chain of n turning joints; the module's text defines them.
+
+    Attributes:
+        a, d: (n - 1,) lengths [m].
+        t: (n - 1,) twists [rad].
+        shift: (n,) angles [rad].
+        T_S_1, T_n_tool: poses (4, 4) of the first frame in {S} and of the tool in the last.
+        rounding: the largest deviation [rad], [m] of a twist or length that was replaced by a
+            quarter turn or 0.
+    """
+
+    a: Numbers
+    d: Numbers
+    t: Numbers
+    shift: Numbers
+    T_S_1: FloatArray
+    T_n_tool: FloatArray
+    rounding: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return len(self.shift)
+
+    @cached_property
+    def T_1_S(self) -> FloatArray:
+        """The inverse (4, 4) of T_S_1."""
+        return frozen(se3.inverse(self.T_S_1))
+
+    @cached_property
+    def T_tool_n(self) -> FloatArray:
+        """The inverse (4, 4) of T_n_tool."""
+        return frozen(se3.inverse(self.T_n_tool))
+
+    @cached_property
+    def reach(self) -> float:
+        """An upper bound [m] on the distance of the tool point from axis 1's frame."""
+        tool = float(np.linalg.norm(self.T_n_tool[:3, 3]))
+        return sum(self.a) + sum(map(abs, self.d)) + tool
+
+    def rows(self, T: FloatArray) -> Rows:
+        """Return the pose (4, 4) of the last frame in the first, for `T` = T_S_tool, as lists."""
+        rows: Rows = (self.T_1_S @ T @ self.T_tool_n).tolist()
+        return rows
+
+    def is_parallel(self, i: int) -> bool:
+        """Return whether axes i and i + 1 (from 1) are parallel or opposite."""
+        return math.sin(self.t[i - 1]) == 0.0 or abs(self.t[i - 1]) == math.pi
+
+    def crosses(self, i: int) -> bool:
+        """Return whether axes i and i + 1 (from 1) meet in one point."""
+        return not self.is_parallel(i) and self.a[i - 1] == 0.0
+
+    def meet(self, i: int) -> bool:
+        """Return whether axes i, i + 1 and i + 2 (from 1) meet in one point."""
+        return self.crosses(i) and self.crosses(i + 1) and self.d[i] == 0.0
+
+    def from_axis(self, first: int) -> DHLinks:
+        """Return the links of the chain that begins with axis ``first``, counted from 0."""
+        return dataclasses.replace(
+            self, a=self.a[first:], d=self.d[first:], t=self.t[first:], shift=self.shift[first:]
+        )
+
+    def link(self, i: int) -> FloatArray:
+        """Return L_i (4, 4), i from 0."""
+        return _link(self.a[i], self.d[i], self.t[i])
+
+
+def sine_and_cosine(t: float) -> tuple[float, float]:
+    """Return the sine and cosine of a twist, exact at quarter turns."""
+    quarters = t / (0.5 * math.pi)
+    if quarters == round(quarters):
+        k = round(quarters) % 4
+        return (0.0, 1.0, 0.0, -1.0)[k], (1.0, 0.0, -1.0, 0.0)[k]
+    return math.sin(t), math.cos(t)
+
+
+def _link(a: float, d: float, t: float) -> FloatArray:
+    s, c = sine_and_cosine(t)
+    return np.array([[1.0, 0.0, 0.0, a], [0.0, c, -s, 0.0], [0.0, s, c, d], [0.0, 0.0, 0.0, 1.0]])
+
+
+def links_of(chain: Chain, *, exact: bool = True) -> DHLinks:
+    """Return the dimensions of `chain`.
+
+    With ``exact``, rounding in its file is removed: twists within FAMILY_ANGLE of a quarter turn
+    and lengths within FAMILY_LENGTH of 0 are exactly that. The tool's home pose stays.
+    """
+    angle, gap = tolerances.FAMILY_ANGLE, tolerances.FAMILY_LENGTH
+    if not exact:
+        angle, gap = tolerances.PARALLEL, tolerances.ROUNDING
+    n = chain.n
+    z = [chain.S[:3, i] for i in range(n)]
+    points = [screws.point_on(chain.S[:, i]) for i in range(n)]
+    a, d, t, shift = [], [], [], [0.0]
+    first = T = _start(z[0], points[0])
+    off_angle = off_length = 0.0
+    for i in range(n - 1):
+        here, x_before = T[:3, 3], T[:3, 0]
+        along, length, twist, x = _normal(
+            z[i], here, z[i + 1], points[i + 1], x_before, (angle, gap)
+        )
+        exact_twist, exact_length = _snapped(twist, angle), _zeroed(length, gap)
+        exact_along = _zeroed(along, gap)
+        if i == 0:
+            first = T = _frame(z[0], x, here + along * z[0])
+            exact_along = 0.0
+        else:
+            turn = math.atan2(float(np.cross(x_before, x) @ z[i]), float(x_before @ x))
+            shift.append(turn)
+            off_length = max(off_length, abs(exact_along - along))
+        off_angle = max(off_angle, abs(wrapped(exact_twist - twist)))
+        off_length = max(off_length, abs(exact_length - length))
+        a.append(exact_length)
+        d.append(exact_along)
+        t.append(exact_twist)
+        T = _frame(z[i], x, T[:3, 3] + (0.0 if i == 0 else along) * z[i])
+        T = _frame(z[i + 1], x, T[:3, 3] + length * x)
+    shift.append(0.0)
+    shift = shift[:n]
+    links = DHLinks(
+        a=tuple(a),
+        d=tuple(d),
+        t=tuple(t),
+        shift=tuple(shift),
+        T_S_1=frozen(first),
+        T_n_tool=frozen(np.eye(4)),
+        rounding=(off_angle, off_length),
+    )
+    T_tool = se3.inverse(_home(links)) @ chain.M
+    return dataclasses.replace(links, T_n_tool=frozen(T_tool))
+
+
+def _home(links: DHLinks) -> FloatArray:
+    """Return the pose (4, 4) of the last frame in {S} at q = 0."""
+    T = np.array(links.T_S_1)
+    for i in range(links.n):
+        T = T @ _turned(links.shift[i])
+        if i < links.n - 1:
+            T = T @ links.link(i)
+    return T
+
+
+def exact_chain(chain: Chain, links: DHLinks) -> Chain:
+    """Return `chain` with the screw axes of `links`, which have no rounding."""
+    T = np.array(links.T_S_1)
+    S = []
+    for i in range(links.n):
+        S.append(screws.revolute(T[:3, 2], T[:3, 3]))
+        T = T @ _turned(links.shift[i])
+        if i < links.n - 1:
+            T = T @ links.link(i)
+    return dataclasses.replace(chain, S=np.column_stack(S))
+
+
+def reversed_chain(chain: Chain) -> Chain:
+    """Return the chain seen from the tool: its joints in the opposite order, its base at the tool.
+
+    The pose of its tool is the inverse of the pose of `chain`, at the reversed joint angles.
+    """
+    T_tool_S = se3.inverse(chain.M)
+    return Chain(
+        M=T_tool_S,
+        S=-screws.moved(T_tool_S, chain.S)[:, ::-1],
+        lower=chain.lower[::-1],
+        upper=chain.upper[::-1],
+        speed=chain.speed[::-1],
+        names=chain.names[::-1],
+    )
+
+
+def _turned(theta: float) -> FloatArray:
+    return se3.from_rotation_translation(so3.rotation_z(theta), np.zeros(3))
+
+
+def _start(z: FloatArray, point: FloatArray) -> FloatArray:
+    """Return a frame (4, 4) with `z` at `point`, its x in any direction."""
+    other = np.eye(3)[int(np.abs(z).argmin())]
+    x = other - (other @ z) * z
+    return _frame(z, x / np.linalg.norm(x), point)
+
+
+def _frame(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:
+    return se3.from_rotation_translation(np.column_stack((x, np.cross(z, x), z)), origin)
+
+
+def _normal(
+    z: FloatArray,
+    here: FloatArray,
+    z2: FloatArray,
+    p2: FloatArray,
+    x: FloatArray,
+    within: tuple[float, float],
+) -> tuple[float, float, float, FloatArray]:
+    """Return the common normal of an axis through `here` and the next one.
+
+    The values are its distance along the axis from `here` [m], its length [m], the twist [rad] and
+    its direction (3,). `x` is used where the axes are one line. ``within`` is the angle [rad] and
+    the length [m] that count as none.
+    """
+    across = np.cross(z, z2)
+    sine, cosine = float(np.linalg.norm(across)), float(z @ z2)
+    gap = p2 - here
+    if sine <= within[0]:
+        between = gap - (gap @ z) * z
+        length = float(np.linalg.norm(between))
+        direction = between / length if length > within[1] else x
+        twist = 0.0 if cosine > 0.0 else math.pi
+        return 0.0, length, twist, direction
+    direction = across / sine
+    along = float(np.cross(gap, z2) @ across) / sine**2
+    length = float(gap @ direction)
+    if length < -within[1]:
+        return along, -length, -math.atan2(sine, cosine), -direction
+    return along, length, math.atan2(sine, cosine), direction
+
+
+def _snapped(twist: float, within: float) -> float:
+    quarter = 0.5 * math.pi * round(twist / (0.5 * math.pi))
+    return quarter if abs(twist - quarter) <= within else twist
+
+
+def _zeroed(length: float, within: float) -> float:
+    return 0.0 if abs(length) <= within else length

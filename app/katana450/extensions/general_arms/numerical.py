@@ -1,0 +1,348 @@
+"""Numerical inverse kinematics for every chain of turning joints, within its limits.
+
+A step minimises |J dq - e|^2 + mu |dq|^2, where e is the twist from the tool to the target with its
+translation divided by the length of the arm: a damped Gauss-Newton step. The damping mu falls with
+each step that comes nearer and rises with each that does not (Levenberg 1944, Marquardt 1963). A
+joint that the step pushes beyond its limit stays there, and the others take the step without it.
+
+Seeds: the given posture; then those of a fixed table of postures inside the limits whose poses are
+nearest to the target. A target that no seed reaches gets the posture with the least error.
+
+`follow` moves a posture along with its target. It stays on its branch: it stops before a posture in
+which the arm loses a freedom, where the determinant of the Jacobian changes its sign, and before a
+joint that would have to jump.
+
+Speed: one target at a time is computed on plain floats; numpy solves the 6 equations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450 import tolerances
+from katana450.extensions.general_arms.links import DHLinks
+from katana450.extensions.general_arms.posture import GeneralPosture, scaled_jacobian
+from katana450.extensions.general_arms.tool_motion import Motion, tool_and_jacobian
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.turns import in_limits_turn
+
+QUICK_STEPS: Final = 14
+"""Maximum number of steps from one seed. Most seeds that lead to the target need fewer."""
+
+STEPS: Final = 100
+"""Maximum number of steps from the best end, if no seed leads to the target."""
+
+SEEDS: Final = 60
+"""Maximum number of seeds for a target."""
+
+FEW_SEEDS, FEW_ENDS = 12, 3
+"""Numbers of seeds, and of their best ends, from which the nearest posture is searched."""
+
+TABLE: Final = 4096
+"""Number of postures from which the seeds are taken."""
+
+SOLVED: Final = 1e-11
+"""[rad], [arm lengths] Error at which a target counts as reached."""
+
+LARGEST_STEP: Final = 1.0
+"""[rad] Maximum turn of a joint in one step."""
+
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e3
+
+STALLED: Final = 1e-3
+"""[1] Relative gain of a step below which the search ends, away from the target."""
+
+JUMP: Final = 0.3
+"""[rad] Maximum turn of a joint while a target is followed; see `Numerical.follow`."""
+
+LOST_FREEDOM: Final = 0.02
+"""[1] Smallest singular value of the scaled Jacobian at which following stops."""
+
+
+class SearchState(NamedTuple):
+    """The state of an arm: error, its squared size, and Jacobian as the six rows of a list."""
+
+    error: tuple[float, ...]
+    square: float
+    J: list[list[float]]
+
+
+class FollowStatus(Enum):
+    """Outcome of `Numerical.follow`, with a sentence for people."""
+
+    REACHED = "the target is reached"
+    NEAREST = "the arm comes no nearer; a limit or its reach keeps it"
+    SINGULAR = "the arm is stopped before a posture in which it loses a freedom"
+    JUMP = "the arm is stopped because a joint would have to jump"
+
+
+class Followed(NamedTuple):
+    """The posture (n,) [rad] that `Numerical.follow` arrives at, and why it ends there."""
+
+    q: FloatArray
+    status: FollowStatus
+
+
+@dataclass(frozen=True, eq=False)
+class Numerical:
+    """Numerical inverse kinematics of one chain; the module's text describes the method.
+
+    Attributes:
+        chain: the chain.
+        links: its dimensions.
+        why: the reason why no closed form is used, as a clause.
+        weight: weight of the position beside the orientation.
+    """
+
+    chain: Chain
+    links: DHLinks
+    why: str = ""
+    weight: float = 1.0
+
+    @property
+    def method(self) -> str:
+        """The method in words."""
+        return f"numerical{self.why and f', because {self.why}'}"
+
+    @cached_property
+    def length(self) -> float:
+        """The length [m] by which translations are divided."""
+        return max(0.5 * self.links.reach, 1e-3) / self.weight
+
+    @cached_property
+    def _state(
+        self,
+    ) -> Callable[[Sequence[float]], Motion]:
+        return tool_and_jacobian(self.links)
+
+    @cached_property
+    def _table(self) -> tuple[FloatArray, FloatArray]:
+        """Postures (TABLE, n) [rad] inside the limits, and their poses as rows (TABLE, 12)."""
+        chain = self.chain
+        rng = np.random.default_rng(chain.n)
+        q = rng.uniform(chain.lower, chain.upper, (TABLE, chain.n))
+        q[0] = 0.5 * (chain.lower + chain.upper)
+        return q, self._places(forward_batch(chain, q))
+
+    def _places(self, T: FloatArray) -> FloatArray:
+        """Return poses (N, 4, 4) as rows (N, 12), whose distances compare rotations and places."""
+        R = T[:, :3, :3].reshape(-1, 9) * math.sqrt(0.5)
+        return np.concatenate((R, T[:, :3, 3] / self.length), axis=1)
+
+    def seeds(self, T: FloatArray) -> FloatArray:
+        """Return the postures (SEEDS, n) [rad] of the table, those with poses nearest to `T`."""
+        q, places = self._table
+        far = ((places - self._places(T[None])) ** 2).sum(axis=1)
+        nearest = np.argpartition(far, SEEDS)[:SEEDS]
+        return q[nearest[np.argsort(far[nearest], kind="stable")]]
+
+    def inverse(
+        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
+    ) -> Sequence[GeneralPosture]:
+        """Return one posture inside the limits; see `Kinematics.inverse`.
+
+        The search begins at `q_hint` (n,) [rad]. If no seed reaches the pose, the posture is the
+        nearest that was found.
+        """
+        pose = np.array(se3.validated_rows(T))
+        hint = None if q_hint is None else self.chain.clamp(q_hint)
+        return [GeneralPosture(self.chain, pose, self.solve(pose, hint), "numerical")]
+
+    def solve(
+        self, T: FloatArray, hint: FloatArray | None = None, seeds: int = SEEDS
+    ) -> tuple[float, ...]:
+        """Return the joint angles [rad] nearest to the pose `T` (4, 4), without checks."""
+        goal = self._goal(T)
+        best: tuple[float, ...] = ()
+        least = math.inf
+        for start in self._starts(T, hint, seeds):
+            q, square = self.descend(goal, start, QUICK_STEPS)
+            if square < least:
+                best, least = q, square
+            if least <= SOLVED * SOLVED:
+                break
+        else:
+            best, _ = self.descend(goal, best, STEPS)
+        return tuple(in_limits_turn(self.chain, np.array(best)).tolist())
+
+    def _starts(
+        self, T: FloatArray, hint: FloatArray | None, seeds: int
+    ) -> Iterator[Sequence[float]]:
+        if hint is not None:
+            yield hint.tolist()
+        if seeds:
+            yield from self.seeds(T)[:seeds].tolist()
+
+    def nearest(self, T: FloatArray, starts: Sequence[FloatArray], weight: float) -> FloatArray:
+        """Return the joint angles (n,) [rad] inside the limits with the least error for `T` (4, 4).
+
+        The error of the position counts ``weight`` times as much as in `solve`. The search begins
+        at `starts` and at the seeds.
+        """
+        search = replace(self, weight=weight)
+        goal = search._goal(T)
+        begun = [search.descend(goal, start.tolist(), QUICK_STEPS) for start in starts]
+        begun += [
+            search.descend(goal, start, QUICK_STEPS) for start in self.seeds(T)[:FEW_SEEDS].tolist()
+        ]
+        ends = [
+            search.descend(goal, q, STEPS)
+            for q, _ in sorted(begun, key=lambda each: each[1])[:FEW_ENDS]
+        ]
+        q, _ = min(ends, key=lambda each: each[1])
+        return in_limits_turn(self.chain, np.array(q))
+
+    def _goal(self, T: FloatArray) -> tuple[float, ...]:
+        """Return `T` in the frame of axis 1: the rotation by columns, then the place."""
+        here = self.links.T_1_S @ T
+        return (*here[:3, :3].T.ravel().tolist(), *here[:3, 3].tolist())
+
+    def step(self, goal: tuple[float, ...], q: Sequence[float]) -> SearchState:
+        """Return error and Jacobian at `q` [rad], translations divided by `length`."""
+        pose, moved = self._state(q)
+        scale = 1.0 / self.length
+        error = (
+            *_turn(pose, goal),
+            *((b - a) * scale for a, b in zip(pose[9:], goal[9:], strict=True)),
+        )
+        J = [[w1, w2, w3, v1 * scale, v2 * scale, v3 * scale] for w1, w2, w3, v1, v2, v3 in moved]
+        return SearchState(error, sum(e * e for e in error), J)
+
+    def descend(
+        self, goal: tuple[float, ...], start: Sequence[float], steps: int
+    ) -> tuple[tuple[float, ...], float]:
+        """Return the joint angles [rad] to which steps from `start` lead, and the squared error."""
+        lower, upper = self._limits
+        q = [min(max(x, a), b) for x, a, b in zip(start, lower, upper, strict=True)]
+        now = self.step(goal, q)
+        mu, slow = FIRST_DAMPING, 0
+        for _ in range(steps):
+            if now.square <= SOLVED * SOLVED:
+                break
+            dq = self._turned(now, q, mu)
+            tried = [min(max(x + d, a), b) for x, d, a, b in zip(q, dq, lower, upper, strict=True)]
+            then = self.step(goal, tried)
+            if then.square < now.square:
+                slow = slow + 1 if then.square > (1.0 - STALLED) * now.square else 0
+                q, now = tried, then
+                mu = max(0.1 * mu, LEAST_DAMPING)
+                if slow == 3:
+                    break
+            else:
+                mu *= 8.0
+                if mu > MOST_DAMPING:
+                    break
+        return tuple(q), now.square
+
+    @cached_property
+    def _limits(self) -> tuple[list[float], list[float]]:
+        """The limits [rad] that a search keeps: none for a joint that can take every direction."""
+        ends = list(zip(self.chain.lower.tolist(), self.chain.upper.tolist(), strict=True))
+        whole = [b - a >= math.tau - tolerances.LIMIT_SLACK for a, b in ends]
+        return (
+            [-math.inf if w else a for (a, _), w in zip(ends, whole, strict=True)],
+            [math.inf if w else b for (_, b), w in zip(ends, whole, strict=True)],
+        )
+
+    def _turned(self, now: SearchState, q: list[float], mu: float) -> list[float]:
+        """Return the damped step (n,) [rad]; joints that it pushes beyond a limit are left out."""
+        lower, upper = self._limits
+        J, error = np.array(now.J), np.array(now.error)
+        damping = mu * max(now.square, 1e-18) if mu < 1.0 else mu
+        for _ in range(self.chain.n):
+            A = J.T @ J
+            A.flat[::7] += damping + 1e-15
+            dq: list[float] = (J @ np.linalg.solve(A, error)).tolist()
+            pushed = [
+                k
+                for k, (x, d, a, b) in enumerate(zip(q, dq, lower, upper, strict=True))
+                if (x <= a and d < 0.0) or (x >= b and d > 0.0)
+            ]
+            if not pushed:
+                break
+            J[pushed] = 0.0
+        largest = max(map(abs, dq))
+        if largest > LARGEST_STEP:
+            dq = [d * LARGEST_STEP / largest for d in dq]
+        return dq
+
+    def follow(self, q: FloatArray, T: FloatArray) -> Followed:
+        """Return the posture to which the tool follows its target from `q` (n,) to `T` (4, 4).
+
+        It never passes a singular posture and never turns a joint by more than JUMP.
+        """
+        goal = self._goal(T)
+        lower, upper = self._limits
+        here = q.tolist()
+        now = self.step(goal, here)
+        regular = _regularity(self.chain, q)
+        for _ in range(STEPS):
+            if now.square <= SOLVED * SOLVED:
+                return Followed(np.array(here), FollowStatus.REACHED)
+            dq = self._turned(now, here, 0.0)
+            size = max(map(abs, dq))
+            fraction = 1.0
+            tried = here
+            while fraction > 1e-3:
+                tried = [
+                    min(max(x + fraction * d, a), b)
+                    for x, d, a, b in zip(here, dq, lower, upper, strict=True)
+                ]
+                then = self.step(goal, tried)
+                if then.square < now.square:
+                    break
+                fraction *= 0.5
+            else:
+                return Followed(np.array(here), FollowStatus.NEAREST)
+            at = _regularity(self.chain, np.array(tried))
+            if at * regular <= 0.0 or (abs(at) < LOST_FREEDOM and abs(at) < abs(regular)):
+                return Followed(np.array(here), FollowStatus.SINGULAR)
+            if max(abs(x - x0) for x, x0 in zip(tried, q.tolist(), strict=True)) > JUMP:
+                return Followed(np.array(here), FollowStatus.JUMP)
+            slow = then.square > (1.0 - STALLED) * now.square
+            here, now = tried, then
+            if slow or size < SOLVED:
+                break
+        status = FollowStatus.REACHED if now.square <= 1e-18 else FollowStatus.NEAREST
+        return Followed(np.array(here), status)
+
+
+def _regularity(chain: Chain, q: FloatArray) -> float:
+    """Return the smallest singular value [1] of the scaled Jacobian.
+
+    With six axes it has the sign of the determinant, which changes where the branch does.
+    """
+    J = scaled_jacobian(chain, q)
+    least = float(np.linalg.svd(J, compute_uv=False).min())
+    return math.copysign(least, float(np.linalg.det(J))) if chain.n == 6 else least
+
+
+def _turn(here: tuple[float, ...], goal: tuple[float, ...]) -> tuple[float, float, float]:
+    """Return the rotation vector [rad] from the first nine numbers of `here` to those of `goal`.
+
+    Half the sum of x x x', y x y', z x z' is its axis times its sine.
+    """
+    a, b, c, d, e, f, g, h, i, *_ = here
+    j, k, m, n, o, p, r, s, t, *_ = goal
+    x = 0.5 * (b * m - c * k + e * p - f * o + h * t - i * s)
+    y = 0.5 * (c * j - a * m + f * n - d * p + i * r - g * t)
+    z = 0.5 * (a * k - b * j + d * o - e * n + g * s - h * r)
+    sine = math.sqrt(x * x + y * y + z * z)
+    cosine = 0.5 * (a * j + b * k + c * m + d * n + e * o + f * p + g * r + h * s + i * t - 1.0)
+    if cosine < -0.99:
+        first, second = (np.reshape(each[:9], (3, 3)).T for each in (here, goal))
+        w: list[float] = so3.log(second @ first.T).tolist()
+        return w[0], w[1], w[2]
+    factor = math.atan2(sine, cosine) / sine if sine > 1e-12 else 1.0
+    return factor * x, factor * y, factor * z

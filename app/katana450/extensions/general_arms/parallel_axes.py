@@ -1,0 +1,178 @@
+"""The closed forms of arms whose axes 2, 3 and 4 are parallel: six axes (UR), or four.
+
+The parallel axes move the tool in a plane that axis 1 turns. With the frames of links.py:
+
+    alpha1   the height along axes 2 to 4 of a point that no later joint lifts: subproblem 4; 2
+             solutions, facing it and facing away from it.
+    psi      the sum of alpha2 to alpha4, with the signs of the axes; see below.
+    alpha3   the distance of axis 4 from axis 2: subproblem 3; 2 solutions, elbow up and down.
+    alpha2   the bent arm turns onto axis 4: subproblem 1; 1 solution.
+    alpha4   the remainder of psi.
+
+Six axes, of which 5 and 6 meet (`six_axes`). The point is where they meet. psi, alpha5 and alpha6
+split what remains of the tool's rotation (`three_turns`): subproblem 4 with 2 solutions, and
+subproblem 1 twice. There are 8 branches. With axes 4 and 6 parallel only psi and alpha6 together
+count: alpha6 is free.
+
+Four axes (`four_axes`). The point is the tool point, and psi is the turn that brings the line from
+axis 4 to the tool point nearest to its direction in the pose: subproblem 1, 1 solution. There are 4
+branches. Four axes take a pose with one shoulder only. The postures of the other shoulder hold the
+tool point but not the rotation, and so does every posture for a pose that is turned out of the
+plane. Near axis 1 the tool point determines alpha1 poorly; the direction of the axes 2 to 4 in the
+pose then determines it, if both agree.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.extensions.general_arms.functions import (
+    FLOATS,
+    FREE,
+    Number,
+    Operations,
+    facing,
+    three_turns,
+    two_links,
+)
+from katana450.extensions.general_arms.links import DHLinks, sine_and_cosine
+from katana450.extensions.general_arms.spherical_wrist import Angles, Solve
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import frozen
+
+AGREES = 1e-13
+"""[m] Distance of the tool point from the arm's plane up to which pose and plane agree."""
+
+
+def six_axes(links: DHLinks, f: Operations) -> Solve:
+    """Return solve(rows, free) for six axes; as `spherical_wrist.parallel_shoulder`."""
+    (s1, c1), (s4, c4) = sine_and_cosine(links.t[0]), sine_and_cosine(links.t[3])
+    (_, flip2), (_, flip3) = sine_and_cosine(links.t[1]), sine_and_cosine(links.t[2])
+    flip = flip2 * flip3
+    d5, a1, d1 = links.d[4], links.a[0], links.d[0]
+    height = links.d[1] + flip2 * (links.d[2] + flip3 * (links.d[3] + c4 * d5))
+    ex, ey = links.a[3], -flip * s4 * d5
+    turns, bent = facing(f), two_links(f, links.a[1], links.a[2])
+    split = three_turns(f, links.t[3] + (0.0 if flip > 0.0 else math.pi), links.t[4])
+    atan2 = f.atan2
+
+    def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
+        (r11, r12, r13, x), (r21, r22, r23, y), (r31, r32, r33, z), _ = rows
+        z = z - d1
+        beside = (c1 * z - height) / s1
+        up = c1 * beside + s1 * z
+        found = []
+        for c, s, ahead in turns(x, y, beside, free[0]):
+            one = atan2(s, c)
+            m11, m12, m13 = c * r11 + s * r21, c * r12 + s * r22, c * r13 + s * r23
+            m31, m32, m33 = c * r21 - s * r11, c * r22 - s * r12, c * r23 - s * r13
+            m21, m22, m23 = c1 * m31 + s1 * r31, c1 * m32 + s1 * r32, c1 * m33 + s1 * r33
+            m31, m33 = c1 * r31 - s1 * m31, c1 * r33 - s1 * m33
+            entries = ((m11, m12, m13), (m21, m22, m23), m31, m33)
+            first, second, radius = split(*entries, 0.0)
+            if f is FLOATS and radius <= FREE:
+                # Axes 4 and 6 are in line, or opposite: put alpha6 where it is wanted.
+                turn = first[2] - free[5]
+                first, second, _ = split(*entries, turn if m33 >= 0.0 else -turn)
+            for psi, five, six, cp, sp in (first, second):
+                towards, opening, bend = bent(
+                    ahead - a1 - ex * cp + ey * sp, up - ex * sp - ey * cp
+                )
+                for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
+                    four = flip * (psi - two - bend_)
+                    found.append((one, two, flip2 * bend_, four, five, six))
+        return found
+
+    return solve
+
+
+def four_axes(links: DHLinks, f: Operations) -> Solve:
+    """Return solve(rows, free) for four axes, whose links are `pointed`.
+
+    ``rows`` is the pose of the tool point with the rotation of the last frame. The 4 solutions are
+    the canonical angles [rad]; as `spherical_wrist.parallel_shoulder`.
+    """
+    s1, c1 = sine_and_cosine(links.t[0])
+    (_, flip2), (_, flip3) = sine_and_cosine(links.t[1]), sine_and_cosine(links.t[2])
+    flip = flip2 * flip3
+    a1, d1 = links.a[0], links.d[0]
+    length, _, over = links.T_n_tool[:3, 3].tolist()
+    height = links.d[1] + flip2 * (links.d[2] + flip3 * over)
+    turns, bent = facing(f), two_links(f, links.a[1], links.a[2])
+    near = (tolerances.NEAR_AXIS_1 * links.reach) ** 2
+    atan2, hypot, cos, sin = f.atan2, f.hypot, f.cos, f.sin
+
+    def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
+        (r11, _, r13, x), (r21, _, r23, y), (r31, _, _, z), _ = rows
+        z = z - d1
+        beside = (c1 * z - height) / s1
+        up = c1 * beside + s1 * z
+        planes = list(turns(x, y, beside, free[0]))
+        if f is FLOATS and planes[0][2] ** 2 <= near:
+            planes = _by_axes(planes, x, y, beside, -flip * s1 * r23, flip * s1 * r13)
+        found = []
+        for c, s, ahead in planes:
+            one = atan2(s, c)
+            m11, m21 = c * r11 + s * r21, c1 * (c * r21 - s * r11) + s1 * r31
+            psi = f.select(hypot(m11, m21) <= FREE, 0.0, atan2(m21, m11))
+            towards, opening, bend = bent(ahead - a1 - length * cos(psi), up - length * sin(psi))
+            for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
+                found.append((one, two, flip2 * bend_, flip * (psi - two - bend_)))
+        return found
+
+    return solve
+
+
+def _by_axes(
+    planes: list[tuple[float, float, float]],
+    x: float,
+    y: float,
+    beside: float,
+    c: float,
+    s: float,
+) -> list[tuple[float, float, float]]:
+    """Return the turns of axis 1, one of them along (c, s) if that holds the tool point too."""
+    size = math.hypot(c, s)
+    if size <= FREE:
+        return planes
+    c, s = c / size, s / size
+    if abs(c * y - s * x - beside) > AGREES:
+        return planes
+    front, back = planes
+    ahead = c * x + s * y
+    if c * front[0] + s * front[1] >= c * back[0] + s * back[1]:
+        return [(c, s, ahead), back]
+    return [front, (c, s, ahead)]
+
+
+def pointed(links: DHLinks) -> DHLinks:
+    """Return the links of four axes with alpha4 = 0 where x points to the tool point."""
+    x, y, z = links.T_n_tool[:3, 3].tolist()
+    bearing = math.atan2(y, x) if math.hypot(x, y) > tolerances.FAMILY_LENGTH else 0.0
+    length = math.hypot(x, y)
+    R = so3.rotation_z(-bearing) @ links.T_n_tool[:3, :3]
+    return dataclasses.replace(
+        links,
+        shift=(*links.shift[:3], links.shift[3] + bearing),
+        T_n_tool=frozen(se3.from_rotation_translation(R, np.array([length, 0.0, z]))),
+    )
+
+
+def why_not_parallel(links: DHLinks) -> str:
+    """Return the condition on parallel axes that four or six axes miss; empty if all hold."""
+    for i in (2, 3):
+        if not links.is_parallel(i):
+            turn = math.degrees(min(abs(links.t[i - 1]), math.pi - abs(links.t[i - 1])))
+            return f"axes {i} and {i + 1} are not parallel ({turn:.3g} deg off)"
+    if links.is_parallel(1):
+        return "axis 1 is parallel to axis 2"
+    for i in (2, 3):
+        if links.a[i - 1] == 0.0:
+            return f"axes {i} and {i + 1} are one line"
+    if links.n == 6 and not links.crosses(5):
+        return "axes 5 and 6 do not meet"
+    return "axes 4 and 5 are parallel" if links.n == 6 and links.is_parallel(4) else ""

@@ -1,0 +1,235 @@
+"""The closed form of seven axes: one joint is locked, the other six are solved, and it is chosen.
+
+Seven axes take a pose in a curve of postures for each branch. The locked joint is its parameter,
+the swivel. The formulas are those of spherical_wrist.py, on arrays of swivels:
+
+    axis 3 locked    axes 1 and 2 meet, and 5, 6 and 7 (iiwa): the lock is part of the link between
+                     axes 2 and 4.
+    axis 1 locked    axes 2 to 7 have a spherical wrist: the lock moves the base of the others.
+    axis 7 or 5      the same seen from the tool (Panda: axes 1, 2 and 3 meet, and 5 and 6).
+
+Of all swivels, the posture of each branch is taken that keeps farthest from the joint limits, or
+nearest to a given posture, inside the limits if there is one. A first round tries swivels over the
+whole range, a second one between the neighbours of the best.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450 import tolerances
+from katana450.extensions.general_arms.closed_form import branch_names, errors_of, in_limits_turns
+from katana450.extensions.general_arms.functions import ARRAYS
+from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
+from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.posture import GeneralPosture
+from katana450.extensions.general_arms.spherical_wrist import (
+    crossing_shoulder,
+    is_crossing_shoulder,
+    is_parallel_shoulder,
+    parallel_shoulder,
+    swivel_link,
+    wrist_centre,
+)
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+
+SWIVELS: Final = 64
+"""Number of swivels of the first round."""
+
+FINER: Final = 9
+"""Number of swivels of the second round for each branch."""
+
+CONTINUITY: Final = 10.0
+"""Weight of the distance to a given posture [1/rad] beside the room to the limits."""
+
+
+def _six_of(links: DHLinks) -> DHLinks:
+    """Return the links of axes 1, 2, 4, 5, 6, 7 as far as `crossing_shoulder` reads them."""
+    return DHLinks(
+        a=(links.a[0], 0.0, *links.a[3:]),
+        d=(links.d[0], 0.0, *links.d[3:]),
+        t=(links.t[0], 0.0, *links.t[3:]),
+        shift=(*links.shift[:2], *links.shift[3:]),
+        T_S_1=links.T_S_1,
+        T_n_tool=links.T_n_tool,
+    )
+
+
+def _locks_third(links: DHLinks) -> bool:
+    """Return whether axis 3 can be locked: `crossing_shoulder` then solves the others."""
+    if not (links.crosses(1) and links.meet(5)):
+        return False
+    six = _six_of(links)
+    cx, cy, _ = wrist_centre(six)
+    between = np.array(swivel_link(links, np.linspace(-3.0, 3.0, 13)))
+    x = between[0] * between[3] + between[4] * between[7] + between[8] * between[11]
+    y = between[1] * between[3] + between[5] * between[7] + between[9] * between[11]
+    return bool(math.hypot(cx, cy) * np.hypot(x, y).min() > tolerances.FAMILY_LENGTH**2)
+
+
+def _locks_first(links: DHLinks) -> bool:
+    """Return whether axis 1 can be locked: axes 2 to 7 then have a spherical wrist."""
+    six = links.from_axis(1)
+    return is_parallel_shoulder(six) or is_crossing_shoulder(six)
+
+
+@dataclass(frozen=True, eq=False)
+class SevenAxes:
+    """Inverse kinematics of seven axes with the joint ``locked`` as parameter.
+
+    Attributes:
+        chain: the chain.
+        links: of the chain, or of the chain seen from the tool.
+        locked: index of the swivel in `links`, 0 or 2.
+        is_reversed: whether `links` are seen from the tool.
+    """
+
+    chain: Chain
+    links: DHLinks
+    locked: int
+    is_reversed: bool
+
+    @staticmethod
+    def of(chain: Chain, links: DHLinks) -> SevenAxes | str:
+        """Return the closed form of `chain`, or the conditions that it misses."""
+        seen = ((links, False), (links_of(reversed_chain(chain)), True))
+        for locked, can_lock in ((2, _locks_third), (0, _locks_first)):
+            for each, is_reversed in seen:
+                if can_lock(each):
+                    return SevenAxes(chain, each, locked, is_reversed)
+        return (
+            "with no joint locked do the other six have three axes at one end that meet in one "
+            "point, and beside the rest two that meet or are parallel"
+        )
+
+    @cached_property
+    def _search(self) -> Numerical:
+        return Numerical(self.chain, links_of(self.chain, exact=False))
+
+    @property
+    def swivel(self) -> int:
+        """Index, from 0, of the joint of the chain that is the parameter."""
+        return 6 - self.locked if self.is_reversed else self.locked
+
+    @property
+    def method(self) -> str:
+        """The method in words."""
+        return f"closed form for seven axes with axis {self.swivel + 1} as the swivel"
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """Names of the branches, in the order of the solutions."""
+        parallel = self.locked == 0 and is_parallel_shoulder(self.links.from_axis(1))
+        return tuple(branch_names(6, shoulder_last=not parallel))
+
+    def at_swivels(self, T: FloatArray, swivels: FloatArray) -> FloatArray:
+        """Return the joint angles (N, 8, 7) [rad] for the pose `T` (4, 4) at `swivels` (N,)."""
+        links = self.links
+        alpha = swivels + links.shift[self.locked]
+        rows = np.array(links.rows(se3.inverse(T) if self.is_reversed else T))
+        zeros = np.zeros_like(swivels)
+        with np.errstate(all="ignore"):
+            if self.locked == 2:
+                six = _six_of(links)
+                solve = crossing_shoulder(six, ARRAYS, swivel_link(links, alpha))
+                places = (0, 1, 3, 4, 5, 6)
+                columns = [[rows[i, j] + zeros for j in range(4)] for i in range(4)]
+            else:
+                six = links.from_axis(1)
+                form = parallel_shoulder if is_parallel_shoulder(six) else crossing_shoulder
+                solve, places = form(six, ARRAYS), (1, 2, 3, 4, 5, 6)
+                columns = _after_first(links, rows, alpha)
+            found = solve(columns, six.shift)
+        q = np.empty((len(swivels), 8, 7))
+        q[:, :, self.locked] = swivels[:, None]
+        for k, angles in enumerate(found):
+            for place, angle in zip(places, angles, strict=True):
+                q[:, k, place] = angle - links.shift[place]
+        return in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
+
+    def inverse(
+        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
+    ) -> Sequence[GeneralPosture]:
+        """Return a posture for each of `branches`; see `Kinematics.inverse`.
+
+        With `q_hint` (7,) [rad] it is the one nearest to the hint, weighed against the room to the
+        limits; else the one with the most room.
+        """
+        pose = np.array(se3.validated_rows(T))
+        hint = None if q_hint is None else self.chain.check_q(q_hint)
+        q = self.best(pose, hint)
+        return [
+            GeneralPosture(self.chain, pose, tuple(each), branch)
+            for each, branch in zip(q.tolist(), self.branches, strict=True)
+        ]
+
+    def best(self, T: FloatArray, hint: FloatArray | None = None) -> FloatArray:
+        """Return the joint angles (8, 7) [rad] of the best swivel of each branch."""
+        low, high = float(self.chain.lower[self.swivel]), float(self.chain.upper[self.swivel])
+        low, high = max(low, -math.pi), min(high, math.pi)
+        step = (high - low) / SWIVELS
+        swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
+        if hint is not None:
+            # The posture next to the hint may lie where the swivel hardly changes along the curve.
+            beside = self._search.solve(T, hint, seeds=0)
+            ends = [hint[self.swivel], beside[self.swivel]]
+            swivels = np.append(swivels, np.clip(ends, low, high))
+        q = self.at_swivels(T, swivels)
+        cost = self._cost(q, T, hint)
+        first = q[cost.argmin(axis=0), np.arange(8)]
+        least = cost.min(axis=0)
+        offsets = np.linspace(-step, step, FINER)
+        finer = np.clip(first[:, self.swivel, None] + offsets, low, high).ravel()
+        q = self.at_swivels(T, finer).reshape(8, FINER, 8, 7)
+        q = q[np.arange(8), :, np.arange(8)].swapaxes(0, 1)
+        cost = self._cost(q, T, hint)
+        second = q[cost.argmin(axis=0), np.arange(8)]
+        better = cost.min(axis=0) < least
+        chosen: FloatArray = np.where(better[:, None], second, first)
+        return chosen
+
+    def _cost(self, q: FloatArray, T: FloatArray, hint: FloatArray | None) -> FloatArray:
+        """Return a number (N, 8) for each of `q` (N, 8, 7), least for the best.
+
+        It adds 1000 for a posture that misses the pose and 100 outside of the limits, with the
+        excess. Inside it is the room to the limits as a negative fraction, 0.5 at most.
+        """
+        chain = self.chain
+        room = (np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)).min(
+            axis=-1
+        )
+        cost: FloatArray = np.where(room < 0.0, 100.0, 0.0) - room
+        if hint is not None:
+            cost = cost + CONTINUITY * np.abs(q - hint).max(axis=-1)
+        # Forward kinematics take the most time: postures outside of the limits need none at first.
+        inside = room >= -tolerances.LIMIT_SLACK
+        checked = inside if inside.any(axis=0).all() else np.ones_like(inside)
+        distance, turn = errors_of(
+            chain, q[checked][:, None], np.broadcast_to(T, (int(checked.sum()), 4, 4))
+        )
+        exact = (distance <= tolerances.SAME_POSITION) & (turn <= tolerances.SAME_ROTATION)
+        cost[checked] = np.where(exact[:, 0], cost[checked], 1000.0 + (distance + turn)[:, 0])
+        return cost
+
+
+def _after_first(links: DHLinks, rows: FloatArray, alpha: FloatArray) -> list[list[FloatArray]]:
+    """Return L_1^-1 Rz(-alpha)^ (N,) applied to `rows`: the pose in the frame of axis 2."""
+    c, s = np.cos(alpha), np.sin(alpha)
+    turned = [
+        [c * x + s * y for x, y in zip(rows[0], rows[1], strict=True)],
+        [c * y - s * x for x, y in zip(rows[0], rows[1], strict=True)],
+    ]
+    whole = [*turned, *([value + 0.0 * c for value in row] for row in rows[2:])]
+    inverse = se3.inverse(links.link(0))
+    return [
+        [sum(inverse[i, k] * whole[k][j] for k in range(4)) for j in range(4)] for i in range(4)
+    ]

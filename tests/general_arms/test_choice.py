@@ -1,0 +1,189 @@
+"""Which kinematics a chain gets, and the condition that it misses otherwise."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+
+import numpy as np
+import pytest
+
+from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
+from katana450.extensions.general_arms.links import exact_chain, links_of, reversed_chain
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics
+from tests.general_arms.published_arms import (
+    FOUR,
+    IIWA_7,
+    KR_6,
+    PANDA,
+    PINCHERX_100,
+    PUMA_560,
+    QUARTER,
+    SEVEN,
+    SIX,
+    SKEWED,
+    SKEWED_6,
+    UR5E,
+    craig,
+)
+from tests.kinematics.conftest import katana
+
+ARMS = FOUR | SIX | SEVEN | SKEWED
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_dimensions_describe_the_chain(name: str) -> None:
+    chain = ARMS[name]
+    links = links_of(chain)
+    np.testing.assert_allclose(exact_chain(chain, links).S, chain.S, atol=1e-12)
+    assert links.rounding < (1e-9, 1e-9)
+    again = reversed_chain(reversed_chain(chain))
+    np.testing.assert_allclose(again.S, chain.S, atol=1e-12)
+    q = np.linspace(0.1, 0.7, chain.n)
+    np.testing.assert_allclose(
+        np.linalg.inv(forward(reversed_chain(chain), q[::-1])), forward(chain, q), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("chain", "method"),
+    [
+        (PINCHERX_100, "four axes: pan and three parallel"),
+        (UR5E, "six axes, three of them parallel"),
+        (PUMA_560, "six axes with a spherical wrist"),
+        (KR_6, "six axes with a spherical wrist"),
+        (reversed_chain(KR_6), "spherical wrist, seen from the tool"),
+        (PANDA, "seven axes with axis 7 as the swivel"),
+        (IIWA_7, "seven axes with axis 3 as the swivel"),
+    ],
+)
+def test_closed_form_is_chosen_by_the_axes(chain: Chain, method: str) -> None:
+    assert kinematics_of(chain).method.startswith("closed form for ")
+    assert method in kinematics_of(chain).method
+    assert kinematics_of(chain) is kinematics_of(chain)
+
+
+def test_five_axes_keep_their_own_solver() -> None:
+    chain = katana()
+    kinematics = kinematics_of(chain)
+    assert isinstance(kinematics, FiveAxisKinematics)
+    q = np.array([0.3, -1.0, 1.4, 0.3, 0.2])
+    T = forward(chain, q)
+    found = kinematics.inverse(T, q)
+    assert [each.branch for each in found] == [each.branch for each in inverse(chain, T)]
+    assert found[0].exact
+    np.testing.assert_allclose(found[0].q, q, atol=1e-12)
+    assert exact_arm(chain).chain is chain
+
+
+LIMITS = ([-2.0] * 6, [2.0] * 6)
+OFFSET_WRIST = craig(
+    [
+        (0.0, 0.0, 0.4, 0.0),
+        (-QUARTER, 0.025, 0.0, 0.0),
+        (0.0, 0.455, 0.0, 0.0),
+        (-QUARTER, 0.035, 0.42, 0.0),
+        (QUARTER, 0.0, 0.0, 0.0),
+        (-QUARTER, 0.012, 0.08, 0.0),
+    ],
+    *LIMITS,
+)
+
+
+@pytest.mark.parametrize(
+    ("chain", "missing"),
+    [
+        (SKEWED_6, r"axes 4, 5 and 6 do not meet in one point \(axes 4 and 5 pass .* 30 mm apart"),
+        (SKEWED_6, r"axes 2 and 3 are not parallel \(40.1 deg off\)"),
+        (OFFSET_WRIST, "axes 5 and 6 pass each other 12 mm apart"),
+        (OFFSET_WRIST, "axes 3 and 4 are not parallel"),
+        (SKEWED["skewed 7"], "with no joint locked"),
+        (
+            craig(
+                [(0.0, 0.0, 0.1, 0.0), (0.0, 0.1, 0.0, 0.0), (QUARTER, 0.1, 0.0, 0.0)] * 1,
+                [-1.0] * 3,
+                [1.0] * 3,
+            ),
+            "there is no closed form for 3 axes",
+        ),
+        (
+            craig(
+                [
+                    (0.0, 0.0, 0.1, 0.0),
+                    (QUARTER, 0.0, 0.0, 0.0),
+                    (0.0, 0.2, 0.0, 0.0),
+                    (0.3, 0.2, 0.0, 0.0),
+                ],
+                [-1.0] * 4,
+                [1.0] * 4,
+            ),
+            r"axes 3 and 4 are not parallel \(17.2 deg off\)",
+        ),
+        (
+            craig(
+                [
+                    (0.0, 0.0, 0.1, 0.0),
+                    (QUARTER, 0.0, 0.0, 0.0),
+                    (0.0, 0.2, 0.0, 0.0),
+                    (0.0, 0.2, 0.0, 0.0),
+                    (0.3, 0.0, 0.1, 0.0),
+                ],
+                [-1.0] * 5,
+                [1.0] * 5,
+            ),
+            "axis 5 must be perpendicular to axis 4 and is 72.8 deg off",
+        ),
+    ],
+)
+def test_missing_condition_is_named(chain: Chain, missing: str) -> None:
+    method = kinematics_of(chain).method
+    assert method.startswith("numerical, because ")
+    assert re.search(missing, method), method
+
+
+def test_rounded_file_is_solved_as_the_exact_arm_that_it_means() -> None:
+    quarter = round(QUARTER, 5)
+    rounded = craig(
+        [
+            (0.0, 0.0, 0.1625, 0.0),
+            (quarter, 0.0, 0.0, 0.0),
+            (0.0, -0.425, 0.0, 0.0),
+            (2e-6, -0.3922, 0.1333, 0.0),
+            (quarter, 0.0, 0.0997, 0.0),
+            (-quarter, 3e-6, 0.0996, 0.0),
+        ],
+        UR5E.lower.tolist(),
+        UR5E.upper.tolist(),
+    )
+    exact, notes = exact_arm(rounded)
+    assert len(notes) == 1
+    assert "nearest exact arm" in notes[0]
+    q = np.array([0.3, -1.0, 1.2, 0.4, 0.9, 0.6])
+    assert np.abs(forward(exact, q) - forward(rounded, q)).max() < 5e-5
+    found = kinematics_of(exact).inverse(forward(exact, q), q)
+    assert min(float(np.abs(each.q - q).max()) for each in found if each.exact) < 1e-9
+    assert exact_arm(UR5E).notes == ()
+
+
+def test_deviation_beyond_rounding_is_no_closed_form() -> None:
+    bent = craig(
+        [
+            (0.0, 0.0, 0.1625, 0.0),
+            (QUARTER, 0.0, 0.0, 0.0),
+            (0.0, -0.425, 0.0, 0.0),
+            (math.radians(0.1), -0.3922, 0.1333, 0.0),
+            (QUARTER, 0.0, 0.0997, 0.0),
+            (-QUARTER, 0.0, 0.0996, 0.0),
+        ],
+        UR5E.lower.tolist(),
+        UR5E.upper.tolist(),
+    )
+    assert "axes 3 and 4 are not parallel (0.1 deg off)" in kinematics_of(bent).method
+    q = np.array([0.3, -1.0, 1.2, 0.4, 0.9, 0.6])
+    (found,) = kinematics_of(bent).inverse(forward(bent, q))
+    assert found.position_error < 1e-9
+    assert dataclasses.replace(bent) is not bent

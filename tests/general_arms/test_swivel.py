@@ -1,0 +1,102 @@
+"""Seven axes: reachable poses are reached inside the limits, by a swivel that suits them."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import numpy as np
+import pytest
+
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from tests.general_arms.published_arms import IIWA_7, PANDA, SEVEN
+
+LONG = "KATANA450_LONG" in os.environ
+POSES = 10_000 if LONG else 150
+
+REACHED = 1e-6
+"""[m], [rad]"""
+
+
+def seven_axes(chain: Chain) -> SevenAxes:
+    found = kinematics_of(chain)
+    assert isinstance(found, SevenAxes), found.method
+    return found
+
+
+def fraction(chain: Chain, q: FloatArray) -> float:
+    """Return the room to the nearest limit as a fraction of the joint's range."""
+    return float((np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)).min())
+
+
+def test_locked_joint_is_the_one_whose_rest_has_a_closed_form() -> None:
+    assert seven_axes(IIWA_7).swivel == 2
+    assert seven_axes(PANDA).swivel == 6
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_posture_is_found_again_at_its_swivel(name: str) -> None:
+    chain = SEVEN[name]
+    solver = seven_axes(chain)
+    rng = np.random.default_rng(1)
+    for q in rng.uniform(chain.lower, chain.upper, (POSES, 7)):
+        found = solver.at_swivels(forward(chain, q), np.array([q[solver.swivel]]))[0]
+        assert np.abs(found - q).max(axis=1).min() < 1e-6
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_reachable_poses_are_reached_inside_the_limits(name: str) -> None:
+    chain = SEVEN[name]
+    solver = seven_axes(chain)
+    rng = np.random.default_rng(2)
+    reached = 0
+    times = []
+    for q in rng.uniform(chain.lower, chain.upper, (POSES, 7)):
+        T = forward(chain, q)
+        started = time.thread_time()
+        found = solver.inverse(T)
+        times.append(time.thread_time() - started)
+        usable = [each for each in found if each.within_limits]
+        reached += any(
+            each.position_error <= REACHED and each.rotation_error <= REACHED for each in usable
+        )
+    assert reached >= 0.995 * POSES
+    assert float(np.median(times)) <= 5e-3
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_swivel_without_hint_keeps_room_to_the_limits(name: str) -> None:
+    chain = SEVEN[name]
+    solver = seven_axes(chain)
+    rng = np.random.default_rng(3)
+    for q in rng.uniform(chain.lower, chain.upper, (20, 7)):
+        T = forward(chain, q)
+        room = max(fraction(chain, each.q) for each in solver.inverse(T) if each.exact)
+        assert room >= fraction(chain, q) - 0.005
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_small_move_from_a_hint_moves_the_joints_little(name: str) -> None:
+    chain = SEVEN[name]
+    solver = seven_axes(chain)
+    rng = np.random.default_rng(4)
+    middle, half = 0.5 * (chain.lower + chain.upper), 0.5 * (chain.upper - chain.lower)
+    for _ in range(20):
+        q = middle + 0.8 * half * rng.uniform(-1.0, 1.0, 7)
+        T = forward(chain, q + 1e-3 * rng.normal(size=7))
+        found = [each for each in solver.inverse(T, q) if each.exact and each.within_limits]
+        assert min(float(np.abs(each.q - q).max()) for each in found) < 0.15
+
+
+def test_pose_out_of_reach_says_so() -> None:
+    T = np.eye(4)
+    T[0, 3] = 3.0
+    for chain in SEVEN.values():
+        for each in seven_axes(chain).inverse(T):
+            assert np.isfinite(each.q).all()
+            assert not each.exact
+            assert each.position_error > 1.5
