@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     )
     from katana450.extensions.reachability.map import ReachabilityMap
     from katana450.library.arm import Arm
+    from katana450.library.general_arm import GeneralArm
     from katana450.library.loading import load
     from katana450.library.motion_plan import MotionPlan
     from katana450.library.nearest import NearestPose
@@ -46,6 +47,7 @@ __all__ = [
     "Branch",
     "Client",
     "ConfigurationError",
+    "GeneralArm",
     "IKSolutions",
     "InputError",
     "KatanaError",
@@ -70,6 +72,7 @@ _MODULES = {
     "Branch": "maths.kinematics.branch",
     "Client": "client",
     "ConfigurationError": "errors",
+    "GeneralArm": "library.general_arm",
     "IKSolutions": "library.solutions",
     "InputError": "errors",
     "KatanaError": "errors",

@@ -11,6 +11,9 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 
+BESIDE = 10
+"""Number of postures for each point of a surface, of which all but the first are beside it."""
+
 Function = Callable[[FloatArray], float]
 
 
@@ -67,11 +70,13 @@ def near_surface(
     """Return postures (count, n) on the surface or 1e-16 to 0.1 rad beside it."""
     found = []
     for number in range(count):
-        q = on_surface(chain, function, rng)
-        if number % 3:
+        if number % BESIDE == 0:
+            q = on_surface(chain, function, rng)
+            found.append(q)
+        else:
             step = rng.normal(size=chain.n)
-            q = q + 10.0 ** rng.uniform(-16.0, -1.0) * step / np.linalg.norm(step)
-        found.append(chain.clamp(q))
+            off = 10.0 ** rng.uniform(-16.0, -1.0)
+            found.append(chain.clamp(q + off * step / np.linalg.norm(step)))
     return np.array(found)
 
 

@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Literal
 
 from katana450.assembly.robot_session import describe_robot
+from katana450.errors import RobotDescriptionError
 from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.library.arm import Arm
+from katana450.library.general_arm import general_arm, refuse
 from katana450.library.pose_frame import PoseFrame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -22,9 +24,11 @@ def load(
     frame: FrameName = "shoulder",
     scene: str | Path | None = None,
 ) -> Arm:
-    """Load a 5-axis arm from a URDF file.
+    """Load an arm from a URDF file.
 
-    The kinematics are in closed form for arms with a pan axis, three parallel axes and a roll axis.
+    Five-axis arms with a pan axis, three parallel axes and a roll axis can do everything that an
+    `Arm` can. Of other arms `fk`, `ik`, `nearest` and `jacobian` work: in closed form for the arms
+    listed in docs/library.md, else numerically. ``notes`` of the arm says which.
 
     Args:
         urdf: the file; None for the Katana450.
@@ -35,7 +39,7 @@ def load(
             (docs/scenes.md); None for those of the app, a cup and a basin.
 
     Raises:
-        RobotDescriptionError: the file cannot be read or describes another kind of mechanism.
+        RobotDescriptionError: the file cannot be read or has no arm of two or more turning axes.
         InputError: the frame is unknown or the scene is invalid; the message says what to do.
 
     >>> arm = katana450.load()
@@ -46,14 +50,24 @@ def load(
         ...
     katana450.errors.RobotDescriptionError: ...
     """
-    robot, session, notes = describe_robot(
-        Settings(), URDF_PATH if urdf is None else Path(urdf), tool
-    )
+    path = URDF_PATH if urdf is None else Path(urdf)
+    try:
+        robot, session, notes = describe_robot(Settings(), path, tool)
+    except RobotDescriptionError as error:
+        try:
+            found = general_arm(path, tool, frame)
+        except RobotDescriptionError:
+            found = None
+        if found is None:
+            raise error from None
+        if scene is not None:
+            refuse("A scene")
+        return found
     stored, _ = load_initial_scene(session, None if scene is None else Path(scene), ())
     return Arm(
         robot=robot,
         session=session,
         notes=notes,
-        pose_frame=PoseFrame.of(robot.require_arm(), frame),
+        pose_frame=PoseFrame.of(robot.require_arm().T_base_shoulder, frame),
         objects=stored.scene.objects,
     )

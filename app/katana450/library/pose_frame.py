@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -36,11 +35,14 @@ class PoseFrame:
     T_frame_shoulder: FloatArray
 
     @staticmethod
-    def of(arm: MountedArm, name: str) -> PoseFrame:
-        """Return the frame with that ``name``. Raises InputError for an unknown name."""
+    def of(T_base_shoulder: FloatArray, name: str) -> PoseFrame:
+        """Return the frame with that ``name``; ``T_base_shoulder`` (4, 4) is {S} in the base [m].
+
+        Raises InputError for an unknown name.
+        """
         if name not in NAMES:
             raise InputError(f"There is no frame {name!r}; choose from {', '.join(NAMES)}.")
-        return PoseFrame(name, frozen(np.eye(4)) if name == "shoulder" else arm.T_base_shoulder)
+        return PoseFrame(name, frozen(np.eye(4)) if name == "shoulder" else T_base_shoulder)
 
     @property
     def in_base(self) -> bool:

@@ -13,7 +13,7 @@ from katana450.arm.robot.conduit import Hinge, read_stretches
 from katana450.arm.robot.gripper import Fingers, fingers_of
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.structure import structure_of
+from katana450.arm.robot.structure import Structure, structure_of
 from katana450.arm.robot.urdf import Urdf, UrdfJoint
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
@@ -44,17 +44,8 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
     """
     frames = urdf.frames()
     structure = structure_of(urdf, path, tool)
-    joints = structure.axes
-    T_base_shoulder = _shoulder_frame(frames, joints)
+    described, T_base_shoulder = described_chain(frames, structure)
     T_shoulder_base = se3.inverse(T_base_shoulder)
-    described = Chain(
-        M=T_shoulder_base @ frames[structure.tools[0]],
-        S=np.column_stack([_screw(j, T_shoulder_base @ frames[j.child]) for j in joints]),
-        lower=np.array([_limit(joint, "lower") for joint in joints]),
-        upper=np.array([_limit(joint, "upper") for joint in joints]),
-        speed=np.array([_limit(joint, "velocity") for joint in joints]),
-        names=tuple(joint.name for joint in joints),
-    )
     up = T_shoulder_base[:3, 2]
     chain, notes = exact_member(described, up)
     tools = {
@@ -79,6 +70,28 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
         ),
         notes=tuple(notes),
     )
+
+
+def described_chain(
+    frames: Mapping[str, FloatArray], structure: Structure
+) -> tuple[Chain, FloatArray]:
+    """Return the chain to the default tool as the file describes it, and {S} (4, 4) in the root.
+
+    ``frames``: pose (4, 4) of each link in the root [m]. Raises RobotDescriptionError for a joint
+    without an axis or a limit.
+    """
+    joints = structure.axes
+    T_base_shoulder = _shoulder_frame(frames, joints)
+    T_shoulder_base = se3.inverse(T_base_shoulder)
+    chain = Chain(
+        M=T_shoulder_base @ frames[structure.tools[0]],
+        S=np.column_stack([_screw(j, T_shoulder_base @ frames[j.child]) for j in joints]),
+        lower=np.array([_limit(joint, "lower") for joint in joints]),
+        upper=np.array([_limit(joint, "upper") for joint in joints]),
+        speed=np.array([_limit(joint, "velocity") for joint in joints]),
+        names=tuple(joint.name for joint in joints),
+    )
+    return chain, T_base_shoulder
 
 
 def _gripper_note(fingers: Fingers, tool: str) -> str:

@@ -39,7 +39,7 @@ class Structure:
     """The joints that matter for an arm.
 
     Attributes:
-        axes: the five turning joints that carry the tool, from the root.
+        axes: the turning joints that carry the tool, from the root.
         tools: the tool links, the default one first.
         chosen: whether the default tool is only the outermost link, because no tool is named.
         hand: every movable joint behind the last axis, parents first.
@@ -53,7 +53,9 @@ class Structure:
     others: tuple[UrdfJoint, ...]
 
 
-def structure_of(urdf: Urdf, path: Path, tool: str | None) -> Structure:
+def structure_of(
+    urdf: Urdf, path: Path, tool: str | None, count: int | None = ARM_JOINTS
+) -> Structure:
     """Return the structure of the arm in a URDF.
 
     Args:
@@ -61,16 +63,18 @@ def structure_of(urdf: Urdf, path: Path, tool: str | None) -> Structure:
         path: path of the file, for error messages.
         tool: link to which targets refer by default. None to search the tree for the arm; its tool
             is the first of TOOL_FRAMES that exists, else the outermost link that it carries.
+        count: the number of axes that it must have; None for any number.
 
     Raises:
-        RobotDescriptionError: there is no such link, or the arm does not have five turning axes.
+        RobotDescriptionError: there is no such link, or the arm does not have ``count`` turning
+            axes.
     """
     tree = _Tree(urdf)
     if tool is not None and tool not in urdf.links:
         raise RobotDescriptionError(
             f"{path.name} has no link {tool!r}; its links are {', '.join(urdf.links)}."
         )
-    axes = _main_axes(tree, path) if tool is None else _axes_to(tree, tool)
+    axes = _main_axes(tree, path, count) if tool is None else _axes_to(tree, tool, count)
     carried = {
         link: len(tree.joints_to(link))
         for link in urdf.links
@@ -161,10 +165,10 @@ def _carries(joint: UrdfJoint) -> bool:
     return joint.type in (*TURNING, "fixed")
 
 
-def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
-    """Return the five axes of the arm in a tree from which fingers and wheels branch off.
+def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
+    """Return the axes of the arm in a tree from which fingers and wheels branch off.
 
-    Raises RobotDescriptionError with the number of axes if it is not five.
+    Raises RobotDescriptionError with the number of axes if it is not ``count``.
     """
     axes: list[UrdfJoint] = []
     link = tree.root
@@ -196,13 +200,13 @@ def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
             f"{path.name} has no series of joints that carries a tool; the closed-form kinematics "
             f"need five turning axes. Its joints are {_listed(tree.joints.values()) or 'none'}."
         )
-    if len(axes) != ARM_JOINTS:
+    if count is not None and len(axes) != count:
         hint = ""
         if len(axes) == ARM_JOINTS + 1 and last is not None and not WRIST.search(last.name):
             hint = f" If {last.name} only opens a gripper, add --tool {last.parent}."
-        count = "1 axis" if len(axes) == 1 else f"{len(axes)} axes"
+        number = "1 axis" if len(axes) == 1 else f"{len(axes)} axes"
         raise RobotDescriptionError(
-            f"{path.name} has {count} ({_listed(axes)}); the closed-form kinematics need five "
+            f"{path.name} has {number} ({_listed(axes)}); the closed-form kinematics need five "
             f"turning axes.{hint}"
         )
     if not all(joint.type in TURNING for joint in axes):
@@ -240,8 +244,8 @@ def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:
     return bool(number > ARM_JOINTS or limit.upper - limit.lower <= JAW_RANGE)
 
 
-def _axes_to(tree: _Tree, tool: str) -> list[UrdfJoint]:
-    """Return the axes that carry the link ``tool``. Raises RobotDescriptionError if not five."""
+def _axes_to(tree: _Tree, tool: str, count: int | None) -> list[UrdfJoint]:
+    """Return the axes that carry ``tool``. Raises RobotDescriptionError if not ``count``."""
     axes = tree.movable_to(tool)
     _refuse_followers(axes, repr(tool))
     for joint in axes:
@@ -249,7 +253,7 @@ def _axes_to(tree: _Tree, tool: str) -> list[UrdfJoint]:
             raise RobotDescriptionError(
                 f"Joint {joint.name!r} is {joint.type}; only turning joints can carry {tool!r}."
             )
-    if len(axes) != ARM_JOINTS:
+    if count is not None and len(axes) != count:
         raise RobotDescriptionError(
             f"Link {tool!r} is carried by {len(axes)} turning joints "
             f"({', '.join(joint.name for joint in axes)}); "

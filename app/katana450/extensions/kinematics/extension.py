@@ -9,26 +9,17 @@ from katana450.extensions.kinematics.options import add_fk_options, add_ik_optio
 
 
 def _fk(options: Namespace) -> int:
-    from katana450.extensions.kinematics.json_lines import JsonKinematics, answer_lines
+    from katana450.extensions.kinematics.json_lines import answer_lines
+    from katana450.extensions.kinematics.lines_of import lines_of
 
-    in_base_frame = options.frame == "base"
-    return answer_lines(JsonKinematics(options.urdf, options.tool, in_base_frame=in_base_frame).fk)
+    return answer_lines(lines_of(options).fk)
 
 
 def _ik(options: Namespace) -> int:
-    from katana450.extensions.kinematics.json_lines import JsonKinematics, answer_lines
-    from katana450.maths.kinematics.priority import Priority
+    from katana450.extensions.kinematics.json_lines import answer_lines
+    from katana450.extensions.kinematics.lines_of import lines_of
 
-    return answer_lines(
-        JsonKinematics(
-            options.urdf,
-            options.tool,
-            in_base_frame=options.frame == "base",
-            all_metrics=options.metrics,
-            priority=Priority[options.priority.upper()],
-            with_nearest=options.nearest,
-        ).ik
-    )
+    return answer_lines(lines_of(options).ik)
 
 
 EXTENSION = Extension(
@@ -37,7 +28,7 @@ EXTENSION = Extension(
         CliCommand(
             "fk",
             "JSON lines from stdin to stdout, joints to poses: "
-            '{"q": [5 angles, rad], "tool": "tcp"} per line',
+            '{"q": [angles, rad], "tool": "tcp"} per line',
             add_fk_options,
             _fk,
         ),

@@ -1,0 +1,116 @@
+"""``katana450 fk`` and ``ik`` for arms of other kinds: lines in, lines out."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.cli.main import main
+
+Urdf = Callable[[str], Path]
+
+
+def ask(command: str, lines: Sequence[object], *options: str) -> list[dict[str, Any]]:
+    """Return the answers to ``lines``, which are sent as JSON."""
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    out = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out):
+        patch.setattr(sys, "stdin", io.StringIO(text))
+        main([command, *options])
+    return [json.loads(line) for line in out.getvalue().splitlines()]
+
+
+Q = [0.3, -0.8, 1.1, 0.4, 0.7, -0.5]
+
+
+def test_posture_comes_back(urdf: Urdf) -> None:
+    options = ("--urdf", str(urdf("ur5")), "--frame", "base")
+    (pose,) = ask("fk", [{"q": Q}], *options)
+    (found,) = ask("ik", [{"T": pose["T"], "q": Q}], *options)
+    near = [each for each in found["solutions"] if np.allclose(each["q"], Q, atol=1e-9)]
+    assert len(near) == 1
+    assert near[0]["within_limits"]
+    assert near[0]["singular"] == []
+    assert found["residual_mm"] < 1e-9
+    assert found["residual_rad"] < 1e-9
+    assert len(found["solutions"]) == len({each["branch"] for each in found["solutions"]})
+
+
+def test_tool_and_orientation_are_chosen_in_the_line(urdf: Urdf) -> None:
+    options = ("--urdf", str(urdf("seven")))
+    tcp, flange = ask("fk", [{"q": [0.1] * 7}, {"q": [0.1] * 7, "tool": "flange"}], *options)
+    gap = np.array(tcp["T"])[:3, 3] - np.array(flange["T"])[:3, 3]
+    assert np.linalg.norm(gap) == pytest.approx(np.hypot(0.02, 0.1))
+    line = {"p": [0.4, 0.1, 0.3], "rpy": [0.1, 0.2, 0.3]}
+    (found,) = ask("ik", [line], *options, "--tool", "flange")
+    assert found["residual_mm"] < 1e-9
+    solution = found["solutions"][0]
+    (pose,) = ask("fk", [{"q": solution["q"], "tool": "flange"}], *options)
+    np.testing.assert_allclose(np.array(pose["T"])[:3, 3], line["p"], atol=1e-9)
+
+
+def test_singular_posture_names_its_axes(urdf: Urdf) -> None:
+    options = ("--urdf", str(urdf("vx300s")))
+    q = [0.2, 0.3, 0.4, 0.1, 0.0, 0.5]
+    (pose,) = ask("fk", [{"q": q}], *options)
+    (found,) = ask("ik", [{"T": pose["T"], "q": q}], *options)
+    here = next(each for each in found["solutions"] if np.allclose(each["q"], q, atol=1e-7))
+    assert here["singular"] == [4, 6]
+
+
+def test_nearest_has_its_reason(urdf: Urdf) -> None:
+    line = {"p": [3.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}
+    (found,) = ask("ik", [line], "--urdf", str(urdf("px100")), "--nearest")
+    assert len(found["solutions"]) == 1
+    assert found["residual_mm"] > 2000.0
+    assert "mm out of reach" in found["nearest"]["reason"]
+    assert found["nearest"]["position_mm"] > 2000.0
+    assert isinstance(found["nearest"]["limits"], list)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ({"q": [0.0] * 5}, r"shape (5,); it must be (6,)"),
+        ({"q": [0.0] * 6, "T": 1}, "no key 'T'"),
+        ({"q": [0.0] * 6, "tool": "nose"}, "There is no tool 'nose'; this arm has ee_link"),
+        ({"q": [0.0] * 6, "tool": ["l6"]}, "no tool with that name"),
+        ({"q": [1e999] * 6}, "finite"),
+        ({}, "'q' is missing"),
+    ],
+)
+def test_wrong_line_of_fk_is_refused(urdf: Urdf, line: object, message: str) -> None:
+    (answer,) = ask("fk", [line], "--urdf", str(urdf("ur5")))
+    assert answer["error"].startswith("line 1: ")
+    assert message in answer["error"]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ({"T": [[1.0, 0.0], [0.0, 1.0]]}, "shape"),
+        ({"p": [0.0, 0.0, 0.0], "pitch": 0.0, "roll": 0.0}, "no key 'pitch'"),
+        ({"p": [0.0, 0.0, 0.0]}, "one orientation"),
+        ({"T": np.eye(4).tolist(), "q": [0.0]}, "shape (1,)"),
+    ],
+)
+def test_wrong_line_of_ik_is_refused(urdf: Urdf, line: object, message: str) -> None:
+    (answer,) = ask("ik", [line], "--urdf", str(urdf("ur5")))
+    assert message in answer["error"]
+
+
+@pytest.mark.parametrize("options", [["--metrics"], ["--priority", "pitch"]])
+def test_options_of_five_axes_are_refused(
+    urdf: Urdf, options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        sys.exit(main(["ik", "--urdf", str(urdf("ur5")), *options]))
+    assert "are for five-axis arms" in capsys.readouterr().err

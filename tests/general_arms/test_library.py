@@ -1,0 +1,150 @@
+"""Arms of other kinds in the library: what works, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.maths.geometry import se3
+
+Urdf = Callable[[str], Path]
+NAMES = {"px100": 4, "vx300s": 8, "ur5": 8, "twisted": 1, "seven": 8}
+
+
+def load(path: Path, **options: Any) -> katana450.GeneralArm:
+    arm = katana450.load(path, **options)
+    assert isinstance(arm, katana450.GeneralArm)
+    return arm
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("frame", ["shoulder", "base"])
+def test_posture_is_found_again(urdf: Urdf, name: str, frame: str) -> None:
+    arm = load(urdf(name), frame=frame)
+    rng = np.random.default_rng(1)
+    for q in rng.uniform(arm.lower, arm.upper, (5, arm.n)):
+        T = arm.fk(q)
+        found = arm.ik(T, q)
+        assert found.q.shape == (NAMES[name], arm.n)
+        assert len(set(found.branches)) == NAMES[name]
+        assert min(float(np.abs(each.q - q).max()) for each in found.feasible) < 0.2
+        for each in found.feasible:
+            np.testing.assert_allclose(arm.fk(each.q), T, atol=1e-8)
+        best = arm.nearest(T)
+        assert best.reason == ""
+        np.testing.assert_allclose(best.T, T, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_many_poses_are_solved_at_once(urdf: Urdf, name: str) -> None:
+    arm = load(urdf(name))
+    q = np.random.default_rng(2).uniform(arm.lower, arm.upper, (6, arm.n))
+    T = arm.fk(q)
+    found = arm.ik(T)
+    assert found.q.shape == (6, NAMES[name], arm.n)
+    assert found.within_limits.shape == found.position_error.shape == (6, NAMES[name])
+    good = found.within_limits & (found.position_error < 1e-8) & (found.rotation_error < 1e-8)
+    assert good.any(axis=1).all()
+    with pytest.raises(katana450.InputError, match="solutions of 6 poses"):
+        iter(found)
+    assert arm.ik(np.zeros((0, 4, 4))).q.shape[0] == 0
+
+
+def test_frames_agree(urdf: Urdf) -> None:
+    shoulder, base = load(urdf("ur5")), load(urdf("ur5"), frame="base")
+    q = np.full(6, 0.3)
+    np.testing.assert_allclose(shoulder.T_base_frame @ shoulder.fk(q), base.fk(q), atol=1e-14)
+    # The tool of the published file, turned by nothing.
+    home = base.fk(np.zeros(6))
+    np.testing.assert_allclose(home[:3, 3], (0.81725, 0.19145, -0.005491), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_jacobian_is_the_derivative(urdf: Urdf, name: str) -> None:
+    arm = load(urdf(name), frame="base")
+    q, h = np.full(arm.n, 0.2), 1e-6
+    J = arm.jacobian(q)
+    assert J.shape == (6, arm.n)
+    for axis, step in enumerate(h * np.eye(arm.n)):
+        rate = (arm.fk(q + step) - arm.fk(q - step)) / (2.0 * h)
+        np.testing.assert_allclose(se3.hat(J[:, axis]), rate @ se3.inverse(arm.fk(q)), atol=1e-8)
+
+
+def test_tool_is_chosen_by_its_link(urdf: Urdf) -> None:
+    path = urdf("seven")
+    assert load(path).tool == "tcp"
+    assert load(path, tool="flange").tool == "flange"
+    assert load(path, tool="l6").n == 6
+    with pytest.raises(katana450.RobotDescriptionError, match="no link 'nose'; its links are"):
+        katana450.load(path, tool="nose")
+
+
+def test_notes_say_how_poses_are_solved(urdf: Urdf) -> None:
+    assert "six axes, three of them parallel" in load(urdf("ur5")).notes[0]
+    twisted = load(urdf("twisted"))
+    assert "numerical, because axis 2 must be perpendicular to axis 1" in twisted.notes[0]
+    assert twisted.method in twisted.notes[0]
+
+
+def test_five_axis_arm_of_the_family_stays_what_it_was(urdf: Urdf) -> None:
+    arm = katana450.load(urdf("px150"))
+    assert not isinstance(arm, katana450.GeneralArm)
+    assert arm.ik(arm.fk(arm.ready)).branches[0] == katana450.Branch("front", "up")
+
+
+REFUSED: dict[str, Callable[[katana450.GeneralArm], Any]] = {
+    "plan": lambda arm: arm.plan(arm.ready),
+    "line": lambda arm: arm.line(by=(0.0, 0.0, 0.1)),
+    "circle": lambda arm: arm.circle((0.3, 0.0, 0.0), 0.1),
+    "reachability": lambda arm: arm.reachability(),
+    "show": lambda arm: arm.show(),
+    "standing": lambda arm: arm.standing(arm.ready),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_needs_five_axes_is_refused_with_what_works(urdf: Urdf, case: str) -> None:
+    arm = load(urdf("ur5"))
+    with pytest.raises(katana450.RobotDescriptionError) as caught:
+        REFUSED[case](arm)
+    for words in ("ur5", "is not possible", "five-axis arm", "6 axes", "`fk`, `ik`", "serve"):
+        assert words in str(caught.value)
+
+
+WRONG: dict[str, tuple[Callable[[katana450.GeneralArm], Any], str]] = {
+    "angles of another arm": (lambda arm: arm.fk([0.0] * 5), r"shape \(5,\)"),
+    "no number": (lambda arm: arm.fk([np.nan] + [0.0] * 5), "axis 1"),
+    "no rotation": (lambda arm: arm.ik(np.diag([2.0, 1.0, 1.0, 1.0])), "rotation"),
+    "pose of rows": (lambda arm: arm.ik(np.eye(3)), "shape"),
+    "one of many": (lambda arm: arm.ik(np.array([np.eye(4), 2.0 * np.eye(4)])), "ose 1"),
+    "hint of five": (lambda arm: arm.ik(np.eye(4), np.zeros(5)), r"shape \(5,\)"),
+    "nearest to nothing": (lambda arm: arm.nearest(np.zeros((4, 4))), "last row"),
+    "priority": (lambda arm: arm.nearest(np.eye(4), priority="pitch"), "for five-axis arms"),
+    "branch": (lambda arm: arm.nearest(np.eye(4), branch="front-up"), "for five-axis arms"),
+    "short jacobian": (lambda arm: arm.jacobian([0.0]), "shape"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_is_refused(urdf: Urdf, case: str) -> None:
+    call, message = WRONG[case]
+    with pytest.raises(katana450.InputError, match=message):
+        call(load(urdf("ur5")))
+
+
+def test_wrong_arguments_of_load_are_refused(urdf: Urdf, tmp_path: Path) -> None:
+    path = urdf("ur5")
+    with pytest.raises(katana450.InputError, match="no frame 'world'"):
+        katana450.load(path, frame="world")  # type: ignore[arg-type]
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("objects: []\n", encoding="utf-8")
+    with pytest.raises(katana450.InputError, match="A scene is for plans"):
+        katana450.load(path, scene=scene)
+    with pytest.raises(katana450.RobotDescriptionError, match="'base' is carried by 0"):
+        katana450.load(path, tool="base")
+    assert "ur5" in repr(load(path))
