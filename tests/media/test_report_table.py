@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +15,21 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.media import figures
+from katana450.extensions.media.measured_figure import DRAWN, magnification
 from katana450.extensions.media.pour_record import COLUMNS, PourRecord
 from katana450.extensions.media.report import Report
 from katana450.extensions.programs.clocked_run import Planned, plan_script, run_by_clock
+from katana450.extensions.programs.measured_run import MeasuredRun
+from katana450.extensions.programs.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
+from tests.programs.lagging_driver import LaggingDriver
 
 TEXT = "steps:\n  - nudge: {axis: 5, by: 7}\n  - fill: 100\n  - nudge: {axis: 1, by: 3}\n"
+
+
+WRITTEN = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 def reported(text: str) -> tuple[Planned, Report]:
@@ -58,6 +67,57 @@ def test_table_has_the_water_once_there_is_some(run: tuple[Planned, Report]) -> 
         csv.DictReader(io.StringIO(reported("steps: [nudge: {axis: 5, by: 7}]")[1].csv()))
     )
     assert not set(COLUMNS) & set(without[0])
+
+
+def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
+    plan = plan_script(parse("frame: base\nsteps: [line: {by: {y: 60}}]"), URDF_PATH)
+    arm, start = plan.robot.require_arm(), plan.start
+    offset = np.array((0.003, 0.0, 0.0, 0.0, 0.0))
+    driver = LaggingDriver(arm, start.q, start.gripper, 10, offset)
+    simulation = run_by_clock(plan, driver)
+    commanded = Report.of(plan.script, plan.program, arm, simulation.trace, {}, ())
+    assert commanded.with_measured(None, "nothing") is commanded
+    run = MeasuredRun.of(arm, simulation.states)
+    report = commanded.with_measured(run, "a test")
+    assert len(report.values) == len(commanded.values) + len(OF_A_MEASURED_ARM)
+    for name, value in commanded.values.items():
+        assert report.values[name] == value, "the measures of the setpoints stay"
+    titles = [line for line in report.lines if not line.startswith(" ")]
+    assert titles == ["Commanded: the plan and its setpoints", "Measured at the arm"]
+    lag = next(line for line in report.lines if line.startswith("  Tracking lag"))
+    assert lag.endswith(f" {run.values['tracking_lag_ms'] if run else 0.0:.4g} ms")
+    rows = list(csv.DictReader(io.StringIO(report.csv())))
+    for row, q, tick in zip(rows, simulation.states, range(len(rows)), strict=True):
+        assert float(row["measured_theta1_deg"]) == pytest.approx(np.degrees(q.q[0]), rel=1e-15)
+        assert float(row["theta1_deg"]) == np.degrees(report.trace.q[tick, 0])
+    pytest.importorskip("matplotlib")
+    files = report.write(tmp_path, WRITTEN)
+    assert tmp_path / "measured.png" in files
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.index(titles[0]) < page.index("Executed position") < page.index(titles[1])
+    assert page.index(titles[1]) < page.index("Measured position error")
+    found = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert found["tracking_lag_ms"] == pytest.approx(100.0, abs=3.0)
+    assert found["measured"] == "a test"
+    assert "measured.png" not in {
+        path.name for path in commanded.write(tmp_path / "exact", WRITTEN)
+    }
+
+
+def test_distances_are_drawn_by_a_round_factor_that_fits() -> None:
+    plan = plan_script(parse("frame: base\nsteps: [line: {by: {y: 60}}]"), URDF_PATH)
+    arm, start = plan.robot.require_arm(), plan.start
+    for angle, magnified in ((1e-4, True), (1e-3, True), (3e-2, False)):
+        offset = np.array((0.0, angle, 0.0, 0.0, 0.0))
+        driver = LaggingDriver(arm, start.q, start.gripper, 0, offset)
+        run = MeasuredRun.of(arm, run_by_clock(plan, driver).states)
+        assert run is not None
+        found = magnification(run.deviations)
+        worst = max(float(each.error.max()) for each in run.deviations)
+        assert f"{found:.0e}"[0] in "125"
+        assert (found > 1.0) is magnified
+        if magnified:
+            assert 0.4 * DRAWN <= found * worst / 0.06 <= 1.01 * DRAWN
 
 
 def test_water_figure_is_drawn(run: tuple[Planned, Report]) -> None:

@@ -13,6 +13,7 @@ from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.arm.control.state import State
 from katana450.extensions.programs.clocked_run import plan_script
+from katana450.extensions.programs.measured_run import MeasuredRun
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.simulation import simulated
 from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError
@@ -121,8 +122,10 @@ def test_program_runs_with_slow_replies(name: str, monkeypatch: pytest.MonkeyPat
         assert state.stopped is None, state.stopped
         return state
 
-    for state, _ in simulated(plan.program.rehearsed, session, plan.start, PERIOD, drive):
-        last = state
+    states = [
+        state for state, _ in simulated(plan.program.rehearsed, session, plan.start, PERIOD, drive)
+    ]
+    last = states[-1]
     for _ in range(200):
         last = drive(session.step(last, [], last.t + PERIOD))
     assert not last.moving
@@ -132,9 +135,15 @@ def test_program_runs_with_slow_replies(name: str, monkeypatch: pytest.MonkeyPat
         for t, position in knots.found
         if round(t / PERIOD) in setpoints
     ]
-    print(name, max(errors), max(compared), max(lags), len(compared), last.t)
+    run = MeasuredRun.of(session.require_arm(), states)
+    assert run is not None
+    print(name, max(errors), max(compared), max(lags), len(compared), last.t, run.values)
     assert len(compared) > 100
     assert max(compared) <= 0.5 + 1e-9
     # With the arm where it should be, 0.33 s behind its setpoint.
     assert max(errors) < 0.002
     assert max(lags) > 0.01
+    # The report has both apart: four polynomials and one exchange late, and still on the path.
+    assert 320.0 < (run.values["tracking_lag_ms"] or 0.0) < 480.0
+    assert (run.values["measured_position_error_mm"] or 9.0) < 2.0
+    assert max(float(each.commanded.max()) for each in run.deviations) < 1e-9

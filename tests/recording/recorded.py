@@ -19,7 +19,7 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.arm.control.stop_cause import pressed
-from katana450.arm.drivers.driver import DriverAnswer
+from katana450.arm.drivers.driver import Driver, DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
@@ -141,16 +141,18 @@ def run(
     commands: Commands = random_commands,
     *,
     odd: bool = True,
+    driver: Driver | None = None,
 ) -> ControlLoop:
     """Run the control loop for ``ticks`` with random commands; ``take`` gets every record.
 
-    ``odd``: whether its driver sometimes answers otherwise, or fails.
+    ``odd``: whether its driver sometimes answers otherwise, or fails. ``driver``: another one.
     """
     found = described()
     rng, clock = np.random.default_rng(seed), TestClock(1000.0)
     mailbox = Mailbox(found.session.check)
-    kind = OddDriver if odd else SimulatedDriver
-    driver = kind(found.robot.require_arm(), found.session.ready, 0.0)
+    if driver is None:
+        kind = OddDriver if odd else SimulatedDriver
+        driver = kind(found.robot.require_arm(), found.session.ready, 0.0)
     loop = ControlLoop(found.session, driver, mailbox, clock, 1.0 / PERIOD)
     loop.record = take
     for _ in range(ticks):

@@ -9,6 +9,7 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
+from katana450.arm.drivers.driver import Driver
 from katana450.extensions.programs import runner
 from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import compiled
@@ -24,8 +25,13 @@ STEP = 0.004
 """[m] Motion of the target of a drag in a tick."""
 
 
-def record_session(path: Path, ticks: int, commands: Commands) -> Path:
-    """Write a session of ``ticks`` ticks with ``commands`` to ``path``, and return it."""
+def record_session(
+    path: Path, ticks: int, commands: Commands, driver: Driver | None = None
+) -> Path:
+    """Write a session of ``ticks`` ticks with ``commands`` to ``path``, and return it.
+
+    ``driver``: the arm, at the ready posture; None for one that follows exactly.
+    """
     count = iter(range(ticks))
     with path.open("wb") as file:
         writer = RecordingWriter(file, header())
@@ -35,6 +41,7 @@ def record_session(path: Path, ticks: int, commands: Commands) -> Path:
             writer.put,
             lambda _rng, state, _found: commands(next(count), state),
             odd=False,
+            driver=driver,
         )
         writer.close()
     return path

@@ -44,6 +44,7 @@ from katana450.extensions.recording.state_message import nanoseconds
 from katana450.extensions.recording.topics import EPISODES
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
+from tests.programs.lagging_driver import LaggingDriver
 from tests.recording.recorded import PERIOD, described
 from tests.recording.sessions import drag, program, record_session
 
@@ -120,6 +121,34 @@ def test_line_has_its_length_and_the_measures_of_the_report(line: Path) -> None:
     )
     assert found.values["stops"] == found.values["contacts"] == 0.0
     assert found.values["emptied_ml"] is None
+
+
+def test_measured_arm_is_scored_apart_from_its_setpoints(line: Path, tmp_path: Path) -> None:
+    """The same line, by an arm that is 70 ms and a known angle behind its setpoints."""
+    arm, offset = described().robot.require_arm(), np.array((0.005, 0.0, 0.0, 0.0, 0.0))
+    driver = LaggingDriver(arm, described().session.ready, 0.0, 7, offset)
+    path = record_session(tmp_path / "measured.mcap", 260, program(LINE), driver)
+    exact, found = score(line), score(path)
+    for name in ("tool_path_mm", "executed_position_error_mm", "sparc"):
+        # The test clock of both runs differs by random fractions of a tick.
+        assert found.values[name] == pytest.approx(exact.values[name], rel=1e-3, abs=1e-9), name
+    assert (found.values["executed_position_error_mm"] or 1.0) < 1e-9
+    assert found.values["tracking_lag_ms"] == pytest.approx(70.0, abs=3.0)
+    assert found.values["joint_tracking_error_deg"] == pytest.approx(math.degrees(0.005))
+    # 5 mrad about the axis of the base, upwards along which the line leads.
+    radius = float(np.linalg.norm(found.tool[0, :2]))
+    assert found.values["measured_position_error_mm"] == pytest.approx(5.0 * radius, rel=0.01)
+    assert not len(exact.measured)
+    sent, turned = (np.arctan2(p[:, 1], p[:, 0]) for p in (found.tool, found.measured[10:]))
+    np.testing.assert_allclose(turned, sent[0] + 0.005, atol=1e-4)
+    page = tmp_path / "score.html"
+    assert main(["score", str(line), str(path), "--html", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert text.count('<g class="measured"><polyline class="c') == 2
+    assert "Dotted: the path of the tool as it was measured." in text
+    assert "Measured position error, mm" in text
+    assert main(["score", str(line), "--html", str(page)]) == 0
+    assert "Dotted" not in page.read_text(encoding="utf-8")
 
 
 def test_stops_are_counted(stopped: Path) -> None:

@@ -53,7 +53,11 @@ def stepped(session: Session, state: State, commands: list[Command], t: float, s
 
     Raises any error of the session, and of ``send``.
     """
-    state = session.step(state, commands, t)
+    return driven(session, session.step(state, commands, t), t, send)
+
+
+def driven(session: Session, state: State, t: float, send: Send) -> State:
+    """Return ``state`` with the answer of the driver to its setpoint at ``t`` [s]."""
     return _observed(session, state, _sent(state, t, send))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from katana450.extension import CliCommand, Extension
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.real_arm.plant.profile import PROFILES
 from katana450.resources import URDF_PATH
 
 URL = "http://127.0.0.1:8080"
@@ -124,6 +125,12 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--urdf", type=Path, default=URDF_PATH, metavar="FILE", help="another arm, for --headless"
+    )
+    parser.add_argument(
+        "--plant",
+        choices=sorted(PROFILES),
+        help="simulate an arm with inertia, delay, friction, droop and backlash; for --headless, "
+        "--report, and a server that is started (default: an ideal arm)",
     )
     parser.add_argument(
         "--scene",

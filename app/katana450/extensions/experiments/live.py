@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
@@ -19,6 +19,9 @@ from katana450.extensions.programs.requests import Breakpoints, Program, Program
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
 from katana450.server.api import answers, requests
+
+ReportRun = Callable[[Client, answers.State], int]
+"""Reports the run that has just ended and returns the exit status, by the state before it."""
 
 NAME = "Terminal"
 """Name of this client, which others see as the owner of the program."""
@@ -41,15 +44,20 @@ END_STATUSES = ("done", "stopped", "failed", *UNPLANNED_STATUSES)
 """Statuses of a program that has ended."""
 
 
-def run_live(text: str, script: Script, options: Namespace) -> int:
-    """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError."""
+def run_live(text: str, script: Script, options: Namespace, report: ReportRun | None = None) -> int:
+    """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError.
+
+    ``report``: reports the run at its end; None for no report.
+    """
     with server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             send_script(arm, text, options)
             if options.from_step is None:
                 planned_program(arm)
+            began = arm.query(answers.State)
             begin(arm, options)
-            return _follow(arm, Keyboard())
+            _follow(arm, Keyboard())
+            return 0 if report is None else report(arm, began)
         except KeyboardInterrupt:
             if options.unattended and _runs(arm):
                 print(
@@ -102,8 +110,8 @@ def planned_program(arm: Client) -> None:
     print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
 
 
-def _follow(arm: Client, keyboard: Keyboard) -> int:
-    """Print the progress of the program until it ends; return 0. Raises KatanaError if it fails.
+def _follow(arm: Client, keyboard: Keyboard) -> None:
+    """Print the progress of the program until it ends. Raises KatanaError if it fails.
 
     A person at a terminal may pause and slow it, and continue it after a stop.
     """
@@ -113,7 +121,6 @@ def _follow(arm: Client, keyboard: Keyboard) -> int:
         if not (end.can_continue and keyboard.present and _continued(arm, keyboard, end)):
             raise KatanaError(end.why)
     print("Done.")
-    return 0
 
 
 def _to_end(arm: Client, keyboard: Keyboard) -> answers.Progress:
@@ -189,6 +196,11 @@ def server_at(script: Script, options: Namespace) -> Iterator[str]:
                 f"--scene: the server at {options.url} has a scene already. Load the file in its "
                 "page, or leave --scene out."
             )
+        if options.plant is not None and options.report is None:
+            raise InputError(
+                f"--plant: the server at {options.url} has an arm already. Leave --plant out, or "
+                "add --headless or --report to simulate a plant here."
+            )
         yield options.url
         return
     port = str(urlsplit(options.url).port)
@@ -197,6 +209,8 @@ def server_at(script: Script, options: Namespace) -> Iterator[str]:
     command = [*python, "serve", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
         command.append("--bare")
+    if options.plant is not None:
+        command += ["--plant", options.plant]
     scene = options.scene
     if scene is None and script.scene is not None:
         # The file of the script, whose folder has the meshes of its scene.

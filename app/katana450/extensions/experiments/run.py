@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from functools import partial
 
 from katana450.errors import InputError
 from katana450.extensions.experiments.problems import print_problems
@@ -52,19 +53,23 @@ def _run(text: str, source: str, options: Namespace) -> int:
         check_traceable()
     try:
         script = parse(text)
+        report = None
         if options.headless or options.dry_run or options.report is not None:
             from katana450.extensions.experiments.simulate import simulate
 
-            status = simulate(script, options)
-            if status or options.headless or options.dry_run:
-                return status
+            simulated = simulate(script, options)
+            if simulated.status or options.headless or options.dry_run:
+                return simulated.status
+            from katana450.extensions.experiments.measured import report_measured
+
+            report = partial(report_measured, simulated, options)
         if options.watch:
             from katana450.extensions.experiments.watch import watch
 
             return watch(options.file, script, options)
         from katana450.extensions.experiments.live import run_live
 
-        return run_live(text, script, options)
+        return run_live(text, script, options, report)
     except ScriptError as error:
         print_problems(error, source)
         return 1

@@ -20,6 +20,8 @@ from katana450.maths.kinematics.velocity import tool_speed
 
 INK, FAINT, DESIRED, ERROR = "#1f2933", "#cbd2d9", "#9aa5b1", "#c2410c"
 """Colours of text, grid, desired paths and errors."""
+MEASURED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 2))}
+"""Lines of measured values over those of setpoints."""
 AXES = ("#0b6e99", "#c2410c", "#2f855a", "#7c3aed", "#a16207")
 """Colours of the joints."""
 
@@ -57,7 +59,7 @@ TIME = "time (s)"
 
 def path_figure(paths: Sequence[PathTrace]) -> bytes:
     """Return a PNG of desired and traced path in 3D, and the error along it (paper's Fig. 7)."""
-    plt = _plt()
+    plt = pyplot()
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(7.2, 3.9))
         space = figure.add_axes((0.0, 0.0, 0.52, 0.92), projection="3d")
@@ -94,7 +96,7 @@ def path_figure(paths: Sequence[PathTrace]) -> bytes:
         panel.axhline(top, color=INK, linewidth=0.7, linestyle=(0, (4, 3)))
         caption = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
         panel.annotate(caption, (99.0, 1.03 * top), ha="right", va="bottom")
-        return _png(plt, figure)
+        return to_png(plt, figure)
 
 
 def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
@@ -112,23 +114,32 @@ def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
 
 def joints_figure(arm: ArmModel, trace: Trace) -> bytes:
     """Return a PNG of the joint variables over time (the paper's Fig. 8)."""
-    plt = _plt()
+    plt = pyplot()
     with plt.rc_context(STYLE):
         figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
         degrees = np.degrees(trace.q)
         for axis in range(degrees.shape[1]):
             panel.plot(trace.t, degrees[:, axis], color=AXES[axis % len(AXES)], linewidth=1.4)
+        if trace.measured is not None:
+            for column in np.degrees(trace.measured).T:
+                panel.plot(trace.t, column, **MEASURED)
+            names = (
+                plt.Line2D([], [], color=AXES[0], linewidth=1.4, label="setpoint"),
+                plt.Line2D([], [], **MEASURED, label="measured"),
+            )
+            above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
+            panel.legend(handles=names, **above, ncols=2, fontsize=8.0)
         _name_lines(panel, trace.t, degrees, [f"θ{n + 1}" for n in range(arm.chain.n)])
         panel.set_title("Joint variables")
         panel.set_xlabel(TIME)
         panel.set_ylabel("angle (deg)")
         panel.set_xlim(0.0, 1.04 * trace.t[-1])
-        return _png(plt, figure)
+        return to_png(plt, figure)
 
 
 def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
     """Return a PNG of joint speeds as fractions of their limits, and of the speed of the tool."""
-    plt = _plt()
+    plt = pyplot()
     with plt.rc_context(STYLE):
         figure, (upper, lower) = plt.subplots(
             2, 1, figsize=(7.2, 4.6), sharex=True, layout="constrained", height_ratios=(3, 2)
@@ -156,12 +167,12 @@ def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
         lower.set_xlabel(TIME)
         lower.set_xlim(0.0, trace.t[-1])
         lower.set_ylim(bottom=0.0)
-        return _png(plt, figure)
+        return to_png(plt, figure)
 
 
 def water_figure(pour: PourRecord) -> bytes:
     """Return a PNG of the volumes, the flow, the tilt of the cup and its lip above the water."""
-    plt = _plt()
+    plt = pyplot()
     with plt.rc_context(STYLE):
         figure, (upper, lower) = plt.subplots(
             2, 1, figsize=(7.2, 5.0), sharex=True, layout="constrained"
@@ -194,7 +205,7 @@ def water_figure(pour: PourRecord) -> bytes:
         name = "lip above the water"
         lines += lip.plot(pour.t, 1e3 * pour.lip, color=AXES[0], linewidth=1.2, label=name)
         lower.legend(handles=lines, **above, ncols=len(lines), fontsize=8.0)
-        return _png(plt, figure)
+        return to_png(plt, figure)
 
 
 def _second(panel: Any, label: str) -> Any:
@@ -236,12 +247,14 @@ def _name_lines(panel: Any, t: FloatArray, values: FloatArray, names: Sequence[s
         )
 
 
-def _plt() -> Any:
+def pyplot() -> Any:
+    """Return matplotlib's module of figures, which draws without a display."""
     importlib.import_module("matplotlib").use("Agg")
     return importlib.import_module("matplotlib.pyplot")
 
 
-def _png(plt: Any, figure: Any) -> bytes:
+def to_png(plt: Any, figure: Any) -> bytes:
+    """Return ``figure`` as a PNG, and close it."""
     file = io.BytesIO()
     figure.savefig(file, format="png", metadata={"Software": None})
     plt.close(figure)

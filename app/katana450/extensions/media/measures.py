@@ -163,7 +163,7 @@ def executed(program: Program, trace: Trace) -> tuple[FloatArray, FloatArray]:
 def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]:
     """Return the bounds that ``script`` expects, with the measured values."""
     return tuple(
-        Bound(name, low, high, values[name]) for name, (low, high) in script.expected.items()
+        Bound(name, low, high, values.get(name)) for name, (low, high) in script.expected.items()
     )
 
 

@@ -8,7 +8,7 @@ import html
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
@@ -20,12 +20,16 @@ from katana450.arm.control.arm import ArmModel
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.media import figures
+from katana450.extensions.media.measured_figure import measured_figure
 from katana450.extensions.media.measures import Bound, alongs, bounds, measurements
 from katana450.extensions.media.pour_record import COLUMNS, PourRecord
+from katana450.extensions.programs.measured_run import MeasuredRun
 from katana450.extensions.programs.measures import MEASURES, title_of, unit_of
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.simulation import Trace
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 
 NONE: Mapping[str, bytes] = {}
@@ -45,6 +49,7 @@ class Report:
         bounds: the bounds that the script expects.
         facts: conditions of the run, by name.
         notes: notes for people.
+        measured: the run as its arm was measured; None for an arm that follows exactly.
     """
 
     script: Script
@@ -55,6 +60,7 @@ class Report:
     bounds: tuple[Bound, ...]
     facts: dict[str, Any]
     notes: tuple[str, ...]
+    measured: MeasuredRun | None = None
 
     @staticmethod
     def of(
@@ -70,16 +76,45 @@ class Report:
         return Report(script, program, arm, trace, values, bounds(script, values), facts, notes)
 
     @property
+    def missed(self) -> list[Bound]:
+        """The bounds that are not met."""
+        return [bound for bound in self.bounds if not bound.held]
+
+    def with_measured(self, run: MeasuredRun | None, what: str) -> Report:
+        """Return the report with ``run``, the same script on an arm that is measured: ``what``."""
+        if run is None:
+            return self
+        values = self.values | run.values
+        facts = self.facts | {"measured": what}
+        checked = bounds(self.script, values)
+        return replace(self, values=values, bounds=checked, facts=facts, measured=run)
+
+    @property
     def held(self) -> bool:
         """True if every bound is met."""
-        return all(bound.held for bound in self.bounds)
+        return not self.missed
 
     @property
     def lines(self) -> list[str]:
         """The measures as text lines."""
-        return [
-            f"{title_of(name):<32} {_with_unit(name, value)}" for name, value in self.values.items()
-        ]
+        lines: list[str] = []
+        for title, values in self._groups:
+            indent = "  " if self.measured else ""
+            lines += [title] if self.measured else []
+            lines += [
+                f"{indent}{title_of(name):<32} {_with_unit(name, value)}"
+                for name, value in values.items()
+            ]
+        return lines
+
+    @property
+    def _groups(self) -> list[tuple[str, dict[str, float | None]]]:
+        """The measures of setpoints and of the measured arm, apart, with their titles."""
+        if self.measured is None:
+            return [("Measured", self.values)]
+        own = self.measured.values
+        others = {name: value for name, value in self.values.items() if name not in own}
+        return [("Commanded: the plan and its setpoints", others), ("Measured at the arm", own)]
 
     def json(self, written: datetime) -> str:
         """Return all measures, with units in the names, and their bounds as JSON."""
@@ -111,7 +146,8 @@ class Report:
     def csv(self) -> str:
         """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path.
 
-        With water also COLUMNS. Each number has all its digits, so that reading gives the same.
+        With water also COLUMNS; with a measured arm its joints and tool. Each number has all its
+        digits, so that reading gives the same.
         """
         n = self.arm.chain.n
         file = io.StringIO()
@@ -122,8 +158,11 @@ class Report:
         slides = self.arm.gripper.slides
         heads.append("fingers_mm" if slides else "fingers_deg")
         trace = self.trace
-        pour = self._pour
-        more = () if pour is None else COLUMNS
+        pour, measured = self._pour, trace.measured
+        more = list(() if pour is None else COLUMNS)
+        if measured is not None:
+            more += [f"measured_theta{axis}_deg" for axis in range(1, n + 1)]
+            more += ["measured_x_mm", "measured_y_mm", "measured_z_mm"]
         rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_fraction", *more])
         for tick in range(len(trace.t)):
             task = self.program.tasks[int(trace.task[tick])]
@@ -143,6 +182,7 @@ class Report:
                     *(repr(float(value)) for value in point),
                     repr(float(trace.sigma[tick])),
                     *(() if pour is None else pour.cells(tick)),
+                    *(() if measured is None else _measured_cells(chain, measured[tick])),
                 ]
             )
         return file.getvalue()
@@ -164,6 +204,8 @@ class Report:
         images = dict(pictures)
         if paths:
             images["path.png"] = figures.path_figure(paths)
+        if self.measured is not None:
+            images["measured.png"] = measured_figure(self.measured)
         images["joints.png"] = figures.joints_figure(self.arm, self.trace)
         images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
         if self._pour is not None:
@@ -185,10 +227,9 @@ class Report:
             f"<figcaption>{CAPTIONS[name][1]}</figcaption></figure>"
             for name, image in images.items()
         )
-        rows = "\n".join(
-            f"<tr><th>{title_of(name)}<small>{MEASURES[name]}</small></th>"
-            f"<td>{_with_unit(name, value)}</td></tr>"
-            for name, value in self.values.items()
+        tables = "\n".join(
+            f"<h2>{title}</h2>\n<table>\n{_rows(values)}\n</table>"
+            for title, values in self._groups
         )
         checks = "\n".join(
             f'<li class="{"held" if bound.held else "missed"}">{title_of(bound.name)}: '
@@ -210,7 +251,7 @@ class Report:
             verdict=verdict,
             result="held" if self.held else "missed",
             figures=shown,
-            rows=rows,
+            tables=tables,
             checks=checks,
             notes=notes,
             facts=html.escape(facts),
@@ -235,7 +276,19 @@ CAPTIONS = {
             "the maximum in each half percent of all paths."
         ),
     ),
-    "joints.png": ("Joint angles over time", "The setpoints of the arm, a hundred per second."),
+    "measured.png": (
+        "The measured arm beside its setpoints: path, distances from it, and error of each joint",
+        (
+            "Left: the desired path and that of the measured tool, whose distances from the path "
+            "are magnified as stated. Right, above: the distances of the setpoints and of the "
+            "measured tool from the path. Below: measured joints minus where the driver had sent "
+            "them by then."
+        ),
+    ),
+    "joints.png": (
+        "Joint angles over time",
+        "The setpoints of the arm, a hundred per second. Dashed: where a simulated plant was.",
+    ),
     "speeds.png": (
         "Joint speeds against their limits, and speed of the tool",
         "Above: joint speeds as fractions of their limits; dashed: the limits. Below: the tool.",
@@ -285,10 +338,7 @@ footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 <p class="verdict {result}">{verdict}</p>
 {notes}
 {figures}
-<h2>Measured</h2>
-<table>
-{rows}
-</table>
+{tables}
 <h2>Expected</h2>
 <ul>
 {checks}
@@ -297,6 +347,19 @@ footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 </html>
 """
 """Template of the HTML page."""
+
+
+def _measured_cells(chain: Chain, q: FloatArray) -> list[str]:
+    numbers = [*np.degrees(q), *(1e3 * forward(chain, q)[:3, 3])]
+    return [repr(float(number)) for number in numbers]
+
+
+def _rows(values: Mapping[str, float | None]) -> str:
+    return "\n".join(
+        f"<tr><th>{title_of(name)}<small>{MEASURES[name]}</small></th>"
+        f"<td>{_with_unit(name, value)}</td></tr>"
+        for name, value in values.items()
+    )
 
 
 def _with_unit(name: str, value: float | None) -> str:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.arm.drivers.driver import Driver
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
@@ -66,12 +67,14 @@ def plan_script(
     return Planned(script, program, robot, session, start)
 
 
-def run_by_clock(plan: Planned) -> Simulation:
+def run_by_clock(plan: Planned, driver: Driver | None = None) -> Simulation:
     """Run ``plan`` to its end with a progress bar. Conditions count as true.
 
-    Raises KatanaError if it ends early.
+    ``driver``: the arm, at the start of the plan; None for one that follows exactly. Raises
+    KatanaError if it ends early.
     """
-    driver = SimulatedDriver(plan.robot.require_arm(), plan.start.q, plan.start.gripper)
+    if driver is None:
+        driver = SimulatedDriver(plan.robot.require_arm(), plan.start.q, plan.start.gripper)
     simulation = Simulation(
         plan.program.rehearsed, plan.session, driver, Settings().rate, plan.start
     )

@@ -8,8 +8,13 @@ MEASURES: Final = {
     "max_position_error_mm": "distance of the planned tool positions from the desired path",
     "rms_position_error_mm": "the same, root mean square",
     "max_orientation_error_deg": "deviation of the tool from the desired pitch and roll",
-    "executed_position_error_mm": "distance of the arm at each tick from the desired path",
+    "executed_position_error_mm": "distance of the setpoints at each tick from the desired path",
     "between_ticks_error_mm": "the same half-way between ticks, joints interpolated linearly",
+    "measured_position_error_mm": "distance of the measured tool from the desired path",
+    "measured_rms_error_mm": "the same, root mean square",
+    "tool_tracking_error_mm": "distance of the measured tool from where it was sent by then",
+    "joint_tracking_error_deg": "the same of the joints, maximum of all",
+    "tracking_lag_ms": "time by which the measured joints are behind the setpoints",
     "path_length_mm": "length of the tool's paths",
     "smallest_singular_value": "of the Jacobian, translations divided by the characteristic length",
     "margin_to_limits_deg": "minimum of all joints over the whole run",
@@ -26,6 +31,17 @@ MEASURES: Final = {
 }
 """Name of each measure, with its unit at the end, and its definition."""
 
+OF_A_MEASURED_ARM: Final = frozenset(
+    (
+        "measured_position_error_mm",
+        "measured_rms_error_mm",
+        "tool_tracking_error_mm",
+        "joint_tracking_error_deg",
+        "tracking_lag_ms",
+    )
+)
+"""Measures of an arm that is measured beside its setpoints."""
+
 UNITS: Final = {
     "_m_s3": "m/s³",
     "_mm_s": "mm/s",
@@ -33,6 +49,7 @@ UNITS: Final = {
     "_ml": "ml",
     "_percent": "%",
     "_deg": "deg",
+    "_ms": "ms",
     "_s": "s",
 }
 """Unit of a measure by the suffix of its name; longer suffixes first."""

@@ -12,6 +12,7 @@ from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
+from katana450.arm.runtime.tick import driven
 from katana450.errors import InputError
 from katana450.extensions.programs import runner
 from katana450.extensions.programs.actions import FollowPlan
@@ -31,7 +32,9 @@ class Trace:
         t: (N,) [s].
         q: (N, 5) setpoints [rad].
         qd: (N, 5) velocities of the setpoints [rad/s].
-        sent: (N, 5) joints that the driver reported [rad].
+        sent: (N, 5) joints that the driver reported, or the setpoints of an arm that is measured
+            [rad].
+        measured: (N, 5) measured joints [rad]; None for an arm that follows exactly.
         fingers: (N,) finger joint [rad].
         task: (N,) index of the current task of the program.
         segment: (N,) index of the segment of its plan, -1 for none.
@@ -45,6 +48,7 @@ class Trace:
     q: FloatArray
     qd: FloatArray
     sent: FloatArray
+    measured: FloatArray | None
     fingers: FloatArray
     task: IntArray
     segment: IntArray
@@ -110,8 +114,7 @@ class Simulation:
             yield min((self.run.number + fraction) / count, 1.0)
 
     def _driven(self, state: State) -> State:
-        sent = self._driver.send(state.setpoint, state.gripper_setpoint, state.t)
-        return self._session.observe(state, sent.q, sent.gripper)
+        return driven(self._session, state, state.t, self._driver.send)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -124,11 +127,15 @@ class Simulation:
         states = self.states
         tasks = [number for _, number in self._records]
         places = [self._place(state, number) for state, number in self._records]
+        q = np.array([state.q for state in states])
+        setpoints = np.array([state.setpoint for state in states])
+        measured = q if states[-1].report is not None else None
         return Trace(
             t=np.array([state.t for state in states]),
-            q=np.array([state.setpoint for state in states]),
+            q=setpoints,
             qd=np.array([state.motion.qd for state in states]),
-            sent=np.array([state.q for state in states]),
+            sent=q if measured is None else setpoints,
+            measured=measured,
             fingers=np.array([state.gripper for state in states]),
             task=np.array(tasks, dtype=np.int64),
             segment=np.array([segment for segment, _ in places], dtype=np.int64),

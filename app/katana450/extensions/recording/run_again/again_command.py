@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-import time
 from argparse import Namespace
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from katana450.extensions.recording.episodes.episode_file import shown_part
 from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recorded_states import at_rest, recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.live.run_fetcher import fetch_run
 from katana450.extensions.recording.run_again.again_script import again_script
 from katana450.extensions.recording.run_again.path_difference import (
     PathDifference,
@@ -38,15 +38,6 @@ from katana450.server.api import answers
 
 SAME = 1e-9
 """[rad or m] Largest difference of the numbers of one arm."""
-
-ON_DISK = 10.0
-"""[s] Timeout for the end of the run in the recording of the server."""
-
-POLL_PERIOD = 0.5
-"""[s] Time between two looks at it."""
-
-SAME_TICK = 1e-3
-"""[s] Largest difference of the times of one tick."""
 
 SLOWER = 1.02
 """[1] Ratio of times from which a run counts as slower than recorded."""
@@ -179,17 +170,11 @@ def driven_difference(
         RefusedError: the server records nothing.
         LostError: the end of the run does not appear in its recording.
     """
-    path, due = folder / "run.mcap", time.monotonic() + ON_DISK
-    ended = client.query(answers.State)
-    while time.monotonic() < due:
-        path.write_bytes(client.recording(ended.sent - began + ON_DISK))
-        with RecordingFile.open(path) as file:
-            # The server writes once a second.
-            if file.end >= ended.t - SAME_TICK:
-                run = read_part(file, max(began - file.start, 0.0))
-                return path_difference(part.setpoint, run.t, run.setpoint)
-        time.sleep(POLL_PERIOD)
-    raise LostError(f"the server has not written the end of the run within {ON_DISK:g} s.")
+    path = folder / "run.mcap"
+    fetch_run(client, began, path)
+    with RecordingFile.open(path) as file:
+        run = read_part(file, max(began - file.start, 0.0))
+        return path_difference(part.setpoint, run.t, run.setpoint)
 
 
 def _report(part: RecordedPart, found: PathDifference) -> None:

@@ -22,6 +22,9 @@ POINTS = 600
 WIDTH, SPEED_HEIGHT, PATH_HEIGHT, LEFT, BOTTOM, TOP = 760.0, 220.0, 300.0, 46.0, 34.0, 12.0
 """[px] Size and margins of the figures."""
 
+DOTTED = " Dotted: the path of the tool as it was measured."
+"""Explanation of the paths of measured arms."""
+
 TICKS = 5
 """Approximate number of labels on an axis."""
 
@@ -35,9 +38,21 @@ def score_page(board: Leaderboard, written: datetime) -> str:
     )
     rows = "\n".join(_row(board, measure) for measure in board.measures)
     speeds = [(each.t, 1e3 * each.speed) for each in board.rows]
-    above = [(1e3 * each.tool[:, 0], 1e3 * each.tool[:, 1]) for each in board.rows]
-    beside = [(1e3 * each.tool[:, 0], 1e3 * each.tool[:, 2]) for each in board.rows]
     half = 0.5 * (WIDTH - 20.0)
+    views = [
+        _figure(
+            f"Path of the tool from {side}",
+            [(1e3 * each.tool[:, 0], 1e3 * each.tool[:, up]) for each in board.rows],
+            "x, mm",
+            f"{'xyz'[up]}, mm",
+            half,
+            PATH_HEIGHT,
+            measured=[
+                (1e3 * each.measured[:, 0], 1e3 * each.measured[:, up]) for each in board.rows
+            ],
+        )
+        for side, up in (("above", 1), ("aside", 2))
+    ]
     names = ", ".join(each.name for each in board.rows)
     return PAGE.format(
         title=html.escape(names if len(names) < 80 else f"{len(board.rows)} recordings"),
@@ -46,12 +61,8 @@ def score_page(board: Leaderboard, written: datetime) -> str:
         rows=rows,
         legend=_legend(board.rows),
         speed=_figure("Speed of the tool over time", speeds, "s", "mm/s", WIDTH, SPEED_HEIGHT),
-        above=_figure(
-            "Path of the tool from above", above, "x, mm", "y, mm", half, PATH_HEIGHT, equal=True
-        ),
-        beside=_figure(
-            "Path of the tool from aside", beside, "x, mm", "z, mm", half, PATH_HEIGHT, equal=True
-        ),
+        views="".join(views),
+        dotted=DOTTED if any(len(each.measured) for each in board.rows) else "",
         written=f"{written:%d %B %Y, %H:%M}",
     )
 
@@ -91,10 +102,14 @@ def _figure(
     up: str,
     width: float,
     height: float,
-    *,
-    equal: bool = False,
+    measured: Sequence[tuple[FloatArray, FloatArray]] | None = None,
 ) -> str:
-    """Return a figure of ``curves``; ``equal``: with one scale for both axes."""
+    """Return a figure of ``curves``.
+
+    ``measured``: of paths, that of each as it was measured, empty if it was not. Paths have one
+    scale for both axes, and a dot at their begin.
+    """
+    equal = measured is not None
     x, y = (np.concatenate([curve[axis] for curve in curves]) for axis in (0, 1))
     low = np.array((float(x.min()), float(y.min()) if equal else 0.0))
     high = np.array((float(x.max()), float(y.max())))
@@ -108,16 +123,23 @@ def _figure(
     def place(points: FloatArray) -> FloatArray:
         return np.asarray(origin + (points - low) * scale * (1.0, -1.0))
 
+    def drawn(x: FloatArray, y: FloatArray) -> str:
+        points = place(np.stack((x, y), axis=1)[:: max(len(x) // POINTS, 1)])
+        return " ".join(f"{px:.1f},{py:.1f}" for px, py in points.tolist())
+
     lines = []
     for number, each in enumerate(curves):
-        step = max(len(each[0]) // POINTS, 1)
-        points = place(np.stack((each[0], each[1]), axis=1)[::step])
-        text = " ".join(f"{px:.1f},{py:.1f}" for px, py in points.tolist())
-        lines.append(f'<polyline class="c{number % COLOURS}" points="{text}"/>')
+        lines.append(f'<polyline class="c{number % COLOURS}" points="{drawn(*each)}"/>')
         if equal:
-            bx, by = points[0].tolist()
+            bx, by = place(np.array((each[0][0], each[1][0]))).tolist()
             colour = f"c{number % COLOURS}"
             lines.append(f'<circle class="{colour}" cx="{bx:.1f}" cy="{by:.1f}" r="4"/>')
+    dotted = "".join(
+        f'<polyline class="c{number % COLOURS}" points="{drawn(*each)}"/>'
+        for number, each in enumerate(measured or ())
+        if len(each[0])
+    )
+    lines.append(f'<g class="measured">{dotted}</g>' if dotted else "")
     marks = []
     for value in _ticks(low[0], low[0] + room[0] / scale[0]):
         px = float(place(np.array((value, low[1])))[0])
@@ -192,6 +214,7 @@ svg {{ display: block; width: 100%; height: auto; }}
 .grid text {{ fill: var(--soft); font-size: 12px; }}
 polyline {{ fill: none; stroke-width: 2; stroke-linejoin: round; }}
 polyline:nth-of-type(even) {{ stroke-dasharray: 7 5; }}
+.measured polyline {{ stroke: var(--ink); stroke-width: 1; stroke-dasharray: 1 3; }}
 @media (max-width: 40rem) {{ .figures {{ grid-template-columns: 1fr; }} td b, th small {{
   display: none; }} tbody th {{ min-width: 8rem; }} th, td {{ padding: .4rem .5rem; }}
   table {{ font-size: .9rem; }} thead th + th {{ white-space: normal; overflow-wrap: anywhere; }}
@@ -206,8 +229,8 @@ polyline:nth-of-type(even) {{ stroke-dasharray: 7 5; }}
 </tbody>
 </table></div>
 <p class="legend">{legend}</p>
-<div class="figures">{speed}{above}{beside}</div>
-<footer>A dot marks the begin of a path. Made by katana450, {written}.</footer>
+<div class="figures">{speed}{views}</div>
+<footer>A dot marks the begin of a path.{dotted} Made by katana450, {written}.</footer>
 </html>
 """
 """Template of the page."""

@@ -13,7 +13,13 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
+from katana450.extensions.programs.measured_run import (
+    MeasuredRun,
+    commanded_errors,
+    path_of,
+)
 from katana450.extensions.programs.measures import MEASURES as REPORTED
+from katana450.extensions.programs.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.motion_measures import motion_measures, water_measures
 from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.files.recorded_states import recorded_states
@@ -36,7 +42,7 @@ PLACING: Final = "placing_error_mm"
 
 MEASURES: Final = {
     "duration_s": "from the first motion to the end of the last",
-    "tool_path_mm": "length of the path of the tool point",
+    "tool_path_mm": "length of the path of the tool point, by setpoints",
     "dimensionless_jerk": "mean squared jerk of the tool over time and length; at best 720",
     "sparc": "spectral arc length of the tool's speed; the nearer to 0, the smoother",
     "nearest_clearance_mm": "minimum of all pairs of parts, without objects that fingers touch",
@@ -44,6 +50,8 @@ MEASURES: Final = {
     "smallest_singular_value": REPORTED["smallest_singular_value"],
     "max_speed_fraction": REPORTED["max_speed_fraction"],
     "max_tool_speed_mm_s": REPORTED["max_tool_speed_mm_s"],
+    "executed_position_error_mm": REPORTED["executed_position_error_mm"],
+    **{name: about for name, about in REPORTED.items() if name in OF_A_MEASURED_ARM},
     "emptied_ml": "water in the basin at the end",
     "emptied_percent": REPORTED["emptied_percent"],
     "spilled_ml": REPORTED["spilled_ml"],
@@ -83,6 +91,8 @@ class Scored:
         t: (N,) times from the first motion [s], at equal steps.
         tool: (N, 3) the tool point in the base frame [m].
         speed: (N,) its speed [m/s].
+        measured: (M, 3) the tool point as measured, in the base frame [m]; none for an arm that
+            follows exactly.
         missing: names of the objects that have a target and are not in the recording. The placing
             error is then unknown.
     """
@@ -93,6 +103,7 @@ class Scored:
     t: FloatArray
     tool: FloatArray
     speed: FloatArray
+    measured: FloatArray
     missing: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -161,11 +172,19 @@ def scored(
         "stops": float(_begins([state.stopped is not None for state in states])),
         "contacts": float(_begins([_waits_before_contact(state) for state in states])),
     }
+    values["executed_position_error_mm"] = _commanded_error(run)
+    measured = MeasuredRun.of(arm, run)
+    points = np.empty((0, 3))
+    if measured is not None:
+        values |= measured.values
+        points = _in_base(robot, forward_batch(arm.chain, measured.q)[:, :3, 3])
     water = states[-1].poured
     if water is not None and water.water.total:
         values |= water_measures(water)
     missing = tuple(sorted((targets or {}).keys() - places.keys()))
-    return Scored(name, values, places, frozen(t), frozen(tool), frozen(speed), missing)
+    return Scored(
+        name, values, places, frozen(t), frozen(tool), frozen(speed), frozen(points), missing
+    )
 
 
 def _check_same(file: RecordingFile, states: Sequence[State], first: float, last: float) -> None:
@@ -195,7 +214,7 @@ def _moving(states: Sequence[State]) -> tuple[int, int] | None:
 
 def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> tuple[FloatArray, FloatArray]:
     """Return times (N,) from 0 [s] and the default tool's points (N, 3) in the base frame [m]."""
-    arm, T = robot.session.require_arm(), robot.robot.require_arm().T_base_shoulder
+    arm = robot.session.require_arm()
     points = forward_batch(arm.chain, np.array([state.setpoint for state in states]))[:, :3, 3]
     times = np.array([state.t for state in states])
     later = np.concatenate(([True], np.diff(times) > 0.0))
@@ -211,7 +230,22 @@ def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> tuple[FloatA
     points = np.concatenate((points, points[numbers]))[order]
     t = np.arange(0.0, times[-1] + 0.5 / RATE, 1.0 / RATE)
     found = CubicSpline(times, points).values_at(np.minimum(t, times[-1]))
-    return t, found @ T[:3, :3].T + T[:3, 3]
+    return t, _in_base(robot, found)
+
+
+def _in_base(robot: DescribedRobot, points: FloatArray) -> FloatArray:
+    T = robot.robot.require_arm().T_base_shoulder
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+
+
+def _commanded_error(states: Sequence[State]) -> float | None:
+    """Return the maximum distance [mm] of the setpoints from the desired paths; None without."""
+    on: dict[int, list[State]] = {}
+    for state in states:
+        if (path := path_of(state)) is not None:
+            on.setdefault(id(path), []).append(state)
+    errors = [commanded_errors(path, of) for of in on.values() if (path := path_of(of[0]))]
+    return 1e3 * float(np.concatenate(errors).max()) if errors else None
 
 
 def _clearance(session: Session, states: Sequence[State]) -> float | None:

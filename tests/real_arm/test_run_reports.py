@@ -1,0 +1,136 @@
+"""Reports of runs on measured arms: a simulated plant, a server with one, and the emulated arm."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.cli.main import main
+from katana450.client import connect
+from katana450.server.api.motion_requests import OperateArm
+from tests.browser.server import RECORDING_APP, AppServer
+from tests.real_arm.emulated import ROOT, emulator
+from tests.real_arm.test_arm_commands import wait_for
+
+SCRIPT = """
+name: Short line
+frame: base
+tool: tcp
+steps:
+  - home
+  - line: {by: {y: 60}}
+  - line: {by: {y: -60}}
+expect:
+  executed_position_error_mm: {at_most: 1.0e-6}
+  measured_position_error_mm: {at_most: 5}
+"""
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    path = tmp_path / "line.yaml"
+    path.write_text(SCRIPT, encoding="utf-8")
+    return path
+
+
+def katana450(*options: str, seconds: float = 120.0) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "katana450", *options],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=seconds,
+        check=False,
+    )
+
+
+def report_in(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_bound_on_a_measured_arm_needs_one(
+    script: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(script), "--headless"]) == 1
+    assert "measured_position_error_mm was not measured" in capsys.readouterr().err
+    assert main(["run", str(script), "--headless", "--plant", "katana450"]) == 0
+    assert "Measured at the arm" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["run", str(script), "--headless", "--plant", "rubber"])
+
+
+@pytest.mark.long
+def test_circle_of_a_plant_has_commanded_and_measured_apart(tmp_path: Path) -> None:
+    done = katana450(
+        "demo", "circle", "--headless", "--plant", "katana450", "--report", str(tmp_path)
+    )
+    assert done.returncode == 0, done.stderr
+    found = report_in(tmp_path)
+    assert found["executed_position_error_mm"] < 1e-9
+    assert found["bounds_held"]
+    with (tmp_path / "trace.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["task"] == "circle"]
+    # The paper's circle, by the measured points: across it and along its axis.
+    off = []
+    for row in rows:
+        x, y, z = (float(row[f"measured_{axis}_mm"]) for axis in "xyz")
+        off.append(math.hypot(x - 150.0, math.hypot(y, z + 110.0) - 100.0))
+    assert found["measured_position_error_mm"] == pytest.approx(max(off), rel=0.02)
+    assert 0.05 < max(off) < 2.0
+    for name in ("measured.png", "joints.png", "path.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 5
+
+
+@pytest.mark.long
+def test_run_on_a_server_reports_what_it_has_measured(script: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report"
+    record = ("--record", str(tmp_path / "recordings"))
+    with AppServer((*RECORDING_APP, *record, "--plant", "katana450")) as app:
+        done = katana450("run", str(script), "--url", app.url, "--report", str(out))
+        assert done.returncode == 0, done.stderr
+        refused = katana450("run", str(script), "--url", app.url, "--plant", "stiff")
+        assert refused.returncode == 1
+        assert "has an arm already" in refused.stderr
+    found = report_in(out)
+    assert found["measured"] == f"at {app.url}"
+    assert found["bounds_held"]
+    # The delay of the plant, 20 ms, and what the machine adds.
+    assert 15.0 <= found["tracking_lag_ms"] < 80.0
+    assert 0.01 < found["measured_position_error_mm"] < 5.0
+    assert (out / "measured.png").exists()
+
+
+@pytest.mark.long
+def test_run_on_the_emulated_arm_reports_what_its_driver_has_measured(
+    script: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "report"
+    with emulator("--calibrated") as port:
+        arm = ("--arm", f"tcp://127.0.0.1:{port}")
+        record = ("--record", str(tmp_path / "recordings"))
+        with AppServer((*RECORDING_APP, *record, *arm)) as app:
+            with connect(app.url, "Test") as client:
+                for act, mode in ((ArmAct.CONNECT, "uncalibrated"), (ArmAct.ENGAGE, "holding")):
+                    client.ask(OperateArm(act=act, confirmed=True))
+                    wait_for(client, mode)
+                client.clear_stop()
+            done = katana450("run", str(script), "--url", app.url, "--report", str(out))
+            assert done.returncode == 0, done.stderr
+    found = report_in(out)
+    assert found["measured"] == f"at {app.url}"
+    # Setpoints wait in the arm for 0.33 s; its driver knows that, so it is no tracking error.
+    assert 300.0 <= found["tracking_lag_ms"] < 600.0
+    assert 0.0 < found["joint_tracking_error_deg"] < 1.5
+    assert 0.0 < found["measured_position_error_mm"] < 5.0
+    assert found["executed_position_error_mm"] < 1e-6
