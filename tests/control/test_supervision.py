@@ -12,13 +12,16 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm_commands import HAZARDS, ArmAct
 from katana450.arm.control.arm_report import ACTS, ArmMode, ArmReport, MeasuredStop
 from katana450.arm.control.messages import sentence
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Verdict
 from katana450.arm.control.stopping import clear_refusal
+from katana450.arm.control.supervision import CONTACT_DISTANCE
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import failed, stepped, waited
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.motion.limiter import JointMotion
 
 TICK = 0.01
 DELAY = 20
@@ -226,6 +229,47 @@ def test_contact_at_the_measured_posture_stops_the_arm(session: Session, state: 
     assert met.stopped is not None
     assert Reason.MEASURED_CONTACT in reasons(met)
     assert "touch, as measured" in met.stopped.cause.why
+
+
+def test_intended_contact_hides_no_other_one(session: Session, state: State) -> None:
+    """The arm touches the table as it should, deepest of all, and a post that it should not."""
+    q = np.array((0.0, -0.6, 1.2, 0.6, 0.0))
+    world = session.world_at(state)
+    assert world is not None
+    while (nearest := world.nearest(np.append(q, 0.0))) is not None and nearest.distance > -1e-3:
+        q[1] += 0.002
+    assert "table" in nearest.parts
+    arm = next(name for name in nearest.parts if name != "table")
+    # Turned about the vertical axis it touches the table in the same way.
+    away = np.append(q + np.array((-0.3, 0.0, 0.0, 0.0, 0.0)), 0.0)
+    assert world.gap(away, *nearest.parts) == pytest.approx(nearest.distance, abs=1e-6)
+    x, y, _ = nearest.points[0]
+    there = replace(state, q=frozen(q), gripper=0.0, motion=JointMotion.rest(away[:-1]))
+
+    def at(aside: float) -> State:
+        place = np.eye(4)
+        place[:3, 3] = x, y + aside, 0.001
+        post = SceneObject("post", Shape.BOX, (0.02, 0.02, 0.05), place)
+        return replace(there, objects=(*there.objects, post))
+
+    aside = 0.2
+    while True:
+        with_post = at(aside)
+        found = session.world_at(with_post)
+        assert found is not None
+        if found.gap(with_post.x, arm, "post") < CONTACT_DISTANCE:
+            break
+        aside -= 2e-4
+    assert found.nearest(with_post.x).parts == nearest.parts  # type: ignore[union-attr]
+    report = ArmReport(ArmMode.MOVING, state.t, away)
+    assert session.supervised(there, report).stopped is None
+    met = session.supervised(with_post, report)
+    assert met.stopped is not None
+    contact = next(f for f in met.findings if f.reason is Reason.MEASURED_CONTACT)
+    assert "post" in (contact.parts or ())
+    # Where both are intended, neither is a reason.
+    both = ArmReport(ArmMode.MOVING, state.t, with_post.x)
+    assert session.supervised(with_post, both).stopped is None
 
 
 def test_acts_are_refused_for_a_simulated_arm(session: Session, state: State) -> None:

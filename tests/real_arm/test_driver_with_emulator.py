@@ -6,7 +6,7 @@ import itertools
 import random
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.firmware_codec import RequestReceived
-from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
+from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.faults import (
     AnyFault,
@@ -166,12 +166,23 @@ def test_power_cycle_ends_in_a_state_where_nothing_moves(wire: Wire) -> None:
 
 
 def cut(server: EmulatorServer, loop: SmallLoop, *, hangs: bool) -> float:
-    """Reset the connection, or let the arm hang; return the time until that is reported [s]."""
-    if not hangs:
-        server.drop_client()
-        return loop.wait(ArmMode.LOST)
-    with server.lock:
-        return loop.wait(ArmMode.LOST)
+    """Reset the connection, or let the arm hang, and wait until the loss is reported.
+
+    Returns the time from then to the last tick whose report still had the arm connected [s]. A busy
+    machine may delay the next tick, but none may be later than that.
+    """
+    begun = time.perf_counter()
+    with server.lock if hangs else nullcontext():
+        if not hangs:
+            server.drop_client()
+        loop.wait(ArmMode.LOST)
+        while "Trying to connect again" not in loop.report.note:
+            # The thread of the driver has not noticed it yet.
+            time.sleep(0.005)
+            assert time.perf_counter() < begun + 5.0
+    reports = loop.reports_since(begun)
+    lost = next(n for n, (_, report, _) in enumerate(reports) if report.mode is ArmMode.LOST)
+    return reports[lost - 1][0] - begun if lost else 0.0
 
 
 def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:
@@ -200,5 +211,16 @@ def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:
             for before, after in itertools.pairwise(packets):
                 ends = [axis.target for axis in before.segments]
                 assert [axis.p0 for axis in after.segments] == ends
-    assert sorted(times)[-1 - CUTS // 20] < 0.5
+    assert max(times) <= MAX_SILENCE
     assert moving >= CUTS // 4
+
+
+@pytest.mark.long
+def test_replies_of_150_milliseconds_are_no_loss() -> None:
+    with emulated(Delay(seconds=0.15)) as (loop, _):
+        loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED, 10.0)
+        begun = time.perf_counter()
+        loop.act(ArmAct.ENGAGE, ArmMode.HOLDING, 10.0)
+        time.sleep(3.0)
+        modes = {report.mode for _, report, _ in loop.reports_since(begun)}
+        assert modes <= {ArmMode.UNCALIBRATED, ArmMode.HOLDING}

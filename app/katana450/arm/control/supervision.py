@@ -52,15 +52,19 @@ def with_tracking_time(state: State, report: ArmReport) -> State:
 
 
 def unintended_contact(world: CollisionWorld, state: State, report: ArmReport) -> Contact | None:
-    """Return the contact of the nearest parts at the measured posture.
+    """Return the deepest contact at the measured posture that is not meant; None without one.
 
-    None if they are not near, or if they are meant to touch where the arm should be.
+    Parts are meant to touch if they are near each other where the arm should be.
     """
-    nearest = world.nearest(state.x)
-    if nearest is None or nearest.distance >= CONTACT_DISTANCE:
-        return None
-    is_intended = world.gap(report.expected, *nearest.parts) < INTENDED_DISTANCE
-    return None if is_intended else nearest
+    placed = world.at(state.x)
+    near = placed.nearer_than(CONTACT_DISTANCE)[0].tolist()
+    for distance, pair in sorted((placed.distance(pair), pair) for pair in near):
+        if distance >= CONTACT_DISTANCE:
+            break
+        contact = placed.contact(pair)
+        if world.gap(report.expected, *contact.parts) >= INTENDED_DISTANCE:
+            return contact
+    return None
 
 
 def fault_of(state: State, report: ArmReport, contact: Contact | None) -> Finding | None:

@@ -39,8 +39,9 @@ SHORTEST_RETRY, LONGEST_RETRY = 0.25, 2.0
 """[s] Time between two attempts to connect. It doubles with each failed one, and is long enough for
 the control loop to report each loss."""
 
-MAX_SILENCE = 0.5
-"""[s] Age of the newest answer of the thread above which the arm counts as lost."""
+MAX_SILENCE = 0.4
+"""[s] Time since the newest request that the arm has answered above which it counts as lost. The
+control loop ticks each 0.08 s or more often, so a silent arm is reported within 0.5 s."""
 
 END_TIMEOUT = 1.5
 """[s] Maximum time in which a moving arm is stopped at the end."""
@@ -98,6 +99,7 @@ class KatanaDriver:
         self._clock = clock
         self._machine = ArmMachine(variant, bounds, joints)
         self._link: ArmLink | None = None
+        self._heard_at = clock()
         self._retry, self._retry_at = SHORTEST_RETRY, -np.inf
         self._setpoints: deque[_Setpoint] = deque(maxlen=MAX_SETPOINTS)
         self._acts: deque[ArmAct] = deque()
@@ -108,7 +110,6 @@ class KatanaDriver:
         self._was_stopped = True
         self._end: float | None = None
         self._answer = self._machine.answer()
-        self._answered_at = clock()
         self._version = self._machine.version
         self._thread = threading.Thread(target=self._run, name="katana450", daemon=True)
 
@@ -131,12 +132,21 @@ class KatanaDriver:
             self._wake.set()
         self._was_stopped = stopped
         answer, report = self._answer, self._answer.report
-        silence = t - self._answered_at
-        if silence > MAX_SILENCE and report is not None and report.mode.follows:
+        assert report is not None
+        # Judged here and not by the thread, which a busy machine may delay: no tick of the control
+        # loop takes an arm for connected that has been silent for longer.
+        connected = report.mode not in (ArmMode.DISCONNECTED, ArmMode.LOST)
+        if connected and (silence := self._silence(t)) > MAX_SILENCE:
             note = f"The driver has not heard from the arm for {silence:.1f} s."
-            lost = replace(report, mode=ArmMode.LOST, note=note)
-            return replace(answer, report=lost)
+            return replace(answer, report=replace(report, mode=ArmMode.LOST, note=note))
         return answer
+
+    def _silence(self, t: float) -> float:
+        """Return the time for which the arm has been silent at ``t`` [s]."""
+        link = self._link
+        if link is not None:
+            self._heard_at = link.heard_at
+        return t - self._heard_at
 
     def perform(self, act: ArmAct, t: float) -> None:  # noqa: ARG002
         """Give ``act`` to the thread, at once."""
@@ -275,7 +285,6 @@ class KatanaDriver:
 
     def _publish(self) -> None:
         """Let the control loop have what has changed."""
-        self._answered_at = self._clock()
         version = self._machine.version
         if version != self._version:
             self._version = version

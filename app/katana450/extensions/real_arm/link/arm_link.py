@@ -20,9 +20,9 @@ from katana450.extensions.real_arm.link.transport import (
     Transport,
 )
 
-EXCHANGE_TIMEOUT = 0.35
-"""[s] Deadline of an exchange: with the time between exchanges, a silent arm is noticed within
-0.5 s."""
+EXCHANGE_TIMEOUT = 0.3
+"""[s] Deadline of an exchange. With the time between two exchanges it is less than the silence for
+which the driver takes an arm for lost."""
 
 KEPT_ROUND_TRIPS = 1000
 
@@ -32,6 +32,8 @@ class ArmLink:
 
     Attributes:
         round_trips: Times of the newest exchanges [s].
+        heard_at: Time at which the newest request that the arm has answered was sent [s], at first
+            that of the connection. A reply that is read late counts for no longer.
     """
 
     def __init__(
@@ -41,6 +43,7 @@ class ArmLink:
         self._clock = clock
         self._codec = HostCodec()
         self._is_lost = False
+        self.heard_at = clock()
         self.round_trips: deque[float] = deque(maxlen=KEPT_ROUND_TRIPS)
 
     def exchange(self, request: ArmRequest, timeout: float = EXCHANGE_TIMEOUT) -> ArmReply:
@@ -82,6 +85,7 @@ class ArmLink:
             self._is_lost = True
             self.close()
             raise
+        self.heard_at = begun
         self.round_trips.append(self._clock() - begun)
         return events[0]
 
