@@ -5,8 +5,6 @@ Run it with ``python -m docs.api``.
 
 from __future__ import annotations
 
-import inspect
-import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,8 @@ from typing import Any
 import msgspec
 
 from katana450.extension import extensions
-from katana450.server.api import answers, requests, schema
+from katana450.extensions.api_description.messages import documentation, kinds
+from katana450.server.api import answers, requests
 from katana450.server.api.fields import Request, tag_of
 
 PAGE = Path(__file__).with_name("api.md")
@@ -45,7 +44,7 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **HTTP** `POST /api/v{version}/scripts`, `scripts/NAME` | The problems of the text in the body, line by line, and its poses if it has only [these](programs.md#teaching); saves a valid text in the folder. |
 | **HTTP** `POST /api/v{version}/stop?press=NAME` | `stop`, on the main port and on the [port of STOP](access.md#the-port-of-stop), which answers with the stage. `press` makes copies on both count once. |
 | **HTTP** `GET`, `POST /api/v{version}/episodes`, `GET episodes/NUMBER` | The list of [episodes](recording.md#episodes); starts, ends and judges them; the file of one. |
-| **HTTP** `GET /api/v{version}/openapi.json` | This API as OpenAPI. |
+| **HTTP** `GET /api/v{version}/openapi.json`, `asyncapi.json` | This API as documents for programs: OpenAPI 3.1 of HTTP, AsyncAPI 3.0 of the websocket and the TCP port. Both describe each message with its units, also those of extensions. |
 
 Every request is a heartbeat. If the server requires an access link ([access](access.md)), send the
 token behind its `#` as `Authorization: Bearer TOKEN` or in the `hello`. The server stops a moving arm
@@ -135,15 +134,15 @@ def page() -> str:
         ("Answers", answers.AnyAnswer, "is"),
     ):
         parts.append(f"## {title}\n")
-        parts += [_kind(kind, tag) for kind in schema.kinds(union)]
+        parts += [_kind(kind, tag) for kind in kinds(union)]
         if tag == "do":
-            for name, kinds in added_requests().items():
-                module = kinds[0].__module__
+            for name, added in added_requests().items():
+                module = added[0].__module__
                 parts.append(f"## Requests of the extension `{name}`\n")
                 parts.append(
                     f"A server without this extension refuses them. The Python module is `{module}`.\n"
                 )
-                parts += [_kind(kind, tag) for kind in kinds]
+                parts += [_kind(kind, tag) for kind in added]
     parts.append("### In requests\n")
     parts += [_kind(kind, None) for kind in (requests.FieldName, requests.FieldSetting)]
     parts.append("### In answers\n")
@@ -170,7 +169,7 @@ def added_requests() -> dict[str, tuple[type[Request], ...]]:
 
 def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
     heading = kind.__name__ if tag is None else f'`"{tag}": "{tag_of(kind.__name__)}"`'
-    text, fields = _description(kind)
+    text, fields = documentation(kind)
     lines = [f"### {heading}\n", text, ""]
     described = msgspec.json.schema_components([kind])[1][kind.__name__]
     for field in msgspec.structs.fields(kind):
@@ -183,14 +182,6 @@ def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _description(kind: type) -> tuple[str, dict[str, str]]:
-    """Return the docstring of ``kind`` as Markdown, and its ``Attributes`` by their names."""
-    doc = (inspect.getdoc(kind) or "").replace("``", "`")
-    text, _, attributes = doc.partition("Attributes:\n")
-    entries = re.findall(r"^ {4}(\w+): (.*(?:\n {8}.*)*)", attributes, flags=re.MULTILINE)
-    return text.rstrip(), {name: " ".join(about.split()) for name, about in entries}
-
-
 def _json(value: Any) -> str:
     return msgspec.json.encode(value).decode()
 
@@ -198,7 +189,7 @@ def _json(value: Any) -> str:
 def _shape(schema: dict[str, Any]) -> str:
     if "$ref" in schema:
         name: str = schema["$ref"].rpartition("/")[2]
-        added = (sys.modules[kinds[0].__module__] for kinds in added_requests().values())
+        added = (sys.modules[each[0].__module__] for each in added_requests().values())
         places = (requests, answers, *added)
         kind: Any = next((vars(each)[name] for each in places if name in vars(each)), None)
         if hasattr(kind, "__members__"):

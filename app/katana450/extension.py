@@ -52,6 +52,7 @@ PACKAGE = "katana450.extensions"
 
 BUILT_IN = (
     "server_commands",
+    "api_description",
     "event_log",
     "programs",
     "importers",

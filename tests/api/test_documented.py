@@ -6,7 +6,9 @@ import json
 from typing import get_args
 
 from docs.api import PAGE, added_requests, page
-from katana450.server.api import answers, requests, schema
+from katana450.extensions.api_description.messages import kinds, summary
+from katana450.extensions.api_description.openapi import openapi_json
+from katana450.server.api import answers, requests
 from katana450.server.api.fields import Request, RequestTraits, tag_of
 
 ADDED = tuple(kind for kinds in added_requests().values() for kind in kinds)
@@ -21,15 +23,15 @@ def test_page_is_up_to_date() -> None:
 
 def test_every_message_is_documented() -> None:
     text = PAGE.read_text(encoding="utf-8")
-    messages = ((EVERY_REQUEST, "do"), (schema.kinds(answers.AnyAnswer), "is"))
-    for kinds, tag in messages:
-        for kind in kinds:
+    messages = ((EVERY_REQUEST, "do"), (kinds(answers.AnyAnswer), "is"))
+    for listed, tag in messages:
+        for kind in listed:
             assert f'### `"{tag}": "{tag_of(kind.__name__)}"`' in text
-            assert len(schema.summary(kind)) > 5, kind
+            assert len(summary(kind)) > 5, kind
 
 
 def test_every_reference_in_openapi_exists() -> None:
-    described = json.loads(schema.openapi_json(ADDED))
+    described = json.loads(openapi_json(ADDED))
     text = json.dumps(described)
     references = text.split("#/components/schemas/")[1:]
     assert len(references) > 20

@@ -86,7 +86,10 @@ THREE = Package("three@0.187.0", "package/build/three.module.js")
 GLTF_VALIDATOR = Package("gltf-validator@2.0.0-dev.3.10", "package/index.js")
 """The validator of the makers of glTF."""
 
-NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR)
+ASYNCAPI_PARSER = Package("@asyncapi/parser@3.6.6", "package/browser/index.js")
+"""The parser of the makers of AsyncAPI, with all that it needs in one file."""
+
+NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR, ASYNCAPI_PARSER)
 """Packages of npm; nothing of them is executed when they are unpacked."""
 
 PYBULLET = Package("pybullet==3.2.7", "pybullet*.so")
@@ -103,7 +106,12 @@ PINOCCHIO = Package(
 USD = Package("usd-core==26.11", "pxr/Usd/__init__.py")
 """The library of Universal Scene Description."""
 
-WHEELS = (PYBULLET, VTK, PINOCCHIO, USD)
+OPENAPI_VALIDATOR = Package(
+    "openapi-spec-validator==0.9.0", "openapi_spec_validator/__init__.py", alone=False
+)
+"""A validator of OpenAPI documents."""
+
+WHEELS = (PYBULLET, VTK, PINOCCHIO, USD, OPENAPI_VALIDATOR)
 """Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")

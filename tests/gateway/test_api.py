@@ -14,8 +14,9 @@ import pytest
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
+from katana450.extensions.api_description.messages import kinds
 from katana450.maths.kinematics.priority import Priority
-from katana450.server.api import answers, requests, schema
+from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask
 from tests.gateway.lines import Lines, post, speaking
@@ -137,11 +138,14 @@ def test_openapi_lists_every_route(server: AppServer) -> None:
     described = json.loads(ask(f"{server.url}/api/v1/openapi.json")[2])
     for path in described["paths"]:
         data = b"{}" if path.endswith("do") else None
-        status, _, _ = ask(server.url + path, data=data, X_Program="a-test-that-posts")
-        assert status in (200, 405, 422), path
+        url = server.url + path.format(name="Pour", number=1)
+        status, _, _ = ask(url, data=data, X_Program="a-test-that-posts")
+        # This server records nothing.
+        recorded = path.startswith(("/api/v1/recording", "/api/v1/episodes"))
+        assert status in ((404, 409) if recorded else (200, 405, 422)), path
         assert set(described["paths"][path]) <= {"get", "post"}
     shapes = described["components"]["schemas"]
-    for kind in (*schema.kinds(requests.AnyRequest), *schema.kinds(answers.AnyAnswer)):
+    for kind in (*kinds(requests.AnyRequest), *kinds(answers.AnyAnswer)):
         assert kind.__name__ in shapes
 
 

@@ -16,7 +16,7 @@ from katana450.arm.robot.weight import loads_of
 from katana450.client import Client, RefusedError
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.statics import holding_torques
-from katana450.maths.kinematics.velocity import limit_distances
+from katana450.maths.kinematics.velocity import condition_number, limit_distances, manipulability
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Matrix4
 from tests.gateway.postures import READY, THERE
@@ -83,12 +83,23 @@ def test_state_includes_values_derived_from_the_posture(
     assert state.margins is not None
     assert state.margins.limit == pytest.approx(distances.min())
     assert state.margins.axis == distances.argmin() + 1
+    assert state.margins.limits == pytest.approx(distances.tolist())
+    assert state.margins.condition_number == pytest.approx(condition_number(arm.chain, q))
+    assert state.margins.manipulability == pytest.approx(manipulability(arm.chain, q))
     assert state.margins.clearance is not None
     assert state.margins.clearance > 0.005
     program.send(requests.Joints(q=THERE.tolist()))
     deadline = time.monotonic() + 5.0
     while (program.query(answers.State).tool_speed or 0.0) < 0.05:
         assert time.monotonic() < deadline
+
+
+def test_condition_number_is_null_in_a_singularity(program: Client) -> None:
+    stretched = program.go(requests.GoToZero()).margins
+    assert stretched is not None
+    assert stretched.condition_number is None
+    assert stretched.smallest_singular_value < 1e-9
+    assert stretched.manipulability < 1e-9
 
 
 def test_other_branch_is_reached_on_a_clear_path(program: Client) -> None:

@@ -16,9 +16,10 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.client import Client, RefusedError, aconnect
+from katana450.extensions.api_description.messages import kinds
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.maths.kinematics.priority import Priority
-from katana450.server.api import answers, requests, schema
+from katana450.server.api import answers, requests
 from katana450.server.service import dispatcher, serialize
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
@@ -136,7 +137,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         # Refused at a simulated arm.
         requests.OperateArm,
     }  # fmt: skip
-    assert set(samples) | no_commands == {*schema.kinds(requests.AnyRequest), Program, Steer}
+    assert set(samples) | no_commands == {*kinds(requests.AnyRequest), Program, Steer}
     for kind, several in samples.items():
         for request in several:
             if kind is requests.ClearStop:

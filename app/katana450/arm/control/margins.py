@@ -16,16 +16,20 @@ class Margins:
     """Distances of one posture from its boundaries.
 
     Attributes:
-        axis: the axis nearest to one of its limits, counted from 0.
-        limit: the distance of that axis to the limit [rad]; negative beyond it.
-        smallest_singular_value: of the Jacobian over the characteristic length [1].
+        limits: (n,) the distance of each axis to its nearer limit [rad]; negative beyond it.
+        singular_values: (n,) those of the Jacobian over the characteristic length [1], in falling
+            order.
         nearest: the nearest pair of parts; None if contacts are not checked.
     """
 
-    axis: int
-    limit: float
-    smallest_singular_value: float
+    limits: FloatArray
+    singular_values: FloatArray
     nearest: Contact | None
+
+    @property
+    def axis(self) -> int:
+        """The axis nearest to one of its limits, counted from 0."""
+        return int(self.limits.argmin())
 
 
 def margins(chain: Chain, world: CollisionWorld | None, x: FloatArray) -> Margins:
@@ -37,11 +41,5 @@ def margins(chain: Chain, world: CollisionWorld | None, x: FloatArray) -> Margin
         x: (n + 1,) the joints and the finger joint [rad].
     """
     q = x[: chain.n]
-    distances = limit_distances(chain, q)
-    axis = int(distances.argmin())
-    return Margins(
-        axis,
-        float(distances[axis]),
-        float(singular_values(chain, q)[-1]),
-        None if world is None else world.nearest(x),
-    )
+    nearest = None if world is None else world.nearest(x)
+    return Margins(limit_distances(chain, q), singular_values(chain, q), nearest)

@@ -12,7 +12,7 @@ from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.grip import touching
 from katana450.arm.control.margins import Margins
-from katana450.arm.control.messages import finding_text, sentence
+from katana450.arm.control.messages import MAX_CONDITION, finding_text, sentence
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
@@ -155,11 +155,15 @@ def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
 
 def margins(found: Margins) -> answers.Margins:
     """Return the distances to limits, singularity and contact as a part of an answer."""
-    nearest = found.nearest
+    nearest, values = found.nearest, found.singular_values
+    singular = values[0] >= MAX_CONDITION * values[-1]
     return answers.Margins(
-        limit=found.limit,
+        limit=float(found.limits[found.axis]),
         axis=found.axis + 1,
-        smallest_singular_value=found.smallest_singular_value,
+        limits=found.limits.tolist(),
+        smallest_singular_value=float(values[-1]),
+        condition_number=None if singular else float(values[0] / values[-1]),
+        manipulability=float(values.prod()),
         clearance=None if nearest is None else nearest.distance,
         parts=None if nearest is None else nearest.parts,
     )

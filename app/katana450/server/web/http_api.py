@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket
 from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import LEASE_TIMEOUT
 from katana450.errors import InputError, LeaseError
-from katana450.server.api import answers, requests, schema
+from katana450.server.api import answers, requests
 from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT, Id
 from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
@@ -103,10 +103,6 @@ class Api:
     def routes(self) -> list[BaseRoute]:
         """Return all routes of the API and of the extensions."""
 
-        async def openapi(_request: Request) -> Response:
-            described = schema.openapi_json(self._hub.runner.request_types)
-            return Response(described, media_type="application/json")
-
         async def socket(socket: WebSocket) -> None:
             await program_socket.serve_socket(self._hub, self._authenticator, self._budgets, socket)
 
@@ -115,7 +111,6 @@ class Api:
             Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
             Route(f"{ROOT}/do", self._do, methods=["POST"]),
             *self._provided,
-            Route(f"{ROOT}/openapi.json", openapi),
             WebSocketRoute(f"{ROOT}/socket", socket),
         ]
 

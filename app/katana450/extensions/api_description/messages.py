@@ -1,0 +1,70 @@
+"""The message classes of the API, their documentation, and their JSON Schema."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from typing import Any, Union, get_args
+
+import msgspec
+
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import Request
+
+TITLE = "katana450"
+
+LICENSE = {"name": "MIT", "identifier": "MIT"}
+
+ABOUT = (
+    "Every message is a JSON object: `do` names a request, `is` an answer. Lengths are in m, "
+    "angles in rad, times in s, unless a field says otherwise. One client at a time holds the "
+    "lease, the right to drive. Everybody may stop the arm at any time."
+)
+"""Description of both documents."""
+
+REFERENCE = "#/components/schemas/{name}"
+"""Reference to the schema of a class, in both documents."""
+
+
+def kinds(union: Any) -> tuple[type[msgspec.Struct], ...]:
+    """Return the message classes of a union, in order."""
+    return get_args(union)
+
+
+def every_request(added: tuple[type[Request], ...]) -> tuple[type[msgspec.Struct], ...]:
+    """Return the requests of the core, then those ``added`` by an extension."""
+    return (*kinds(requests.AnyRequest), *added)
+
+
+def summary(kind: type) -> str:
+    """Return the first line of the docstring of ``kind``."""
+    return (inspect.getdoc(kind) or "").partition("\n")[0]
+
+
+def documentation(kind: type) -> tuple[str, dict[str, str]]:
+    """Return the docstring of ``kind`` as Markdown, and its ``Attributes`` by their names."""
+    return _divided(inspect.getdoc(kind) or "")
+
+
+def schemas(added: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str, Any], Any]:
+    """Return the schemas of a request and of an answer, and those of all classes by name.
+
+    Each field is described by the entry of its class under ``Attributes``. ``added``: requests of
+    an extension.
+    """
+    shapes: list[Any] = [Union[every_request(added)], answers.AnyAnswer]  # noqa: UP007
+    (request, answer), components = msgspec.json.schema_components(shapes, ref_template=REFERENCE)
+    for schema in components.values():
+        text, fields = _divided(inspect.cleandoc(schema.get("description", "")))
+        schema["description"] = text
+        for name, about in fields.items():
+            if name in schema.get("properties", ()):
+                schema["properties"][name]["description"] = about
+    return request, answer, components
+
+
+def _divided(doc: str) -> tuple[str, dict[str, str]]:
+    """Return the text of a docstring without its ``Attributes``, and these by their names."""
+    text, _, attributes = doc.replace("``", "`").partition("Attributes:\n")
+    entries = re.findall(r"^ {4}(\w+): (.*(?:\n {8}.*)*)", attributes, flags=re.MULTILINE)
+    return text.rstrip(), {name: " ".join(about.split()) for name, about in entries}

@@ -1,0 +1,378 @@
+"""The OpenAPI 3.1 document: the API over HTTP, from the message classes."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import msgspec
+
+from katana450.extensions.api_description.messages import (
+    ABOUT,
+    LICENSE,
+    TITLE,
+    schemas,
+    summary,
+)
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT, Request
+
+READABLE = {
+    "state": answers.State,
+    "arm": answers.Arm,
+    "event_log": answers.EventLog,
+    "branches": answers.Branches,
+    "loop": answers.Loop,
+    "objects": answers.Objects,
+    "world": answers.World,
+    "links": answers.Links,
+}
+"""Answers of the paths of single questions."""
+
+
+@functools.cache
+def openapi_json(
+    added: tuple[type[Request], ...] = (), served: frozenset[str] | None = None
+) -> bytes:
+    """Return the document as JSON.
+
+    ``added``: requests of an extension. ``served``: paths of the server, of which only the first
+    name below ``/api/v1`` counts; None to describe all paths.
+    """
+    request, answer, components = schemas(added)
+    paths: dict[str, Any] = {
+        **{path: {"get": _question(path, kind)} for path, kind in READABLE.items()},
+        "stop": {"post": _stop()},
+        "do": {"post": _do(request, answer)},
+        "mesh": {"post": _mesh()},
+        "scene": {"get": _scene_download(), "post": _scene_upload()},
+        **_scripts(),
+        **_recordings(),
+        **_documents(),
+    }
+    names = None if served is None else {_first(path.removeprefix(ROOT)) for path in served}
+    document = {
+        "openapi": "3.1.0",
+        "info": {
+            "title": TITLE,
+            "version": str(requests.VERSION),
+            "description": ABOUT,
+            "license": LICENSE,
+        },
+        "servers": [{"url": "/", "description": "The server that this document is from."}],
+        "security": [{}, {"link": []}],
+        "paths": {
+            f"{ROOT}/{path}": operations
+            for path, operations in paths.items()
+            if names is None or _first(path) in names
+        },
+        "components": {
+            "schemas": components,
+            "securitySchemes": {
+                "link": {
+                    "type": "http",
+                    "scheme": "bearer",
+                    "description": "Token of an access link, the part after its `#`, if the server "
+                    "requires one.",
+                }
+            },
+        },
+    }
+    return msgspec.json.encode(document)
+
+
+def _first(path: str) -> str:
+    """Return the first name of ``path``: `scripts` for `scripts/{name}`."""
+    return path.strip("/").partition("/")[0].partition("{")[0]
+
+
+COMMON_RESPONSES = {
+    "401": {"description": "A token is required."},
+    "403": {"description": "The sender may not do this."},
+    "429": {"description": "Too many requests, or too costly ones. `Retry-After` says when."},
+}
+"""Responses of every path but the documents."""
+
+NOT_READY = {"503": {"description": "The arm is not ready yet."}}
+
+
+def _question(path: str, kind: type) -> dict[str, Any]:
+    return {
+        "operationId": f"get_{path}",
+        "summary": summary(kind),
+        "responses": {
+            "200": _response("The present value.", kind),
+            "409": _response("There is no such value.", answers.Refused),
+            **COMMON_RESPONSES,
+            **NOT_READY,
+        },
+    }
+
+
+def _stop() -> dict[str, Any]:
+    return {
+        "operationId": "stop",
+        "summary": summary(requests.Stop),
+        "parameters": [
+            _query(
+                "press",
+                "Name of this press. The same name again does not count again.",
+                maxLength=MAX_PRESS_LENGTH,
+            )
+        ],
+        "responses": {"204": {"description": "The stop is requested."}, **COMMON_RESPONSES},
+    }
+
+
+def _do(request: Any, answer: Any) -> dict[str, Any]:
+    """Describe the path of single requests, by the schemas of requests and answers."""
+    return {
+        "operationId": "do",
+        "summary": "Execute one request.",
+        "description": "A request with `wait` is answered when its motion has ended; the open "
+        "connection then counts as the heartbeat. After any other motion request the program sends "
+        "ten requests a second until the arm rests, or the arm stops or pauses.",
+        "parameters": [
+            {
+                "name": "X-Program",
+                "in": "header",
+                "required": True,
+                "schema": {"type": "string", "pattern": "^[A-Za-z0-9_-]{16,64}$"},
+                "description": "A secret key that identifies the program; others never see it.",
+            },
+            {
+                "name": "X-Name",
+                "in": "header",
+                "schema": {"type": "string", "maxLength": 40},
+                "description": "The name of the program that others see.",
+            },
+        ],
+        "requestBody": {"required": True, "content": {"application/json": {"schema": request}}},
+        "responses": {
+            "200": _json_response("The request is done, or its answer.", answer),
+            "409": _json_response(
+                "The request is refused at present, or its motion did not reach its end.",
+                {"anyOf": [_reference(answers.Refused), _reference(answers.Done)]},
+            ),
+            "422": _response("The request is invalid.", answers.Refused),
+            "408": {"description": "The body was not received in time."},
+            "413": {"description": "The body is too large."},
+            **COMMON_RESPONSES,
+        },
+    }
+
+
+def _mesh() -> dict[str, Any]:
+    return {
+        "operationId": "upload_mesh",
+        "summary": "Upload a mesh, which `place` then uses by its key.",
+        "parameters": [
+            _query("name", "The file's name, with its ending.", required=True),
+            _query(
+                "format",
+                "wrl, stl, obj, ply, off, glb, gltf, dae or 3mf, for a name without an ending.",
+            ),
+            _query("unit", "mm, cm, in or m. Without it the unit is guessed and reported."),
+        ],
+        **_upload("application/octet-stream", answers.Mesh),
+    }
+
+
+def _scene_upload() -> dict[str, Any]:
+    return {
+        "operationId": "upload_scene",
+        "summary": "Upload a scene, which `load` then uses by its key.",
+        **_upload("application/zip", answers.Scene),
+    }
+
+
+def _scene_download() -> dict[str, Any]:
+    return {
+        "operationId": "download_scene",
+        "summary": "Download the scene as a .zip of scene.yaml and its meshes.",
+        "responses": {
+            "200": _content("The present scene.", "application/zip"),
+            "409": _response("The request is refused at present.", answers.Refused),
+            **COMMON_RESPONSES,
+        },
+    }
+
+
+def _scripts() -> dict[str, Any]:
+    """Describe the paths of scripts, by path."""
+    name = {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}}
+    text = {"required": True, "content": {"text/plain": {"schema": {"type": "string"}}}}
+    return {
+        "scripts": {
+            "get": {
+                "operationId": "list_scripts",
+                "summary": "List the names of the scripts.",
+                "responses": {
+                    "200": _json_response("The names, and whether texts can be saved.", _OBJECT),
+                    **COMMON_RESPONSES,
+                },
+            },
+            "post": {
+                "operationId": "check_script",
+                "summary": "List the problems of a script by line. Nothing is planned.",
+                "requestBody": text,
+                "responses": {
+                    "200": _json_response("The problems, and the taught poses.", _OBJECT),
+                    **COMMON_RESPONSES,
+                },
+            },
+        },
+        "scripts/{name}": {
+            "get": {
+                "operationId": "get_script",
+                "summary": "Return the text of a script.",
+                "parameters": [name],
+                "responses": {
+                    "200": _content("The text.", "text/plain"),
+                    "404": {"description": "There is no script of this name."},
+                    **COMMON_RESPONSES,
+                },
+            },
+            "post": {
+                "operationId": "save_script",
+                "summary": "Save a valid script under a new name in the folder of `--programs`.",
+                "parameters": [name],
+                "requestBody": text,
+                "responses": {
+                    "204": {"description": "The script is saved."},
+                    "409": _content("It cannot be saved, and why.", "text/plain"),
+                    "422": _content("It is not a valid script, and why.", "text/plain"),
+                    **COMMON_RESPONSES,
+                },
+            },
+        },
+        "script.schema.json": _document(
+            "get_script_schema", "Return the JSON Schema of scripts.", "application/schema+json"
+        ),
+    }
+
+
+def _recordings() -> dict[str, Any]:
+    """Describe the paths of recordings and episodes, by path."""
+    times = [
+        _query("last", "Time before the present [s].", type="number"),
+        _query("from", "Begin [s since the epoch].", type="number"),
+        _query("to", "End [s since the epoch].", type="number"),
+    ]
+    number = {"name": "number", "in": "path", "required": True, "schema": {"type": "integer"}}
+    json = {"required": True, "content": {"application/json": {"schema": _OBJECT}}}
+    common = {"404": {"description": "There is no such recording here."}, **COMMON_RESPONSES}
+    made = {"409": _content("Nothing was recorded, and why.", "text/plain"), **common}
+    return {
+        "recording": {
+            "get": {
+                "operationId": "download_recording",
+                "summary": "Download what was recorded, at most ten minutes of motion.",
+                "parameters": times,
+                "responses": {"200": _content("An MCAP file.", "application/octet-stream"), **made},
+            }
+        },
+        "recording/script": {
+            "get": {
+                "operationId": "download_recording_script",
+                "summary": "Download a script that runs the recorded motion again.",
+                "parameters": times,
+                "responses": {"200": _content("The script.", "application/yaml"), **made},
+            }
+        },
+        "episodes": {
+            "get": {
+                "operationId": "list_episodes",
+                "summary": "List the episodes, and the one that runs.",
+                "responses": {"200": _json_response("The lists.", _OBJECT), **common},
+            },
+            "post": {
+                "operationId": "change_episodes",
+                "summary": "Start, end, judge or change an episode.",
+                "requestBody": json,
+                "responses": {
+                    "200": _json_response("The episode.", _OBJECT),
+                    "409": _response("The request is refused at present.", answers.Refused),
+                    "422": _response("The request is invalid.", answers.Refused),
+                    **common,
+                },
+            },
+        },
+        "episodes/{number}": {
+            "get": {
+                "operationId": "download_episode",
+                "summary": "Download an episode.",
+                "parameters": [number],
+                "responses": {
+                    "200": _content("An MCAP file.", "application/octet-stream"),
+                    **common,
+                },
+            }
+        },
+    }
+
+
+def _documents() -> dict[str, Any]:
+    """Describe the paths of the documents about the API, by path."""
+    return {
+        "openapi.json": _document("get_openapi", "Return this document.", "application/json"),
+        "asyncapi.json": _document(
+            "get_asyncapi",
+            "Return the AsyncAPI document of the websocket and the TCP port.",
+            "application/json",
+        ),
+    }
+
+
+def _document(operation: str, about: str, media: str) -> dict[str, Any]:
+    responses = {"200": _content("The document.", media)}
+    return {"get": {"operationId": operation, "summary": about, "responses": responses}}
+
+
+def _upload(media: str, kept: type) -> dict[str, Any]:
+    """Describe an upload of type ``media`` that is answered with ``kept``."""
+    return {
+        "requestBody": {
+            "required": True,
+            "content": {media: {"schema": {"type": "string", "format": "binary"}}},
+        },
+        "responses": {
+            "200": _response("The file is kept.", kept),
+            "422": _response("The file cannot be read.", answers.Refused),
+            "413": {"description": "The file is too large."},
+            **COMMON_RESPONSES,
+            **NOT_READY,
+        },
+    }
+
+
+_OBJECT = {"type": "object"}
+
+
+def _reference(kind: type) -> dict[str, str]:
+    return {"$ref": f"#/components/schemas/{kind.__name__}"}
+
+
+def _response(description: str, kind: type) -> dict[str, Any]:
+    return _json_response(description, _reference(kind))
+
+
+def _json_response(description: str, schema: Any) -> dict[str, Any]:
+    return {"description": description, "content": {"application/json": {"schema": schema}}}
+
+
+def _content(description: str, media: str) -> dict[str, Any]:
+    """Describe a response that is a text or a file of type ``media``."""
+    return {"description": description, "content": {media: {"schema": {"type": "string"}}}}
+
+
+def _query(
+    name: str, description: str, *, required: bool = False, type: str = "string", **schema: Any
+) -> dict[str, Any]:
+    return {
+        "name": name,
+        "in": "query",
+        "required": required,
+        "schema": {"type": type, **schema},
+        "description": description,
+    }

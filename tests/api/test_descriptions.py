@@ -1,0 +1,214 @@
+"""Check the OpenAPI and AsyncAPI documents: by validators, and by the messages of a server."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from katana450.extensions.api_description.asyncapi import asyncapi_json
+from katana450.extensions.api_description.messages import every_request, kinds
+from katana450.extensions.api_description.openapi import openapi_json
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import tag_of
+from tests.api.test_documented import ADDED
+from tests.browser.server import RECORDING_APP, AppServer
+from tests.exchange.tools import ASYNCAPI_PARSER, OPENAPI_VALIDATOR, needs, needs_package, run
+from tests.gateway.client import ask
+from tests.gateway.lines import Lines
+
+HOST = "127.0.0.1:8080"
+
+PARSE = """
+globalThis.self = globalThis.window = globalThis;
+const fs = require("fs"), { default: Parser } = { default: require(process.argv[1]) };
+new (Parser.default ?? Parser.Parser ?? Parser)().parse(fs.readFileSync(process.argv[2], "utf8"))
+  .then(({ diagnostics, document }) => console.log(JSON.stringify({
+    diagnostics: diagnostics.map(({ severity, code, message }) => ({ severity, code, message })),
+    operations: document?.operations().all().length ?? 0,
+  })));
+"""
+
+
+@cache
+def openapi() -> dict[str, Any]:
+    described: dict[str, Any] = json.loads(openapi_json(ADDED))
+    return described
+
+
+@cache
+def asyncapi() -> dict[str, Any]:
+    described: dict[str, Any] = json.loads(asyncapi_json(ADDED, HOST, secure=False))
+    return described
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer((*RECORDING_APP, "--no-idle-planning", "--lines", "0")) as server:
+        yield server
+
+
+def resolved(document: dict[str, Any], reference: str) -> Any:
+    """Return what a reference such as ``#/a/b`` leads to, through further references."""
+    found: Any = document
+    for name in reference.removeprefix("#/").split("/"):
+        found = found[name]
+    return resolved(document, found["$ref"]) if "$ref" in found else found
+
+
+@pytest.mark.parametrize("document", [openapi(), asyncapi()], ids=["OpenAPI", "AsyncAPI"])
+def test_every_reference_leads_somewhere(document: dict[str, Any]) -> None:
+    references = set(re.findall(r'"\$ref": "([^"]+)"', json.dumps(document)))
+    assert len(references) > 30
+    for reference in references:
+        assert resolved(document, reference)
+
+
+def test_every_operation_of_openapi_has_a_name_of_its_own() -> None:
+    operations = [each for path in openapi()["paths"].values() for each in path.values()]
+    names = [each["operationId"] for each in operations]
+    assert len(names) > 20
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[a-z_]+", name) for name in names)
+    assert openapi()["servers"][0]["url"] == "/"
+
+
+def test_fields_are_described_with_their_units() -> None:
+    for document in (openapi(), asyncapi()):
+        schemas = document["components"]["schemas"]
+        assert schemas["Margins"]["properties"]["limits"]["description"].count("[rad]")
+        assert schemas["Joint"]["properties"]["value"]["description"].startswith("Target [rad]")
+        assert "Attributes" not in json.dumps(schemas)
+
+
+def test_every_request_is_an_operation_of_asyncapi_with_its_answers() -> None:
+    operations = asyncapi()["operations"]
+    for kind in every_request(ADDED):
+        for channel in ("socket", "lines"):
+            name = f"{channel}_{tag_of(kind.__name__)}"
+            if (channel, kind) == ("socket", requests.Hello):
+                assert name not in operations
+                continue
+            operation = operations[name]
+            assert operation["action"] == "receive"
+            (message,) = operation["messages"]
+            payload = resolved(asyncapi(), message["$ref"])["payload"]["$ref"]
+            assert payload.endswith(f"/{kind.__name__}")
+            replies = [each["$ref"].rpartition("/")[2] for each in operation["reply"]["messages"]]
+            assert replies[-1] == "Refused"
+            assert set(replies) <= {each.__name__ for each in kinds(answers.AnyAnswer)}
+
+
+def checked(message: dict[str, Any]) -> str:
+    """Return the name of a message that fits the AsyncAPI schema of its name."""
+    message = dict(message)
+    name = next(
+        each.__name__ for each in kinds(answers.AnyAnswer) if tag_of(each.__name__) == message["is"]
+    )
+    schema = {"$ref": f"#/components/schemas/{name}", "components": asyncapi()["components"]}
+    jsonschema.Draft7Validator(schema).validate(message)
+    return name
+
+
+def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
+    lines, seen = Lines(server), set()
+    with lines.socket, lines.reader:
+        lines.say(do="hello", name="Schemas")
+        seen.add(checked(lines.hear()))
+        asked: list[dict[str, Any]] = [
+            *({"do": "query", "at": each} for each in ("state", "arm", "objects", "world", "loop")),
+            *({"do": "query", "at": each} for each in ("links", "branches", "event_log")),
+            {"do": "get", "node": "tcp", "field": "translation"},
+            {"do": "heartbeat"},
+            {"do": "list_people"},
+            {"do": "joint", "axis": 5, "value": 40},
+            {"do": "joint", "axis": 9, "value": 0},
+        ]
+        for request in asked:
+            seen.add(checked(lines.answer(**request)))
+    assert seen == {kind.__name__ for kind in kinds(answers.AnyAnswer)} - {"Mesh", "Scene"}
+    with pytest.raises(jsonschema.ValidationError):
+        checked({"is": "echo", "n": "one"})
+    # A pose is four rows of four numbers in draft 7 too.
+    schema = {"$ref": "#/components/schemas/Pose", "components": asyncapi()["components"]}
+    pose = {"do": "pose", "T": [[1, 0, 0, 0.4], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
+    jsonschema.Draft7Validator(schema).validate(pose)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft7Validator(schema).validate({**pose, "T": [[1, 0, 0, 0.4]]})
+
+
+def test_a_server_describes_all_its_paths_and_its_address(server: AppServer) -> None:
+    served = json.loads(ask(f"{server.url}/api/v1/openapi.json")[2])
+    assert served["paths"] == openapi()["paths"]
+    described = json.loads(ask(f"{server.url}/api/v1/asyncapi.json")[2])
+    assert described["servers"]["socket"]["host"] == f"127.0.0.1:{server.port}"
+    assert described["servers"]["socket"]["protocol"] == "ws"
+    assert described["operations"] == asyncapi()["operations"]
+
+
+def test_every_path_in_the_code_is_described() -> None:
+    app = Path(requests.__file__).parents[2]
+    found = {
+        name
+        for file in app.rglob("*.py")
+        for name in re.findall(
+            r'Route\(f"\{ROOT\}/([^"]+)"',
+            file.read_text(encoding="utf-8").replace("{{", "{").replace("}}", "}"),
+        )
+    }
+    found = {name.replace("{number:int}", "{number}") for name in found} - {"socket", "{subject}"}
+    paths = {path.removeprefix("/api/v1/") for path in openapi()["paths"]}
+    # The page alone asks for its address for a phone.
+    assert found - paths == {"phone"}
+    assert {"do", "stop", "episodes/{number}", "scripts/{name}"} <= found
+
+
+def test_paths_of_a_missing_extension_are_not_described() -> None:
+    some = frozenset({"/api/v1/do", "/api/v1/scripts/{name}", "/api/v1/episodes{rest:path}"})
+    paths = json.loads(openapi_json((), some))["paths"]
+    assert {path.removeprefix("/api/v1/") for path in paths} == {
+        *("do", "scripts", "scripts/{name}", "episodes", "episodes/{number}"),
+    }
+
+
+@pytest.mark.long
+@needs_package(ASYNCAPI_PARSER)
+@needs("node")
+def test_parser_of_asyncapi_finds_nothing(tmp_path: Path) -> None:
+    """It recommends the newest version of AsyncAPI, and mentions no more."""
+    parser, file = ASYNCAPI_PARSER.file, tmp_path / "asyncapi.json"
+    assert parser is not None
+    file.write_text(json.dumps(asyncapi()), encoding="utf-8")
+    found = json.loads(run("node", "-e", PARSE, parser, file))
+    assert {each["code"] for each in found["diagnostics"]} <= {"asyncapi-latest-version"}
+    assert found["operations"] == len(asyncapi()["operations"])
+    broken = {**asyncapi(), "operations": {"x": {"action": "shout"}}}
+    file.write_text(json.dumps(broken), encoding="utf-8")
+    found = json.loads(run("node", "-e", PARSE, parser, file))
+    assert any(each["severity"] == 0 for each in found["diagnostics"])
+
+
+@pytest.mark.long
+@needs_package(OPENAPI_VALIDATOR)
+def test_validator_of_openapi_finds_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "openapi.json"
+    for document, status in ((openapi(), 0), ({**openapi(), "paths": {"x": {"get": 3}}}, 1)):
+        file.write_text(json.dumps(document), encoding="utf-8")
+        done = subprocess.run(
+            [sys.executable, "-m", "openapi_spec_validator", str(file)],
+            env=os.environ | {"PYTHONPATH": str(OPENAPI_VALIDATOR.folder)},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60.0,
+        )
+        assert done.returncode == status, done.stdout + done.stderr
