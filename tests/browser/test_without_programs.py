@@ -8,14 +8,15 @@ from pathlib import Path
 import pytest
 
 from tests.browser.conftest import OpenPage
-from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.session import bar, mood, take
 from tests.extensions.environments import without
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[AppServer]:
-    command = (*ATTENTIVE_APP, "--silence", "2.0")
+    # Recording needs programs too, so its options are missing.
+    command = (*RECORDING_APP, "--strict-silence", "--silence", "2.0")
     with without(tmp_path, "programs"), AppServer(command) as server:
         yield server
 
