@@ -238,6 +238,7 @@ def test_intended_contact_hides_no_other_one(session: Session, state: State) -> 
     assert world is not None
     while (nearest := world.nearest(np.append(q, 0.0))) is not None and nearest.distance > -1e-3:
         q[1] += 0.002
+    assert nearest is not None
     assert "table" in nearest.parts
     arm = next(name for name in nearest.parts if name != "table")
     # Turned about the vertical axis it touches the table in the same way.

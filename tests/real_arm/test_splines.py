@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
 from katana450.extensions.real_arm.encoders import EncoderMap
 from katana450.extensions.real_arm.splines import (
+    LARGEST,
     SEGMENT_TICKS,
     TICK,
     SplineSegment,
@@ -143,9 +144,9 @@ def test_no_coefficient_overflows(
         goal = np.clip(target, MAP.lower, MAP.upper)
         segments.append(joined(segments[-1].end, goal, np.array(final, float)))
     for segment in segments:
-        ends = segment.end.position
-        if (np.abs(ends) < 32768).all():
-            assert SendSplines(segment.axes(), More.START).payload
+        assert (np.abs(segment.end.position) <= LARGEST + 1).all()
+        # Raises InputError for a number beyond 16 bits.
+        assert SendSplines(segment.axes(), More.START).payload
 
 
 def test_still_setpoints_end_at_rest() -> None:

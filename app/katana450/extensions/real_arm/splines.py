@@ -39,6 +39,9 @@ MAX_SPEED_CHANGE = 300
 MAX_DEVIATION = 100
 """[encoders] Maximum difference between a travel and its mean speed, so that p2 and p3 fit."""
 
+LARGEST = 32_000
+"""[encoders] Distance from 0 that no polynomial exceeds. The limits of all axes are 31000."""
+
 LONGEST_GAP = 1.5 * TICK
 """[s] Time between setpoints after which the second one begins a motion if it differs."""
 
@@ -94,9 +97,16 @@ def joined(start: SplineKnot, position: FloatArray, speed: FloatArray) -> Spline
     change = MAX_SPEED_CHANGE * SPEED_UNIT
     wanted = np.rint(speed * SPEED_UNIT).astype(np.int64)
     v1 = np.clip(wanted, start.speed - change, start.speed + change)
+    # So slow that the axis can stop within the segment after this one, before its numbers end.
+    half = SEGMENT_TICKS // 2
+    ahead = SPEED_UNIT * start.position + half * start.speed
+    least, most = ((SPEED_UNIT * end - ahead) // SEGMENT_TICKS for end in (-LARGEST, LARGEST))
+    v1 = np.clip(v1, least, most)
     mean = (start.speed + v1) * SEGMENT_TICKS // (2 * SPEED_UNIT)
     m = np.rint(position).astype(np.int64) - start.position
     m = np.clip(m, mean - MAX_DEVIATION, mean + MAX_DEVIATION)
+    stop = start.position + half * v1 // SPEED_UNIT
+    m = np.clip(m, -LARGEST - stop, LARGEST - stop)
     return SplineSegment(start, SplineKnot(start.position + m, v1))
 
 
@@ -154,6 +164,8 @@ class SplineStream:
         if not self._times or self._times[-1] < self._end + TICK / 2:
             return None
         position, speed = self._at(self._end)
+        # Between setpoints that leap, the parabola may be faster than any axis.
+        speed = np.clip(speed, -self._max_speed, self._max_speed)
         segment = joined(self._knot, position, speed)
         self._knot = segment.end
         self._end += SEGMENT_TIME

@@ -1,0 +1,171 @@
+"""Figures that the documents of the arm state: times of a stop, rates, retries, the plant."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+import socket
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_report import ArmMode
+from katana450.extensions.real_arm.codec.requests import More, SendSplines
+from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
+from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from katana450.extensions.real_arm.link.transport import LinkLostError, Transport
+from katana450.extensions.real_arm.plant.profile import KATANA450, STIFF
+from katana450.extensions.real_arm.splines import SplineStream
+from katana450.maths.geometry.arrays import FloatArray
+from tests.conftest import LONG
+from tests.real_arm.control_loop import SmallLoop
+from tests.real_arm.paper_arm import ENDS, JOINTS, MAP
+from tests.real_arm.small_firmware import SmallFirmware
+from tests.real_arm.test_driver import PaperServer
+from tests.real_arm.test_programs_with_emulator import PERIOD, EmulatorOnPaper
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def moving(delay: float, seconds: float) -> tuple[EmulatorOnPaper, float, list[float]]:
+    """Return the emulated arm amid a motion, the time, and the times of its positions."""
+    emulator = EmulatorOnPaper(JOINTS, delay, 0.0)
+    t, times = 0.0, []
+    while t < seconds:
+        size = 0.35 * (1.0 - math.cos(1.6 * t))
+        joints = JOINTS + size * np.array([1.0, -0.8, 0.5, 1.0, 1.0, 0.0])
+        emulator.machine.steer(joints, t, stopped=False)
+        emulator.advance(t)
+        times.append(emulator.machine.arm.t)
+        t += PERIOD
+    assert emulator.machine.mode is ArmMode.MOVING, emulator.machine.note
+    return emulator, t, times
+
+
+@pytest.mark.parametrize(("delay", "least", "most"), [(1e-3, 0.05, 0.2), (0.045, 0.3, 0.45)])
+def test_stop_of_the_emulated_arm_takes_the_stated_time(
+    delay: float, least: float, most: float
+) -> None:
+    emulator, t, _ = moving(delay, 1.0)
+    stop = None
+    while stop is None and t < 3.0:
+        emulator.machine.steer(JOINTS, t, stopped=True)
+        emulator.advance(t)
+        report = emulator.machine.answer().report
+        assert report is not None
+        stop = report.measured_stop
+        t += PERIOD
+    assert stop is not None
+    assert least < stop.time < most
+    assert stop.angle > 0.0
+
+
+def test_positions_come_four_times_a_second_with_replies_of_40_milliseconds() -> None:
+    _, _, times = moving(0.04, 5.0)
+    found = sorted({t for t in times if t > 1.0})
+    rate = (len(found) - 1) / (found[-1] - found[0])
+    assert 3.5 < rate < 8.0
+    assert max(b - a for a, b in itertools.pairwise(found)) < 0.35
+
+
+@settings(max_examples=300 if LONG else 40)
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0), st.floats(0.005, 0.06))
+def test_no_stream_of_setpoints_overflows_a_coefficient(
+    seed: int, wild: float, longest: float
+) -> None:
+    """Setpoints leap anywhere within the limits, at irregular times."""
+    rng = np.random.default_rng(seed)
+    stream = SplineStream(MAP.encoders(JOINTS).astype(int), MAP.speed)
+    place = MAP.encoders(JOINTS)
+    t, count = 0.0, 0
+    for _ in range(150):
+        t += float(rng.uniform(0.001, longest))
+        if rng.random() < wild:
+            place = np.where(rng.random(6) < 0.5, MAP.lower, MAP.upper).astype(float)
+        stream.add(t, place)
+        while (segment := stream.cut()) is not None:
+            count += 1
+            # Raises InputError for a number beyond 16 bits.
+            packet = SendSplines(segment.axes(), More.START)
+            assert len(packet.payload) == 75
+            numbers = np.frombuffer(packet.payload[1:73], ">i2").reshape(6, 6)
+            assert (numbers[:, 1] == segment.end.position).all()
+    assert count > 0 or t < 0.1
+
+
+def rows_of_plant() -> dict[str, tuple[str, str]]:
+    text = (DOCS / "arm-emulator.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([^|]+?) \| ([^|]+?) \| ([^|]+?) \| [^|]+ \|$", text, re.MULTILINE)
+    return {name: (one, other) for name, one, other in rows}
+
+
+def number(text: str) -> float:
+    found = re.match(r"[-\d.]+", text)
+    assert found, text
+    return float(found[0])
+
+
+@pytest.mark.parametrize(
+    ("row", "field", "factor"),
+    [
+        ("natural frequency of the position control", "bandwidth", 1.0),
+        ("damping ratio", "damping", 1.0),
+        ("delay", "delay", 1e3),
+        ("Coulomb friction", "coulomb", 1.0),
+        ("viscous friction", "viscous", 1.0),
+        ("droop of the stretched arm", "droop", math.degrees(1.0)),
+        ("backlash", "backlash", math.degrees(1.0)),
+        ("acceleration of an axis that falls", "fall", 1.0),
+        ("largest acceleration, as a multiple of the arm's limit", "reserve", 1.0),
+    ],
+)
+def test_table_of_the_plant_has_its_numbers(row: str, field: str, factor: float) -> None:
+    for text, profile in zip(rows_of_plant()[row], (KATANA450, STIFF), strict=True):
+        assert number(text) == pytest.approx(factor * getattr(profile, field)), (row, text)
+
+
+def test_friction_of_the_plant_leaves_an_axis_within_the_stated_angle() -> None:
+    stated = re.search(r"within ([\d.]+)° of its setpoint", (DOCS / "arm-emulator.md").read_text())
+    assert stated
+    left = math.degrees(KATANA450.coulomb / KATANA450.bandwidth**2)
+    assert left == pytest.approx(float(stated[1]), abs=5e-4)
+
+
+@pytest.mark.long
+def test_lost_arm_is_connected_to_again_after_a_quarter_to_two_seconds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    tries: list[float] = []
+    opened = ArmUrl.open
+
+    def noted(url: ArmUrl) -> Transport:
+        tries.append(time.perf_counter())
+        if len(tries) > 1:
+            raise LinkLostError("The cable is out.")
+        return opened(url)
+
+    monkeypatch.setattr(ArmUrl, "open", noted)
+    paper = PaperServer()
+    loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", port), ENDS, JOINTS))
+    try:
+        with SmallFirmware(paper.answer, port):
+            loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
+            paper.faults = [(None,)]
+            loop.wait(ArmMode.LOST)
+            lost = time.perf_counter()
+            time.sleep(8.5)
+    finally:
+        loop.end()
+    gaps: FloatArray = np.diff([lost, *tries[1:]])
+    for gap, stated in zip(gaps, (0.25, 0.5, 1.0, 2.0, 2.0), strict=False):
+        # A busy machine may delay a thread.
+        assert stated - 0.1 < gap < stated + 0.5
+    assert len(gaps) >= 4
