@@ -33,7 +33,7 @@ export class Rumble {
 // tells of contacts and limits, the strong one of a grip whose force was `old` when it was felt last.
 function felt(before, state, old) {
   const has = ({ findings }, reason) => findings.some((each) => each.reason === reason);
-  if (has(state, "slipped") && !has(before, "slipped")) return SLIP;
+  if (["sliding", "slipped"].some((reason) => has(state, reason) && !has(before, reason))) return SLIP;
   const force = strength(state);
   if (force > old + STEP) return { duration: SQUEEZE, weak: 0.2, strong: Math.min(1, 0.2 + 0.8 * force) };
   if (state.touching.length > before.touching.length) return TOUCH;

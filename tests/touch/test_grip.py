@@ -15,9 +15,10 @@ from katana450.arm.control.restart import restarted
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
+from katana450.arm.control.support import SUPPORT_GAP
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.touch.held_load import DENSITY, FRICTION, mass
+from katana450.extensions.touch.held_load import DENSITY, FRICTION, SLIDING_RESISTANCE, mass
 from katana450.extensions.touch.pad import pads_of
 from katana450.extensions.touch.squeeze import FORCE_LIMIT
 from katana450.extensions.touch.touch_model import TouchModel
@@ -133,46 +134,115 @@ def test_impossible_forces_are_refused(session: Session, model: TouchModel, hold
         model.squeeze_for(run(session, holding, cmd.SetGripper(OPEN)), 1.0)
 
 
-def test_weak_grip_lets_the_cup_slip_when_it_is_lifted(
+def slides(state: State) -> bool:
+    return any(each.reason is Reason.SLIDING for each in state.findings)
+
+
+def height_in_hand(session: Session, state: State) -> float:
+    """Return the height of the held cup above the middle of the palm [m]."""
+    assert state.held is not None
+    x = state.x_setpoint
+    palm = session.environment.into_hand(np.eye(4), x)
+    in_base: float = session.environment.pose(state.held, x)[2, 3]
+    return in_base - float(se3.inverse(palm)[2, 3])
+
+
+def test_weak_grip_lets_the_cup_slide_down_to_the_table(
     session: Session, arm: MountedArm, model: TouchModel, holding: State
 ) -> None:
     (cup,) = (each for each in holding.objects if each.held)
     weight = mass(cup, holding, {"cup": 0.0614}) * GRAVITY
     needed = weight / (2.0 * FRICTION)
     firm = lifted(session, arm, gripped_with(session, model, holding, 1.1 * needed), 0.04)
-    assert firm.held is not None
+    assert not slides(firm)
     weak = gripped_with(session, model, holding, 0.9 * needed)
     # The table carries the cup until the arm lifts it.
-    assert weak.held is not None
-    states = [weak]
-    after = lifted(session, arm, weak, 0.04)
-    assert after.held is None
-    assert (after.grip, after.squeeze) == (None, 0.0)
-    (slipped,) = after.findings
-    assert slipped.reason is Reason.SLIPPED
-    assert slipped.amount == pytest.approx(weight, rel=0.05)
-    assert sentence(after).startswith("Cup slipped out of the fingers under a load of 0.6 N")
-    (stands,) = (each for each in after.objects if each.name == "cup")
-    assert stands.T[2, 3] == 0.0
-    (logged,) = entries_between(states[0], after)
+    assert not slides(weak)
+    begun = height_in_hand(session, weak)
+    after = lifted(session, arm, weak, 0.015)
+    assert slides(after)
+    (sliding,) = after.findings
+    assert sliding.amount == pytest.approx(weight, rel=0.05)
+    assert sentence(after).startswith("Cup slides in the fingers under a load of 0.6 N")
+    (logged,) = entries_between(weak, after)
     assert logged.began
-    assert logged.finding is slipped
-    opened = run(session, after, cmd.SetGripper(OPEN))
+    assert height_in_hand(session, after) < begun - 1e-3
+    # At rest it slides as fast as a tenth of its weight says.
+    later = after
+    for _ in range(50):
+        later = session.step(later, (), later.t + 0.01)
+    fell = height_in_hand(session, after) - height_in_hand(session, later)
+    assert fell == pytest.approx(0.5 * 0.1 * weight / SLIDING_RESISTANCE, rel=0.05)
+    assert entries_between(after, later) == ()
+    while slides(later):
+        later = session.step(later, (), later.t + 0.05)
+        assert later.t < after.t + 60.0
+    # It stands on the table again, still between the fingers.
+    assert later.held is not None
+    assert later.findings == ()
+    height = session.environment.pose(later.held, later.x_setpoint)[2, 3]
+    assert 0.0 <= height <= SUPPORT_GAP
+    (ended,) = entries_between(after, later)
+    assert not ended.began
+
+
+def test_firm_grip_ends_a_slide(
+    session: Session, arm: MountedArm, model: TouchModel, holding: State
+) -> None:
+    (cup,) = (each for each in holding.objects if each.held)
+    needed = mass(cup, holding, {"cup": 0.0614}) * GRAVITY / (2.0 * FRICTION)
+    after = lifted(session, arm, gripped_with(session, model, holding, 0.8 * needed), 0.04)
+    assert slides(after)
+    held = run(session, after, cmd.SetGripper(-0.44))
+    assert not slides(held)
+    still = session.step(held, (), held.t + 0.01)
+    assert still.held is held.held
+
+
+def test_cup_slides_out_of_the_fingers_and_falls(
+    session: Session, arm: MountedArm, model: TouchModel, holding: State
+) -> None:
+    high = lifted(session, arm, holding, 0.11)
+    assert not slides(high)
+    state = gripped_with(session, model, high, 0.1)
+    lowest = height_in_hand(session, state)
+    began = state.t
+    while state.held is not None:
+        height = height_in_hand(session, state)
+        assert height <= lowest
+        lowest = height
+        state = session.step(state, (), state.t + 0.02)
+        assert state.t < began + 20.0
+    # Its weight is 0.6 N, of which the fingers hold 0.16 N while their pads are on it.
+    assert state.t - began > 1.0
+    assert (state.grip, state.squeeze) == (None, 0.0)
+    (slipped,) = state.findings
+    assert slipped.reason is Reason.SLIPPED
+    assert sentence(state).startswith("Cup slipped out of the fingers under a load of 0.6 N")
+    (stands,) = (each for each in state.objects if each.name == "cup")
+    assert stands.T[2, 3] == 0.0
+    opened = run(session, state, cmd.SetGripper(OPEN))
     assert opened.findings == ()
 
 
-def test_acceleration_pulls_a_held_cup_out_of_the_fingers(
+def test_acceleration_makes_a_held_cup_slide_until_it_ends(
     session: Session, arm: MountedArm, model: TouchModel, holding: State
 ) -> None:
     (cup,) = (each for each in holding.objects if each.held)
     weight = mass(cup, holding, {"cup": 0.0614}) * GRAVITY
     up = lifted(session, arm, gripped_with(session, model, holding, 0.65 * weight), 0.06)
     assert up.held is not None
-    shaken = session.step(up, [cmd.SetJoint(3, up.q[3] + 0.5)], up.t + 0.01)
-    while shaken.moving and shaken.held is not None:
-        shaken = session.step(shaken, (), shaken.t + 0.01)
-    assert shaken.held is None
-    assert shaken.findings[0].amount > 1.02 * weight
+    assert not slides(up)
+    loads, state = [], session.step(up, [cmd.SetJoint(3, up.q[3] + 0.5)], up.t + 0.01)
+    while state.moving:
+        loads += [each.amount for each in state.findings if each.reason is Reason.SLIDING]
+        state = session.step(state, (), state.t + 0.01)
+    assert loads
+    assert min(loads) > 1.02 * weight
+    assert state.held is not None
+    assert not slides(state)
+    slid = np.linalg.norm(state.held.T[:3, 3] - up.held.T[:3, 3])
+    assert 1e-5 < slid < 0.01
 
 
 def test_mass_follows_from_the_cup_with_its_water_or_from_the_volume(

@@ -52,12 +52,13 @@ def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -
 
     path = record_session(tmp_path / "slip.mcap", 320, commands)
     assert len({state.squeeze for state in seen}) == 3
-    assert seen[-1].held is None
-    assert any(each.reason is Reason.SLIPPED for each in seen[-1].findings)
+    sliding = [s for s in seen if any(each.reason is Reason.SLIDING for each in s.findings)]
+    places = {s.held.T.tobytes() for s in sliding if s.held is not None}
+    assert len(places) == len(sliding) > 20, "it slides in each tick"
     with RecordingFile.open(path) as file:
         result = verify_recording(file, fresh().session)
     assert result.identical, result
-    assert result.ticks > 250
+    assert result.ticks > 150
 
 
 def test_touch_is_read_by_name(

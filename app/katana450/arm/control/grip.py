@@ -1,4 +1,4 @@
-"""Contact of the fingers: an object between both is held, until they open or it slips."""
+"""Contact of the fingers: an object between both is held, until they open or it slides out."""
 
 from __future__ import annotations
 
@@ -22,23 +22,37 @@ RELEASE_TURN, RELEASE_SLIDE = 0.02, 1e-3
 """[rad, m] Opening of the fingers from which on an object is free: 1 mm at the pads."""
 
 
-def gripped(environment: Environment, world: CollisionWorld | None, state: State) -> State:
-    """Return ``state`` after the motion of the fingers in this tick."""
+def gripped(
+    environment: Environment, world: CollisionWorld | None, state: State, dt: float
+) -> State:
+    """Return ``state`` after the motion of the fingers in this tick of ``dt`` [s]."""
     hand = environment.hand
     if world is None or hand is None or not (hand.fingers and state.objects):
         return state
     x = state.x_setpoint
-    if state.grip is not None:
+    if (grip := state.grip) is not None:
         opened = RELEASE_SLIDE if hand.slides else RELEASE_TURN
-        if state.gripper_setpoint > state.grip + opened:
+        if state.gripper_setpoint > grip + opened:
             return _let_go(environment, state)
+        if any(finding.reason is Reason.SLIDING for finding in state.findings):
+            state = without_finding(state, Reason.SLIDING)
         # Fingers that open to let the object go need no force.
-        opening = state.gripper_goal > state.grip + opened
+        opening = state.gripper_goal > grip + opened
         load = None if opening or hand.grip_model is None else hand.grip_model.overload(state)
-        if load is None or state.held is None:
+        if load is None or state.held is None or hand.grip_model is None:
             return state
-        slipped = Finding(Reason.SLIPPED, load, parts=(state.held.name, hand.fingers[0]))
-        return replace(_let_go(environment, state), findings=(slipped, *state.findings))
+        held, slid = state.held, hand.grip_model.slid(state, dt)
+        found = Finding(
+            Reason.SLIPPED if slid is None else Reason.SLIDING,
+            load,
+            parts=(held.name, hand.fingers[0]),
+        )
+        if slid is None:
+            state = _let_go(environment, state)
+        else:
+            objects = tuple(slid if each is held else each for each in state.objects)
+            state = replace(state, objects=objects)
+        return replace(state, findings=(found, *state.findings))
     if state.gripper_goal >= state.gripper_setpoint:
         return (
             without_finding(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state

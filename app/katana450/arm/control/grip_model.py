@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
+    from katana450.arm.control.scene_objects import SceneObject
     from katana450.arm.control.state import State
 
 
@@ -13,7 +14,13 @@ class GripModel(Protocol):
     """Forces between the fingers and the object that they hold. All methods are pure."""
 
     def overload(self, state: State) -> float | None:
-        """Return the load [N] that pulls the held object out of the fingers; None if they hold."""
+        """Return the load [N] under which the held object slides; None if the fingers hold it."""
+
+    def slid(self, state: State, dt: float) -> SceneObject | None:
+        """Return the held object after it has slid for ``dt`` [s]; None if it leaves the fingers.
+
+        ``state`` has an overload.
+        """
 
     def report(self, state: State) -> Mapping[str, Any]:
         """Return forces, pressures and sensor values of ``state`` for the answer to a query."""

@@ -111,6 +111,10 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.PITCH_CHANGED: lambda f: f"pitch gives way by {_short(math.degrees(f.amount))}°",
     Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
     Reason.LOPSIDED: _lopsided,
+    Reason.SLIDING: lambda f: (
+        f"{part((f.parts or ('the object',))[0])} slides in the fingers under a load of "
+        f"{_short(f.amount)} N: grip it with more force, or move more slowly"
+    ),
     Reason.SLIPPED: lambda f: (
         f"{part((f.parts or ('the object',))[0])} slipped out of the fingers under a load of "
         f"{_short(f.amount)} N: open the gripper, then grip it with more force"

@@ -209,7 +209,7 @@ class Session:
         if state.mode is IDLE and state.motion.at_rest and state.goal is not state.setpoint:
             # A brake can end one rounding beside its predicted end.
             state = replace(state, goal=state.setpoint)
-        state = gripped(self.environment, self.world_at(state), state)
+        state = gripped(self.environment, self.world_at(state), state, dt)
         if self.pouring is not None and state.poured is not None:
             x = state.x_setpoint
             state = replace(state, poured=self.pouring.step(state.poured, state.objects, x, dt))

@@ -70,6 +70,7 @@ class Reason(Enum):
     ROLL_CHANGED = "roll changed"
     NOT_AT_START = "not at the start"
     LOPSIDED = "one finger only"
+    SLIDING = "sliding"
     SLIPPED = "slipped"
     INTERNAL = "internal error"
     RESTARTED = "restarted"
@@ -116,7 +117,7 @@ class Finding:
             stop, the travel of the tool, or else of any link, until rest [m]; for a plan, the
             distance of the arm from its start [rad]; for silence and lateness, the time [s]; for a
             tracking error and a measured stop, the angle of a joint [rad]; for an object that
-            slipped, its load [N].
+            slides or has slipped, its load [N].
         axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
         parts: the two links or objects that the finding concerns; None if it concerns none.
         time: for a stop, the time until rest [s].

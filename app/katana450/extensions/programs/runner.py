@@ -115,7 +115,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     try:
         if run.blocked > ACTION_TIMEOUT:
             raise InputError(f"The path is still blocked: {_met(state)} would collide.")
-        if run.held and state.held is None:
+        if run.held:
             _check_slip(state)
         done = task.action.done(state, run.waited)
         more: tuple[cmd.Command, ...] = ()
@@ -187,9 +187,9 @@ def skipped(program: Program, run: Run) -> tuple[int, ...]:
 
 
 def _check_slip(state: State) -> None:
-    """Raise InputError if the object that the fingers held has slipped out of them."""
+    """Raise InputError if the object that the fingers held slides, or has slipped out of them."""
     for finding in state.findings:
-        if finding.reason is Reason.SLIPPED:
+        if finding.reason in (Reason.SLIDING, Reason.SLIPPED):
             raise InputError(f"{finding_text(finding)}.")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
-from katana450.arm.control.support import SUPPORT_GAP, surface_below
+from katana450.arm.control.support import surface_below
 from katana450.extensions.touch.solid_body import body_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import FEMTOLITRE
@@ -21,6 +21,13 @@ FRICTION = 0.8
 DENSITY = 500.0
 """[kg/m^3] Density of an object of unknown mass: light wood, or a printed part that is not solid.
 Assumed."""
+
+SLIDING_RESISTANCE = 20.0
+"""[N s/m] Growth of the friction with the speed of an object that slides. Assumed: the friction of
+rubber grows with speed, and the cup, held by almost no force, slides at 30 mm/s."""
+
+MAX_SLIDING_SPEED = 0.2
+"""[m/s] Maximum speed of an object that slides. Assumed."""
 
 STEP = 1e-3
 """[s] Step of the difference that gives the acceleration."""
@@ -62,16 +69,20 @@ def acceleration(
     return (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2
 
 
-def shear(load: FloatArray, axis: FloatArray) -> float:
-    """Return the part of ``load`` (3,) [N] across ``axis`` (3,), the unit closing direction.
+def along_pads(load: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return the part (3,) of ``load`` (3,) [N] across ``axis`` (3,), the unit closing direction.
 
     The other part presses the object against a finger and needs no friction.
     """
-    return float(np.linalg.norm(load - (load @ axis) * axis))
+    return load - (load @ axis) * axis
 
 
-def is_supported(state: State, held: SceneObject, T_base_object: FloatArray) -> bool:
-    """Return whether the ``held`` object still stands on what is below it."""
+def sliding_speed(excess: float) -> float:
+    """Return the speed [m/s] of an object whose load is beyond its friction by ``excess`` [N]."""
+    return min(max(excess, 0.0) / SLIDING_RESISTANCE, MAX_SLIDING_SPEED)
+
+
+def height_above_support(state: State, held: SceneObject, T_base_object: FloatArray) -> float:
+    """Return the height [m] of the ``held`` object above what would carry it."""
     standing = replace(held, T=T_base_object, held=False)
-    surface = surface_below(state.objects, standing)
-    return bool(T_base_object[2, 3] - surface <= SUPPORT_GAP)
+    return float(T_base_object[2, 3] - surface_below(state.objects, standing))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TypedDict
 
 import numpy as np
 
 from katana450.arm.control.scene_objects import Hand, SceneObject, same
 from katana450.arm.control.state import State
+from katana450.arm.control.support import SUPPORT_GAP
 from katana450.errors import InputError
 from katana450.extensions.touch.foundation import PadPressure
 from katana450.extensions.touch.gripper_sensors import (
@@ -20,9 +22,10 @@ from katana450.extensions.touch.gripper_sensors import (
 from katana450.extensions.touch.held_load import (
     FRICTION,
     acceleration,
-    is_supported,
+    along_pads,
+    height_above_support,
     mass,
-    shear,
+    sliding_speed,
 )
 from katana450.extensions.touch.infrared import InfraredRays
 from katana450.extensions.touch.pad import Pad, pads_of
@@ -30,7 +33,7 @@ from katana450.extensions.touch.solid_body import body_of
 from katana450.extensions.touch.squeeze import FORCE_LIMIT, Squeeze, SqueezedBody
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.units import GRAVITY
 
 UP = np.array((0.0, 0.0, 1.0))
@@ -101,23 +104,51 @@ class TouchModel:
         self._last_sensors: tuple[State, GripperSensors] | None = None
 
     def overload(self, state: State) -> float | None:
-        """Return the load [N] that pulls the held object out of the fingers; None if they hold.
+        """Return the load [N] under which the held object slides; None if the fingers hold it.
 
         The load is the weight and the inertia of the object across the closing direction. They hold
         it by friction: up to FRICTION times the sum of both forces. An object that still stands on
-        its support does not slip, and neither does one that is held beside the pads.
+        its support does not slide, and neither does one that is held beside the pads.
         """
         body, squeeze, held = self._held(state), self.squeeze(state), state.held
         if body is None or squeeze is None or held is None or not body.on_pads:
             return None
-        x = state.x_setpoint
-        T = self._pose(x)
+        load = float(np.linalg.norm(self._pull(state, held, squeeze)))
+        if load <= FRICTION * squeeze.normal_force:
+            return None
+        T = self._pose(state.x_setpoint) @ held.T
+        return None if height_above_support(state, held, T) <= SUPPORT_GAP else load
+
+    def slid(self, state: State, dt: float) -> SceneObject | None:
+        """Return the held object after it has slid for ``dt`` [s]; None if it leaves the pads.
+
+        Friction grows with the speed, so the object slides as fast as the load beyond the friction
+        at rest says, and in the direction of the load. It ends on what carries it.
+        """
+        held, squeeze = state.held, self.squeeze(state)
+        assert held is not None
+        assert squeeze is not None
+        pull = self._pull(state, held, squeeze)
+        load = float(np.linalg.norm(pull))
+        speed = sliding_speed(load - FRICTION * squeeze.normal_force)
+        step = speed * dt / load * pull
+        T = self._pose(state.x_setpoint)
+        room = height_above_support(state, held, T @ held.T)
+        if -step[2] > room:
+            step *= room / -step[2]
+        moved = held.T.copy()
+        moved[:3, 3] += T[:3, :3].T @ step
+        slid = replace(held, T=frozen(moved))
+        objects = tuple(slid if each is held else each for each in state.objects)
+        body = self._held(replace(state, objects=objects))
+        return slid if body is not None and body.on_pads else None
+
+    def _pull(self, state: State, held: SceneObject, squeeze: Squeeze) -> FloatArray:
+        """Return the force (3,) by which weight and inertia pull along the pads [N]."""
         middle = held.T_collision_shape[:3, 3]
         force = acceleration(state, middle, self._pose) + GRAVITY * UP
-        load = shear(mass(held, state, self._masses) * force, T[:3, :3] @ squeeze.axis)
-        if load <= FRICTION * squeeze.normal_force or is_supported(state, held, T @ held.T):
-            return None
-        return load
+        axis = self._pose(state.x_setpoint)[:3, :3] @ squeeze.axis
+        return along_pads(-mass(held, state, self._masses) * force, axis)
 
     def squeeze(self, state: State) -> Squeeze | None:
         """Return the forces on the object that the fingers hold; None with an empty hand."""
