@@ -1,4 +1,4 @@
-"""What the document of the emulator states: speeds, presses, lost connections, random times."""
+"""Speeds, presses, lost connections and random times of the emulator, as documented."""
 
 from __future__ import annotations
 
