@@ -50,7 +50,8 @@ Every request is a heartbeat. If the server requires an access link ([access](ac
 token behind its `#` as `Authorization: Bearer TOKEN` or in the `hello`. The server stops a moving arm
 when the holder of the lease falls silent or disconnects. After a stop nothing moves before a
 `clear_stop` and a new command. A script that the server runs for a program ends at rest once nothing
-is received from that program for 1 s (`--owner-silence`).
+is received from that program for 1 s (`--owner-silence`). A request with `wait` counts as a heartbeat
+[until its motion has ended](#one-line-one-motion).
 
 The answer to a command comes once the arm's process has taken it, a tick or two later. The answer to
 a later question can come first. A command is answered with one of these:
@@ -110,19 +111,53 @@ with `Retry-After`.
 
 [examples/octave](../examples/octave/README.md) has the functions for a connection (`katana_open`,
 `katana_say`, `katana_hear`, `katana_go`), kinematics in m-code, and the paper's circle streamed as joint
-angles. `circle_by_name.m` sets rotations of the VRML world by DEF name instead, as VR Sink does. LabVIEW
+angles. They need Octave's package `instrument-control`, which has `tcpclient` (Debian: octave-instrument-control).
+`circle_by_name.m` sets rotations of the VRML world by DEF name instead, as VR Sink does. LabVIEW
 and Simulink connect in the same manner: [simulink](simulink.md).
 
-## By hand
+## One line, one motion
+
+A motion request with `wait`, the maximum duration of its motion in seconds (0.1 to 600), is answered when
+the motion has ended. So one line of curl makes one whole motion:
 
 ```sh
 KEY=$(openssl rand -hex 16)  # a secret that identifies this program
-curl -H "X-Program: $KEY" -H 'X-Name: By hand' -d '{{"do": "joint", "axis": 1, "value": 0.4}}' http://127.0.0.1:8080/api/v{version}/do
+curl -H "X-Program: $KEY" -H 'X-Name: By hand' -d '{{"do": "joint", "axis": 1, "value": 0.4, "wait": 20}}' http://127.0.0.1:8080/api/v{version}/do
+curl -H "X-Program: $KEY" -d '{{"do": "position", "p": [0.45, 0.1, 0.0], "wait": 20}}' http://127.0.0.1:8080/api/v{version}/do
+curl -H "X-Program: $KEY" -d '{{"do": "gripper", "angle": 0.2, "wait": 10}}' http://127.0.0.1:8080/api/v{version}/do
+curl -H "X-Program: $KEY" -d '{{"do": "program", "text": "name: Nod\\nsteps:\\n  - joints: [0, -68, 85, 30, 0]\\n"}}' http://127.0.0.1:8080/api/v{version}/do
+curl -H "X-Program: $KEY" -d '{{"do": "steer", "order": "run", "wait": 60}}' http://127.0.0.1:8080/api/v{version}/do
+curl -H "X-Program: $KEY" -d '{{"do": "home", "wait": 20}}' http://127.0.0.1:8080/api/v{version}/do
 curl http://127.0.0.1:8080/api/v{version}/state
 ```
 
-A moving arm stops, or pauses if it is simulated, a quarter of a second after the last message of
-its program. So a single `curl` begins a motion and does not finish a long one.
+The field `end` of the answer says how the motion ended, and where the arm is then:
+
+| `how` | the motion | HTTP status |
+|---|---|---|
+| `reached` | has reached its target; `steer`: the program is done | 200 |
+| `limited` | ended as near to the target as the arm can go; `why` and the findings say what limits it | 200 |
+| `contact` | ended before a contact; the target is dropped | 409 |
+| `paused` | waits on its path. A step of `steer` with `step` ends so too | 409 |
+| `stopped` | was ended by STOP, of anybody or of the server itself | 409 |
+| `superseded` | was replaced by another command of the same program | 409 |
+| `lease lost` | ended because another client drives now | 409 |
+| `timeout` | did not end within `wait`; the arm has come to rest and dropped the target, a program is ended | 409 |
+| `failed` | was not possible: no path was found, or the program failed | 409 |
+
+With `curl --fail-with-body` a status of 409 becomes the exit status 22, so lines joined by `&&` end there.
+
+- While the request is open, its connection counts as the heartbeat. If it closes before the end, for
+  example by Ctrl-C, the arm stops and the stop is latched, as when any driver disconnects. A client whose
+  machine vanishes without closing is noticed within 3 s. A suspended client is not noticed; `wait` bounds that time.
+- A lease that the request has acquired is released at the end, and nothing moves later. A lease that the
+  client held before is kept.
+- The WebSocket and the TCP port take `wait` too, without heartbeats meanwhile. A request with `wait` is
+  answered even without an `id`. At most 8 such requests of a client can be open.
+- Streams (`servo`, `jog`), questions and requests about the lease have no `wait`; with it they are refused.
+
+Without `wait` the answer comes at once. Then a moving arm stops, or pauses if it is simulated, 0.25 s
+(`--silence`) after the last message of its program, because the driver fell silent.
 """
 
 
@@ -149,7 +184,8 @@ def page() -> str:
     parts += [
         _kind(kind, None)
         for kind in (
-            *(answers.Finding, answers.PartRefusal, answers.Margins, answers.Water),
+            *(answers.Finding, answers.PartRefusal, answers.MotionEnd),
+            *(answers.Margins, answers.Water),
             *(answers.Progress, answers.LogLine, answers.BranchOption, answers.SceneObject),
             *(answers.Value, answers.Node, answers.Field, answers.Link),
             *(answers.ConnectedPerson, answers.PersonConnection),
@@ -173,12 +209,14 @@ def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
     lines = [f"### {heading}\n", text, ""]
     described = msgspec.json.schema_components([kind])[1][kind.__name__]
     for field in msgspec.structs.fields(kind):
-        if field.name == "id" or (tag == "do" and field.name == "revocations"):
+        if field.name == "id" or (tag == "do" and field.name in ("revocations", "wait")):
             continue
         shape = _shape(described["properties"][field.name])
         default = "" if field.required else f", default `{_json(field.default)}`"
         about = f". {fields[field.name]}" if field.name in fields else ""
         lines.append(f"- `{field.encode_name}`: {shape}{default}{about}")
+    if issubclass(kind, requests.MotionRequest):
+        lines.append("- `wait`: see [one line, one motion](#one-line-one-motion).")
     return "\n".join(lines).rstrip() + "\n"
 
 

@@ -130,6 +130,7 @@ def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
             {"do": "get", "node": "tcp", "field": "translation"},
             {"do": "heartbeat"},
             {"do": "list_people"},
+            {"do": "nudge", "axis": 5, "by": 0.1, "wait": 20},
             {"do": "joint", "axis": 5, "value": 40},
             {"do": "joint", "axis": 9, "value": 0},
         ]

@@ -40,10 +40,14 @@ def test_every_reference_in_openapi_exists() -> None:
 
 
 def test_every_request_class_is_a_request_and_declares_its_traits() -> None:
-    assert set(Request.__subclasses__()) == set(EVERY_REQUEST)
+    subclasses = {*Request.__subclasses__(), *requests.MotionRequest.__subclasses__()}
+    assert subclasses - {requests.MotionRequest} == set(EVERY_REQUEST)
     for kind in EVERY_REQUEST:
         assert isinstance(vars(kind).get("traits"), RequestTraits), f"{kind.__name__}: no traits"
         assert (kind.__name__ in requests.__all__) != (kind in ADDED)
+        # The end of a motion can be waited for, not that of a stream or a question.
+        waits = issubclass(kind, requests.MotionRequest)
+        assert not (waits and (kind.traits.stream or kind.traits.question or kind.traits.free))
     assert [kind for kind in EVERY_REQUEST if kind.traits.safety] == [requests.Stop]
 
 

@@ -179,11 +179,13 @@ def test_command_that_takes_longer_runs(block: CodeBlock, command: str) -> None:
 @pytest.mark.usefixtures("folder")
 def test_requests_of_the_shell_are_answered(server: AppServer) -> None:
     block = code_block("docs/api.md", "KEY=")
-    first, second = (
-        run(block.text.replace(PRINTED_URL, server.url)).replace("}{", "}\n{").split("\n")
-    )
-    assert json.loads(first)["outcome"] == "accepted"
-    assert json.loads(second)["is"] == "state"
+    printed = run(block.text.replace(PRINTED_URL, server.url)).replace("}{", "}\n{")
+    *motions, state = map(json.loads, printed.splitlines())
+    ends = [each["end"]["how"] for each in motions if "end" in each]
+    assert ends == ["reached"] * 5
+    assert [each["is"] for each in motions] == ["done"] * 6
+    assert (state["is"], state["holder"], state["moving"]) == ("state", None, False)
+    assert state["q"] == motions[-1]["end"]["q"]
 
 
 @pytest.mark.parametrize("block", code_blocks("json"), ids=identifier)

@@ -53,6 +53,7 @@ class FakeArm:
     outcome: Any
     margins: Margins
     holding: FloatArray | None
+    planning_failure = ""
 
     def __init__(self, state: State) -> None:
         self.rest = state

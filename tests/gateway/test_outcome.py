@@ -12,6 +12,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.arm.runtime.mailbox import Mailbox
@@ -20,9 +21,10 @@ from katana450.extensions.api_description.messages import kinds
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.maths.kinematics.priority import Priority
 from katana450.server.api import answers, requests
-from katana450.server.service import dispatcher, serialize
-from katana450.server.service.dispatcher import Dispatcher
+from katana450.server.service import pending_answer, serialize
 from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
+from katana450.server.service.pending_answer import PendingAnswer
 from tests.browser.server import AppServer
 from tests.gateway.lines import post, speaking
 
@@ -273,11 +275,10 @@ class SilentArm:
 def test_outcome_is_unknown_while_the_process_of_the_arm_is_silent(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(dispatcher, "OUTCOME_SECONDS", 0.05)
+    monkeypatch.setattr(pending_answer, "OUTCOME_SECONDS", 0.05)
     hub = Hub(lambda: 0.0)
     hub.gate.arm = cast(Any, SilentArm())
-    pending = answers.Done(id=3, ticket=7)
-    assert Dispatcher.is_pending(pending)
-    answer = done(asyncio.run(Dispatcher(hub).concluded(pending)))
+    program = hub.join(Identity("session", "Ada", Role.ADMIN), "page", lambda _: None)
+    pending = PendingAnswer(hub, program, answers.Done(id=3, ticket=7))
+    answer = done(asyncio.run(pending.answer()))
     assert (answer.id, answer.ticket, answer.outcome) == (3, 7, "unknown")
-    assert not Dispatcher.is_pending(answer)

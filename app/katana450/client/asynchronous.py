@@ -61,20 +61,22 @@ class AsyncClient:
         await close_quietly(self._socket)
 
     async def ask(self, request: requests.Request) -> answers.Answer:
-        """Send a request and return its answer.
+        """Send a request and return its answer; one with ``wait`` is answered after its motion.
 
         Raises RefusedError with the reason, or LostError if the connection is lost.
         """
+        wait = request.wait if isinstance(request, requests.MotionRequest) else None
+        timeout = ANSWER_TIMEOUT + (wait or 0.0)
         self._last_id += 1
         request = msgspec.structs.replace(request, id=self._last_id)
         future: asyncio.Future[answers.Answer] = asyncio.get_running_loop().create_future()
         self._waiting[self._last_id] = future
         try:
             await self.send(request)
-            async with asyncio.timeout(ANSWER_TIMEOUT):
+            async with asyncio.timeout(timeout):
                 return await future
         except TimeoutError as error:
-            raise LostError(f"The server has not answered for {ANSWER_TIMEOUT:g} s.") from error
+            raise LostError(f"The server has not answered for {timeout:g} s.") from error
         finally:
             self._waiting.pop(request.id, None)
 

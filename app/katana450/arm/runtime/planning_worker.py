@@ -40,6 +40,8 @@ class PlanningWorker:
         """Called with the reason if no path was found."""
         self.redirected: Callable[[], None] = lambda: None
         """Called, in any thread, when a command gives the arm another motion, a hold or a stop."""
+        self.failure = ""
+        """Reason for which no path was found, until the next command; empty without one."""
         self.newest_actor: Actor | None = None
         """The actor of the newest command that was not passive."""
 
@@ -56,6 +58,7 @@ class PlanningWorker:
     def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
         """Implement ``CommandSink``. A command that is planned first gets no ticket of its own."""
         traits = [each.traits for each in command.parts]
+        self.failure = ""
         if not all(each.passive for each in traits):
             self.cancel()
             self.newest_actor = actor
@@ -96,14 +99,18 @@ class PlanningWorker:
                 if waited or not self._state_publisher.snapshot.state.waits:
                     self._unless(cancelled, cmd.Follow(plan), actor)
         except KatanaError as error:
-            self.notify(str(error))
+            self._fail(str(error))
         except Exception:
             log.exception("The planning of a path failed.")
-            self.notify("Internal error while a path was planned: see the server's log.")
+            self._fail("Internal error while a path was planned: see the server's log.")
         finally:
             with self._lock:
                 if self._work is cancelled:
                     self._work = None
+
+    def _fail(self, why: str) -> None:
+        self.failure = why
+        self.notify(why)
 
     def _at_rest(self, actor: Actor | None, cancelled: threading.Event) -> State:
         """Return the state of the arm at rest; a moving arm is sent a hold first."""

@@ -42,8 +42,15 @@ def summary(kind: type) -> str:
 
 
 def documentation(kind: type) -> tuple[str, dict[str, str]]:
-    """Return the docstring of ``kind`` as Markdown, and its ``Attributes`` by their names."""
-    return _divided(inspect.getdoc(kind) or "")
+    """Return the docstring of ``kind`` as Markdown, and its ``Attributes`` by their names.
+
+    These include the ones that it inherits.
+    """
+    text, fields = _divided(inspect.getdoc(kind) or "")
+    for base in kind.__mro__[1:]:
+        if issubclass(base, msgspec.Struct):
+            fields = _divided(inspect.cleandoc(base.__doc__ or ""))[1] | fields
+    return text, fields
 
 
 def schemas(added: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str, Any], Any]:
@@ -54,12 +61,15 @@ def schemas(added: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str,
     """
     shapes: list[Any] = [Union[every_request(added)], answers.AnyAnswer]  # noqa: UP007
     (request, answer), components = msgspec.json.schema_components(shapes, ref_template=REFERENCE)
-    for schema in components.values():
+    messages = {each.__name__: each for each in (*every_request(added), *kinds(answers.AnyAnswer))}
+    for name, schema in components.items():
         text, fields = _divided(inspect.cleandoc(schema.get("description", "")))
+        if name in messages:
+            text, fields = documentation(messages[name])
         schema["description"] = text
-        for name, about in fields.items():
-            if name in schema.get("properties", ()):
-                schema["properties"][name]["description"] = about
+        for field, about in fields.items():
+            if field in schema.get("properties", ()):
+                schema["properties"][field]["description"] = about
     return request, answer, components
 
 

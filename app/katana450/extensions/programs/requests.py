@@ -7,7 +7,14 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import ADMIN, COMMAND, MAX_REQUEST_BYTES, Request, RequestTraits
+from katana450.server.api.fields import (
+    ADMIN,
+    COMMAND,
+    MAX_REQUEST_BYTES,
+    MotionRequest,
+    Request,
+    RequestTraits,
+)
 
 SLOWEST_SPEED = 0.01
 """Minimum fraction of its own speed at which a program can run."""
@@ -49,7 +56,7 @@ class Program(Request, frozen=True, kw_only=True):
     speed: Annotated[float, Meta(ge=SLOWEST_SPEED, le=1.0)] = 1.0
 
 
-class Steer(Request, frozen=True, kw_only=True):
+class Steer(MotionRequest, frozen=True, kw_only=True):
     """Run, step, pause, resume, end or continue the planned program.
 
     A program drives as a participant of its own. Its owner must stay connected unless ``run`` or

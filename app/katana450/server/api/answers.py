@@ -11,7 +11,7 @@ import msgspec
 
 from katana450.server.api.arm_answers import Margins, MeasuredArm, Water
 from katana450.server.api.fields import VERSION, Answer, Numbers
-from katana450.server.api.outcome_answers import Done, Finding, PartRefusal, Refused
+from katana450.server.api.outcome_answers import Done, Finding, MotionEnd, PartRefusal, Refused
 from katana450.server.api.people_answers import ConnectedPerson, People, PersonConnection
 from katana450.server.api.program_answers import Progress
 from katana450.server.api.scene_answers import (
@@ -47,6 +47,7 @@ __all__ = [
     "Margins",
     "MeasuredArm",
     "Mesh",
+    "MotionEnd",
     "Node",
     "Numbers",
     "Objects",

@@ -39,6 +39,9 @@ MIN_SPEED, MAX_SPEED = 0.05, 1.0
 MAX_STATES_PER_SECOND = 100
 """Maximum rate of states [1/s]: the rate of the control loop."""
 
+MIN_WAIT, MAX_WAIT = 0.1, 600.0
+"""Limits of the time in which a motion that a request waits for has to end [s]."""
+
 MAX_JOINTS = 32
 
 Rates = tuple[float, float, float, float, float]
@@ -151,6 +154,17 @@ class Request(
 
     id: Id = None
     revocations: Annotated[int, Meta(ge=0)] | None = None
+
+
+class MotionRequest(Request, frozen=True, kw_only=True):
+    """Base of the requests whose answer can come at the end of their motion.
+
+    Attributes:
+        wait: Maximum duration of the motion [s]. The answer then comes at its end and has ``end``,
+            and the open connection counts as the heartbeat. Without it the answer comes at once.
+    """
+
+    wait: Annotated[float, Meta(ge=MIN_WAIT, le=MAX_WAIT)] | None = None
 
 
 class Answer(

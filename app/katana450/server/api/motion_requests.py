@@ -18,6 +18,7 @@ from katana450.server.api.fields import (
     MAX_LINEAR_STEP,
     Frame,
     Matrix4,
+    MotionRequest,
     Rates,
     Request,
     RequestTraits,
@@ -45,7 +46,7 @@ class Jog(Request, frozen=True, kw_only=True):
                 raise ValueError(f"the rate {rate} is not between {-limit:g} and {limit:g}")
 
 
-class StepTool(Request, frozen=True, kw_only=True):
+class StepTool(MotionRequest, frozen=True, kw_only=True):
     """Move the target of the tool by one step. Steps in a row add up.
 
     Attributes:
@@ -65,7 +66,7 @@ class StepTool(Request, frozen=True, kw_only=True):
                 raise ValueError(f"the step {step} is not between {-limit:g} and {limit:g}")
 
 
-class Joint(Request, frozen=True, kw_only=True):
+class Joint(MotionRequest, frozen=True, kw_only=True):
     """Move one joint to a value.
 
     Attributes:
@@ -79,7 +80,7 @@ class Joint(Request, frozen=True, kw_only=True):
     value: float
 
 
-class Joints(Request, frozen=True, kw_only=True):
+class Joints(MotionRequest, frozen=True, kw_only=True):
     """Move all joints along a straight line in joint space; they arrive together.
 
     Attributes:
@@ -109,7 +110,7 @@ class Servo(Request, frozen=True, kw_only=True):
     qd: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)] | None = None
 
 
-class Pose(Request, frozen=True, kw_only=True):
+class Pose(MotionRequest, frozen=True, kw_only=True):
     """Move the tool to a pose, or as near to it as five axes can.
 
     The priority (``set_priority``) decides which part of the pose is kept.
@@ -125,7 +126,7 @@ class Pose(Request, frozen=True, kw_only=True):
     frame: Frame = Frame.SHOULDER
 
 
-class Position(Request, frozen=True, kw_only=True):
+class Position(MotionRequest, frozen=True, kw_only=True):
     """Move the tool point to a position; pitch and roll of the target are kept.
 
     Attributes:
@@ -139,7 +140,7 @@ class Position(Request, frozen=True, kw_only=True):
     frame: Frame = Frame.SHOULDER
 
 
-class Turn(Request, frozen=True, kw_only=True):
+class Turn(MotionRequest, frozen=True, kw_only=True):
     """Turn the tool to a pitch and a roll; the target of the tool point is kept.
 
     Attributes:
@@ -153,7 +154,7 @@ class Turn(Request, frozen=True, kw_only=True):
     roll: float
 
 
-class Gripper(Request, frozen=True, kw_only=True):
+class Gripper(MotionRequest, frozen=True, kw_only=True):
     """Move the fingers.
 
     Attributes:
@@ -166,7 +167,7 @@ class Gripper(Request, frozen=True, kw_only=True):
     angle: float
 
 
-class Undo(Request, frozen=True):
+class Undo(MotionRequest, frozen=True):
     """Undo the last change of a goal, an object or a setting by this client.
 
     To undo a goal, the arm moves back to the earlier one. Refused while the arm is stopped, and
@@ -176,13 +177,13 @@ class Undo(Request, frozen=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
 
-class EndDrag(Request, frozen=True):
+class EndDrag(MotionRequest, frozen=True):
     """End a drag: the nearest pose that the arm can reach becomes the target."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 
 
-class Go(Request, frozen=True):
+class Go(MotionRequest, frozen=True):
     """Move along the detour that the state offers, to the target that a drag did not reach.
 
     A drag ends at a gap where a joint would have to leap. If a clear path on the same branch leads
@@ -193,13 +194,13 @@ class Go(Request, frozen=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
 
-class Home(Request, frozen=True):
+class Home(MotionRequest, frozen=True):
     """Move to the ready posture."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 
 
-class GoToZero(Request, frozen=True):
+class GoToZero(MotionRequest, frozen=True):
     """Move to the zero posture, in which the arm is stretched along x."""
 
     traits: ClassVar[RequestTraits] = COMMAND

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from katana450.server.api.fields import Answer
+from katana450.server.api.fields import Answer, Numbers
 
 
 class Finding(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,6 +44,28 @@ class PartRefusal(msgspec.Struct, frozen=True, kw_only=True):
     why: str
 
 
+class MotionEnd(msgspec.Struct, frozen=True, kw_only=True):
+    """The end of a motion whose request had ``wait``, and where the arm is then.
+
+    Attributes:
+        how: ``reached`` the target; ``limited`` by the findings, as near as the arm can;
+            ``contact``, before which it stands; ``paused``; ``stopped``; ``superseded`` by another
+            command of the same client; ``lease lost`` to another client; ``timeout``; ``failed``.
+        why: Reason in words; empty if the target was reached.
+        seconds: Time since the request [s].
+        q: (n,) Joint angles that the arm reports [rad]; [m] for joints that slide.
+        gripper: Finger joint [rad]; [m] for fingers that slide.
+        T: (4, 4) Pose of the tool in the frame {S}; null for a mechanism that has only joints.
+    """
+
+    how: str
+    why: str
+    seconds: float
+    q: Numbers
+    gripper: float
+    T: list[Numbers] | None
+
+
 class Done(Answer, frozen=True, kw_only=True):
     """The request with this ``id`` is done.
 
@@ -57,6 +79,7 @@ class Done(Answer, frozen=True, kw_only=True):
         rotation_misfit: Largest entry of R^T R - I of the given pose. The nearest rotation is used;
             more than 1e-3 is refused.
         revocations: ``revocations`` of the state in which the command was accepted.
+        end: End of the motion, if the request had ``wait``.
     """
 
     ticket: int | None = None
@@ -65,6 +88,7 @@ class Done(Answer, frozen=True, kw_only=True):
     refused: tuple[PartRefusal, ...] = ()
     rotation_misfit: float | None = None
     revocations: int | None = None
+    end: MotionEnd | None = None
 
 
 class Refused(Answer, frozen=True, kw_only=True):

@@ -26,6 +26,7 @@ from katana450.server.api.fields import (
     Attachment,
     Frame,
     Id,
+    MotionRequest,
     Name,
     Request,
     RequestTraits,
@@ -104,6 +105,7 @@ __all__ = [
     "Kick",
     "ListPeople",
     "Load",
+    "MotionRequest",
     "Mute",
     "Nudge",
     "OperateArm",
@@ -192,7 +194,7 @@ class SetPriority(Request, frozen=True, kw_only=True):
     priority: Priority
 
 
-class Branch(Request, frozen=True, kw_only=True):
+class Branch(MotionRequest, frozen=True, kw_only=True):
     """Move to the target pose with another shoulder or elbow.
 
     Attributes:
@@ -206,7 +208,7 @@ class Branch(Request, frozen=True, kw_only=True):
     elbow: Literal["up", "down"]
 
 
-class Nudge(Request, frozen=True, kw_only=True):
+class Nudge(MotionRequest, frozen=True, kw_only=True):
     """Move one joint by a relative angle, counted from its goal.
 
     The new goal is limited to the range of the joint.
@@ -222,7 +224,7 @@ class Nudge(Request, frozen=True, kw_only=True):
     by: float
 
 
-class Hold(Request, frozen=True):
+class Hold(MotionRequest, frozen=True):
     """Come to rest and drop the target."""
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -239,7 +241,7 @@ class Pause(Request, frozen=True):
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
 
-class Resume(Request, frozen=True):
+class Resume(MotionRequest, frozen=True):
     """Resume the motion after a pause."""
 
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)

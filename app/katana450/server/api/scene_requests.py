@@ -14,6 +14,7 @@ from katana450.server.api.fields import (
     Frame,
     Key,
     Matrix4,
+    MotionRequest,
     Name,
     NodeName,
     Request,
@@ -138,7 +139,7 @@ class FieldSetting(FieldName, frozen=True, kw_only=True):
     value: FieldValue
 
 
-class Set(Request, frozen=True, kw_only=True):
+class Set(MotionRequest, frozen=True, kw_only=True):
     """Set fields of the VRML world by the DEF names of their nodes, as VR Sink does.
 
     If one field cannot be set, none is. The names are those of `katana450 export vrml`; ``query``

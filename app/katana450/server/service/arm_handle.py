@@ -167,6 +167,11 @@ class ArmHandle:
         """True while a path is being planned that the arm will then follow."""
         return self._planning_worker is not None and self._planning_worker.busy
 
+    @property
+    def planning_failure(self) -> str:
+        """Reason for which the path of the newest command was not found; else empty."""
+        return "" if self._planning_worker is None else self._planning_worker.failure
+
     def heartbeat(self, drivers: tuple[str, ...]) -> None:
         """Send a heartbeat of the server, with its drivers, to the arm's process."""
         self._front_end.heartbeat(drivers)

@@ -59,8 +59,8 @@ class CommandGate:
         self.program: RunningProgram | None = None
         """The running program; None without one."""
         self.last_pause: LastPause | None = None
-        self.revocations = 0
-        """Number of stops and of losses of the lease."""
+        self.revocations = self.motions = 0
+        """Number of stops and losses of the lease; of commands that superseded a motion."""
         self.on_stop: Callable[[], None] = lambda: None
         """Callback at each stop, before the arm gets it."""
         self.recorder = Recorder()
@@ -95,6 +95,7 @@ class CommandGate:
                     arm, before = self.present(), self.present().state
                     with self.undo.noted(arm, command, granted):
                         ticket = arm.deliver(command, granted)
+                    self.motions += any(each.traits.supersedes for each in command.parts)
                     self.last_pause = LastPause.after(self.last_pause, command, actor, before)
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -12,7 +11,7 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.lease import Role
 from katana450.arm.control.state import Verdict
-from katana450.errors import KatanaError, LeaseError
+from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
@@ -24,6 +23,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.object_requests import ObjectRequests
 from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.pending_answer import PendingAnswer, give_back
 from katana450.server.service.people_requests import PeopleRequests
 
 COMMANDS: dict[type[requests.Request], cmd.Command] = {
@@ -38,11 +38,11 @@ COMMANDS: dict[type[requests.Request], cmd.Command] = {
 }
 """Commands of the requests that have no fields."""
 
-ACCEPTED, UNKNOWN, REQUESTED = Verdict.ACCEPTED.value, "unknown", "requested"
+ACCEPTED, REQUESTED = Verdict.ACCEPTED.value, "requested"
 """Outcomes in answers that do not come from the arm's process."""
 
-OUTCOME_SECONDS = 1.0
-"""Timeout [s] for the outcome of a command from the arm's process; a tick takes 10 ms."""
+MAX_OPEN = 8
+"""Maximum number of requests of one participant that wait for the end of a motion."""
 
 
 def driver_key(hub: Hub, participant: Participant) -> str:
@@ -65,10 +65,11 @@ class Dispatcher:
 
     def handle(
         self, participant: Participant, request: requests.Request, budget: Budget
-    ) -> answers.Answer:
+    ) -> answers.Answer | PendingAnswer:
         """Execute ``request`` and return its answer. Counts as a heartbeat of ``participant``.
 
-        The outcome of a command may still be pending, see ``is_pending``.
+        The answer is pending until the arm's process reports the outcome of a command, or until
+        the end of the motion if the request waits for it.
 
         The processor time is charged to ``budget``; raises BusyError when that is used up. A
         ``free`` request and a command of the driver cost nothing. Raises MutedError for a request
@@ -77,14 +78,28 @@ class Dispatcher:
         question, driver = request.traits.question, driver_key(self._hub, participant)
         admin = request.traits.admin and participant.person.role is Role.ADMIN
         free = request.traits.free or admin or (driver and not question)
+        wait = request.wait if isinstance(request, requests.MotionRequest) else None
+        holds = self._hub.lease.holder == participant.person
+        if not (request.traits.free or question):
+            # A later request without `wait` keeps the lease.
+            participant.gives_back = wait is not None and (participant.gives_back or not holds)
         try:
             with nullcontext() if free else budget.charged(driver, question=question):
                 self._check_muted(participant, request)
-                return msgspec.structs.replace(self._execute(participant, request), id=request.id)
+                if wait is not None and participant.heartbeat.open >= MAX_OPEN:
+                    raise InputError(f"At most {MAX_OPEN} requests can wait at once.")
+                answer = self._execute(participant, request)
+                answer = msgspec.structs.replace(answer, id=request.id)
         except KatanaError as error:
+            give_back(self._hub, participant)
             if not question or isinstance(error, BusyError):
                 self._hub.recorder.refuse(request, participant.actor, error)
             raise
+
+        if isinstance(answer, answers.Done) and (wait or (answer.ticket and not answer.outcome)):
+            fingers = isinstance(request, requests.Gripper)
+            return PendingAnswer(self._hub, participant, answer, wait, fingers=fingers)
+        return answer
 
     def _check_muted(self, participant: Participant, request: requests.Request) -> None:
         """Raise MutedError if ``request`` does not count. ``Hub.stop`` counts the STOPs."""
@@ -131,27 +146,6 @@ class Dispatcher:
         at_once = request.traits.stream or command.traits.planned or not ticket
         done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))
         return msgspec.structs.replace(done, revocations=revocations)
-
-    @staticmethod
-    def is_pending(answer: answers.Answer) -> bool:
-        """Return whether ``answer`` belongs to a command whose outcome is not known yet."""
-        if not isinstance(answer, answers.Done):
-            return False
-        return answer.ticket is not None and answer.outcome is None
-
-    async def concluded(self, pending: answers.Answer) -> answers.Answer:
-        """Return ``pending`` with the outcome of its command, once the arm's process reports it.
-
-        A command that the session refuses becomes ``answers.Refused``.
-        """
-        assert isinstance(pending, answers.Done)
-        assert pending.ticket is not None
-        try:
-            async with asyncio.timeout(OUTCOME_SECONDS):
-                outcome = await asyncio.wrap_future(self._hub.present().outcome(pending.ticket))
-        except TimeoutError:
-            return msgspec.structs.replace(pending, outcome=UNKNOWN)
-        return serialize.concluded(pending, outcome)
 
     def _change_lease(self, participant: Participant, request: requests.Request) -> None:
         """Execute a request about the lease."""

@@ -8,17 +8,23 @@ from collections.abc import Callable
 
 from katana450.arm.runtime.readiness import SocketChannel, data_age, readable
 
-KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
-"""Keepalive of TCP [s, s, probes]. A host that disappears is detected within 11 s."""
+KEEPALIVE = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 2}
+"""Keepalive of TCP [s, s, probes]. A host that disappears is detected within 3 s."""
 
 
 class LastHeartbeat:
-    """The newest heartbeat of one participant, stamped when its message is handled."""
+    """The newest heartbeat of one participant, stamped when its message is handled.
+
+    Attributes:
+        open: Number of its requests that wait for the end of a motion. While there is one, its open
+            connection counts as a heartbeat.
+    """
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """Count the participant as alive now. ``clock`` is in seconds."""
         self._clock = clock
         self._newest = clock()
+        self.open = 0
 
     def note(self) -> None:
         """Note that a message of the participant is being handled."""
@@ -27,7 +33,7 @@ class LastHeartbeat:
     @property
     def newest(self) -> float:
         """Time of the newest heartbeat [s], on the clock."""
-        return self._newest
+        return self._clock() if self.open else self._newest
 
     def _age(self) -> float:
         """Return the age of the newest message [s]."""
@@ -53,7 +59,7 @@ class Arrival(LastHeartbeat):
         """Time of the newest heartbeat [s], including a message that is not read yet."""
         if self._line is not None and readable(self._line.fileno()):
             self.note()
-        return self._newest
+        return super().newest
 
     def _age(self) -> float:
         return 0.0 if self._line is None else data_age(self._line)

@@ -96,6 +96,10 @@ class ArmInterface(Protocol):
         """True while a path is being planned that the arm will then follow."""
 
     @property
+    def planning_failure(self) -> str:
+        """Reason for which the path of the newest command was not found; else empty."""
+
+    @property
     def age(self) -> float:
         """Time since the arm's process last proved that its control loop runs [s]."""
 

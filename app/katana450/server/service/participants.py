@@ -26,6 +26,8 @@ class Participant:
         notify: Function that queues a notice to the client.
         heartbeat: Newest heartbeat.
         channel: Channel of its commands.
+        gives_back: Whether the lease is released at the end of the motion that a request waits for,
+            because that request has acquired it.
     """
 
     person: Person
@@ -33,6 +35,7 @@ class Participant:
     notify: Callable[[dict[str, Any]], None]
     heartbeat: LastHeartbeat
     channel: CommandChannel
+    gives_back: bool = False
 
     @property
     def actor(self) -> Actor:

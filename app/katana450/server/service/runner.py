@@ -68,6 +68,13 @@ class Runner:
         kind = type(request).__name__
         raise AssertionError(f"{type(self).__name__} lists {kind} and does not execute it.")
 
+    def runs_for(self, participant: Participant) -> bool:  # noqa: ARG002
+        """Return whether a run of ``participant`` drives the arm, or will once it is planned."""
+        return False
+
+    def end(self, participant: Participant, why: str) -> None:
+        """End the run of ``participant``, unless it is unattended, because of ``why``, a clause."""
+
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError where ``actor`` must not touch ``controls``. Called in any thread."""
 

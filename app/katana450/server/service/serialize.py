@@ -64,6 +64,15 @@ def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | an
     )
 
 
+def motion_end(arm: ArmInterface, how: str, why: str, seconds: float) -> answers.MotionEnd:
+    """Return the end of a motion with the place of the arm; see ``answers.MotionEnd``."""
+    now, robot = arm.state, arm.robot
+    T = None if robot.arm is None else forward(robot.arm.chain_to(now.tool), now.q).tolist()
+    return answers.MotionEnd(
+        how=how, why=why, seconds=seconds, q=now.q.tolist(), gripper=now.gripper, T=T
+    )
+
+
 def state(hub: Hub) -> answers.State:
     """Return the newest state. Raises LeaseError until there is an arm."""
     arm = hub.present()

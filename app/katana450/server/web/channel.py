@@ -24,6 +24,7 @@ from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
 from katana450.server.service.mutes import MutedError
 from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.token_bucket import TokenBucket
 
@@ -131,16 +132,16 @@ class Channel(ABC):
         """Execute ``request``; send the answer if it has an id or is always answered."""
         answer = self._dispatcher.handle(participant, request, self.budget)
         wanted = request.id is not None or request.traits.answered
-        if self._dispatcher.is_pending(answer):
-            task = asyncio.ensure_future(self._conclude(answer, wanted=wanted))
+        if isinstance(answer, PendingAnswer):
+            task = asyncio.ensure_future(self._conclude(answer, wanted=wanted or answer.waits))
             self._concluding.add(task)
             task.add_done_callback(self._concluding.discard)
         elif wanted:
             self.notify(answer)
 
-    async def _conclude(self, pending: answers.Answer, *, wanted: bool) -> None:
+    async def _conclude(self, pending: PendingAnswer, *, wanted: bool) -> None:
         """Send the outcome of a command; if no answer is ``wanted``, only a refusal."""
-        answer = await self._dispatcher.concluded(pending)
+        answer = await pending.answer()
         if wanted or isinstance(answer, answers.Refused):
             self.notify(answer)
 

@@ -27,7 +27,8 @@ from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.mutes import MutedError
-from katana450.server.service.participants import SHARED_SESSION, Participant, actor_of
+from katana450.server.service.participants import SHARED_SESSION, Participant, actor_of, session_of
+from katana450.server.service.pending_answer import ARRIVED, PendingAnswer
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
@@ -166,9 +167,12 @@ class Api:
                 )
             participant = self._participant(request, identity)
             answer = self._dispatcher.handle(participant, decoded, self._budget(request))
-            if self._dispatcher.is_pending(answer):
-                answer = await self._dispatcher.concluded(answer)
-            return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
+            if isinstance(answer, PendingAnswer):
+                watched = self._watched(request, identity, participant, answer)
+                answer = await (watched if answer.waits else answer.answer())
+            end = answer.end if isinstance(answer, answers.Done) else None
+            failed = isinstance(answer, answers.Refused) or (end and end.how not in ARRIVED)
+            return as_json(answer, NOT_NOW if failed else 200)
         except (BusyError, MutedError) as error:
             self._refused(request)
             self._note_flood(identity, error)
@@ -182,6 +186,45 @@ class Api:
         except LeaseError as error:
             self._refused(request)
             return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
+
+    async def _watched(
+        self,
+        request: Request,
+        identity: Identity,
+        participant: Participant,
+        pending: PendingAnswer,
+    ) -> answers.Answer:
+        """Return the answer at the end of a motion.
+
+        If the sender closes the connection before it, is disconnected by an admin, or its link
+        ends, its program leaves as if a socket were closed, so a moving arm stops.
+        """
+        found: list[answers.Answer] = []
+
+        async def work() -> None:
+            answer = asyncio.create_task(pending.answer())
+            # The body was received, so the next message is that the connection was closed.
+            gone = asyncio.ensure_future(request.receive())
+            try:
+                await asyncio.wait((answer, gone), return_when=asyncio.FIRST_COMPLETED)
+                if answer.done():
+                    found.append(answer.result())
+            finally:
+                if not answer.done():
+                    self._forget(participant.person.key)
+                for each in (answer, gone):
+                    each.cancel()
+                await asyncio.gather(answer, gone, return_exceptions=True)
+
+        def current() -> Identity | None:
+            token = request.headers.get("authorization", "")
+            return self._authenticator.program("", token, request.cookies)
+
+        key, kind = participant.person.key, ConnectionKind.POSTS
+        identity = replace(identity, session=session_of(key))
+        connection = Connection(identity, kind, address_of(request), key=key)
+        why = await self._authenticator.run_while_authorised(current, work(), connection)
+        return found[0] if found else answers.Refused(why=why or "The connection was closed.")
 
     def _refused(self, request: Request) -> None:
         """Add one to the refused requests of the sender of ``request``."""
@@ -237,9 +280,20 @@ class Api:
         else:
             participant, connection, timer = known
             timer.cancel()
-        timer = asyncio.get_running_loop().call_later(LEASE_TIMEOUT, self._forget, key)
-        self._programs[key] = _HttpProgram(participant, connection, timer)
+        self._remember(key, participant, connection)
         return participant
+
+    def _remember(self, key: str, participant: Participant, connection: Connection) -> None:
+        timer = asyncio.get_running_loop().call_later(LEASE_TIMEOUT, self._expire, key)
+        self._programs[key] = _HttpProgram(participant, connection, timer)
+
+    def _expire(self, key: str) -> None:
+        """Let the program of ``key`` leave, unless it waits for the end of a motion."""
+        known = self._programs[key]
+        if known.participant.heartbeat.open:
+            self._remember(key, known.participant, known.connection)
+        else:
+            self._forget(key)
 
     def _key(self, request: Request, identity: Identity) -> str:
         """Return the key that all requests of one program have in common."""
@@ -247,7 +301,10 @@ class Api:
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:
-        participant, connection, _ = self._programs.pop(key)
+        if key not in self._programs:
+            return
+        participant, connection, timer = self._programs.pop(key)
+        timer.cancel()
         self._hub.people.remove(connection)
         self._hub.leave(participant, for_good=True)
 

@@ -108,10 +108,18 @@ class ProgramPlanner:
         if self._idle is not None:
             self._idle.cancel()
 
+    @property
+    def will_run(self) -> bool:
+        """True if the program runs as soon as it is planned, and the planning has not failed."""
+        planning = self.planning
+        ready = planning is not None and (planning.busy or planning.program is not None)
+        return self.then is not None and ready
+
     def require(self) -> Planning:
         """Return the planning of the present program. Raises LeaseError if none is planned."""
         if self.planning is None or self.planning.program is None:
-            raise LeaseError("No program is planned. Send a script first.")
+            refused = "" if self.planning is None else self.planning.refused
+            raise LeaseError(refused or "No program is planned. Send a script first.")
         return self.planning
 
     @property

@@ -15,7 +15,7 @@ import msgspec
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.state import State, Verdict
+from katana450.arm.control.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import requests, runner
 from katana450.extensions.programs.continuation import Interruption
@@ -23,16 +23,14 @@ from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
-from katana450.extensions.programs.server.program_owner import (
-    ProgramOwner,
-    check_may_drive,
-)
+from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
 from katana450.extensions.programs.server.program_participant import ProgramParticipant
 from katana450.extensions.programs.server.program_planner import PLANNED_ORDERS, ProgramPlanner
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.server.run_progress import run_progress
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
+from katana450.server.service.dispatcher import ACCEPTED
 from katana450.server.service.hub import Hub
 from katana450.server.service.last_pause import LastPause
 from katana450.server.service.participants import Participant, session_of
@@ -51,8 +49,8 @@ class ProgramRunner(Runner):
         """Prepare to run programs of ``hub``.
 
         ``options.owner_silence`` is the heartbeat timeout of the owner [s], after which a program
-        ends. A page that reloads returns sooner. ``options.no_unattended``: see ``ProgramOwner``.
-        ``options.no_idle_planning``: scripts are planned only when they are asked for.
+        ends. ``options.no_unattended``: see ``ProgramOwner``. ``options.no_idle_planning``: scripts
+        are planned only when they are asked for.
         """
         super().__init__(hub, options)
         allowed = not options.no_unattended
@@ -81,6 +79,10 @@ class ProgramRunner(Runner):
         """Return whether ``participant`` owns the present program."""
         return self._owner.is_person(participant.person)
 
+    def runs_for(self, participant: Participant) -> bool:
+        """Return whether the program of ``participant`` runs, or will once it is planned."""
+        return self.owns(participant) and (self.running or self._planner.will_run)
+
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError if ``actor`` may not drive, or does not own the running program."""
         check_may_drive(actor.person)
@@ -93,9 +95,8 @@ class ProgramRunner(Runner):
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(participant, text, more=more, speed=speed)
             case requests.Steer(order=order, unattended=unattended, at=at):
-                if ticket := self.steer(participant, order, unattended=unattended, at=at):
-                    return answers.Done(ticket=ticket)
-                return answers.Done(outcome=Verdict.ACCEPTED.value)
+                ticket = self.steer(participant, order, unattended=unattended, at=at)
+                return answers.Done(ticket=ticket, outcome=None if ticket else ACCEPTED)
             case requests.Breakpoints(steps=steps):
                 self.set_breakpoints(participant, steps)
             case requests.AllowUnattended(allowed=allowed):
@@ -197,11 +198,14 @@ class ProgramRunner(Runner):
     def leave(self, participant: Participant) -> None:
         """Forget ``participant``; end its program, or the run that waits for its planning."""
         self._planner.forget_parts(participant)
-        if not self.owns(participant):
-            return
-        self._planner.forget_run(f"{participant.person.name} left")
-        if self.running and not self._owner.unattended:
-            self._end(f"{participant.person.name} left.")
+        self.end(participant, f"{participant.person.name} left")
+
+    def end(self, participant: Participant, why: str) -> None:
+        """End the program of ``participant``, or the run that waits for its planning."""
+        if self.owns(participant):
+            self._planner.forget_run(why)
+            if self.running and not self._owner.unattended:
+                self._end(f"{why}.")
 
     def removed(self, session: str) -> None:
         """End the program of the person of ``session``, even if it runs unattended."""
@@ -222,7 +226,6 @@ class ProgramRunner(Runner):
         if self._runs_as is None or self._run is None or program is None:
             return
         if not self._runs_as.drives:
-            # The next holder takes over an arm at rest, so no command is needed.
             taken = "The lease was taken from the program."
             self._leave_with(runner.ended(self._run, Phase.STOPPED, taken))
             return
@@ -327,8 +330,7 @@ class ProgramRunner(Runner):
             self._planner.plan_rest(participant, interruption, planning)
         else:
             self._planner.plan(participant, planning.text, planning.speed, first_step=(at or 1) - 1)
-        self._run = None
-        self._planner.then, self._owner.unattended = order, unattended
+        self._run, self._planner.then, self._owner.unattended = None, order, unattended
 
     def _begin(
         self, participant: Participant, order: ProgramOrder, *, unattended: bool
@@ -340,8 +342,7 @@ class ProgramRunner(Runner):
             self.hub.gate.check_not_stopped()
             self._planner.check_free(participant)
             self._planner.plan(participant, planning.text, planning.speed, changed)
-            self._run = None
-            self._planner.then, self._owner.unattended = order, unattended
+            self._run, self._planner.then, self._owner.unattended = None, order, unattended
             return None
         return self._start(planning, participant, order, unattended=unattended)
 
@@ -365,8 +366,8 @@ class ProgramRunner(Runner):
             single=order is ProgramOrder.STEP,
             pauses=self._planner.breakpoints,
         )
-        how = "runs unattended" if unattended else "runs"
-        log.info("%s %s the program %s.", participant.person.name, how, program.name)
+        how = ", unattended" if unattended else ""
+        log.info("%s runs the program %s%s.", participant.person.name, program.name, how)
         what = {"program": program.name, "order": order.value, "unattended": unattended}
         self.hub.recorder.note("program", participant.actor, what)
         return self._runs_as.ticket
@@ -392,9 +393,8 @@ class ProgramRunner(Runner):
         if self.program is not None:
             # Set first, because the progress is read in other threads too.
             self._interruption = Interruption.of(self.program, run, self.hub.present().state)
-        left, self._runs_as = self._runs_as, None
-        self._run = run
+        left, self._runs_as, self._run = self._runs_as, None, run
         left.leave(done=run.phase is Phase.DONE)
-        joined = left.joined
-        log.info("The program %s: %s", joined.person.name, run.why or f"{run.phase.value}.")
-        self.hub.recorder.note("program", joined.actor, {"ended": run.phase.value}, why=run.why)
+        actor, ended = left.joined.actor, run.phase.value
+        log.info("The program %s: %s", actor.name, run.why or f"{ended}.")
+        self.hub.recorder.note("program", actor, {"ended": ended}, why=run.why)
