@@ -67,7 +67,9 @@ are answered at once, as `accepted`. So are `branch`, whose path is planned firs
 gives the arm no command yet. A `stop` is answered at once, as `requested`.
 
 A stop is cleared at the earliest when the arm is at rest, and 1 s after the newest STOP; until then
-`clear_stop` is refused with the reason. `clearable` in a state says when. A stop can be cleared before a program sees it. A program that must not continue then, such as one that
+`clear_stop` is refused with the reason. `clearable` in a state says when.
+
+A stop can be cleared before a program sees it. A program that must not continue then, such as one that
 streams joint angles, adds to each command the `revocations` of the state in which it began. The server
 refuses the command if there was a stop or a change of driver since then. The answer to a command has
 this number too.
@@ -96,9 +98,9 @@ shape=requests.Shape.MESH, mesh=key))` places it in front of the arm. `arm.save_
 scene, and `arm.load_scene(data)` restores it.
 
 `connect` sends the heartbeats by itself. `aconnect` is the same for asyncio. A refused request
-raises `RefusedError`, whose text has the reason and what to do. `arm.stop()` sends STOP on all paths at once
-and returns `confirmed` or `requested`. `arm.clear_stop()` waits until the stop can be cleared. No call waits for ever: if the server
-does not answer, the call raises `LostError`.
+raises `RefusedError`, whose text has the reason and what to do. `arm.stop()` sends STOP on all paths at
+once and returns `confirmed` or `requested`. `arm.clear_stop()` waits until the stop can be cleared. If the
+server does not answer, a call raises `LostError`.
 
 With the token of an admin, `arm.people()` lists everybody who is connected, and `arm.kick(person)`,
 `arm.mute(person)` and `arm.unmute(person)` act on them ([access](access.md#admins)).
