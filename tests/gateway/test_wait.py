@@ -98,14 +98,17 @@ def check_nothing_moves_later(watcher: Client) -> None:
     "request_",
     [
         {"do": "joints", "q": THERE.tolist()},
-        {"do": "joint", "axis": 1, "value": 0.5},
+        pytest.param({"do": "joint", "axis": 1, "value": 0.5}, marks=pytest.mark.long),
         {"do": "nudge", "axis": 1, "by": -0.4},
-        {"do": "position", "p": [0.4, 0.1, 0.05]},
-        {"do": "turn", "pitch": 0.3, "roll": 0.2},
-        {"do": "step_tool", "by": [0.0, 0.0, 0.05, 0.0, 0.0]},
+        pytest.param({"do": "position", "p": [0.4, 0.1, 0.05]}, marks=pytest.mark.long),
+        pytest.param({"do": "turn", "pitch": 0.3, "roll": 0.2}, marks=pytest.mark.long),
+        pytest.param({"do": "step_tool", "by": [0.0, 0.0, 0.05, 0.0, 0.0]}, marks=pytest.mark.long),
         {"do": "gripper", "angle": 0.2},
-        {"do": "go_to_zero"},
-        {"do": "set", "node": "axis_1", "field": "rotation", "value": [0, 0, 1, 0.6]},
+        pytest.param({"do": "go_to_zero"}, marks=pytest.mark.long),
+        pytest.param(
+            {"do": "set", "node": "axis_1", "field": "rotation", "value": [0, 0, 1, 0.6]},
+            marks=pytest.mark.long,
+        ),
     ],
     ids=lambda request: str(request["do"]),
 )
@@ -127,6 +130,7 @@ def test_one_request_over_http_makes_one_whole_motion(
     assert (now.holder, now.stopped, now.moving) == (None, None, False)
 
 
+@pytest.mark.long
 def test_a_motion_longer_than_the_lease_of_a_silent_program_is_supervised(
     server: AppServer, watcher: Client
 ) -> None:
@@ -200,6 +204,7 @@ def test_pause_ends_the_wait(server: AppServer, watcher: Client) -> None:
         program.ask(requests.ReleaseLease())
 
 
+@pytest.mark.long
 def test_newer_command_of_the_same_program_supersedes(server: AppServer, watcher: Client) -> None:
     with moving(server, watcher) as answer:
         status, home = post(server, do="home", wait=30)
@@ -210,6 +215,7 @@ def test_newer_command_of_the_same_program_supersedes(server: AppServer, watcher
     check_nothing_moves_later(watcher)
 
 
+@pytest.mark.long
 def test_admin_who_takes_the_lease_ends_the_wait(server: AppServer, watcher: Client) -> None:
     with moving(server, watcher) as answer:
         watcher.ask(requests.Take())
@@ -295,6 +301,7 @@ def test_json_lines_and_websocket_have_the_same_wait(server: AppServer, watcher:
     assert watcher.query(answers.State).holder is None
 
 
+@pytest.mark.long
 def test_closed_line_stops_the_arm(server: AppServer, watcher: Client) -> None:
     slow(watcher)
     with speaking(server, "Broken") as lines:
@@ -304,6 +311,7 @@ def test_closed_line_stops_the_arm(server: AppServer, watcher: Client) -> None:
     watcher.clear_stop()
 
 
+@pytest.mark.long
 def test_number_of_open_requests_is_bounded(server: AppServer, watcher: Client) -> None:
     slow(watcher)
     with speaking(server) as lines:
@@ -315,6 +323,7 @@ def test_number_of_open_requests_is_bounded(server: AppServer, watcher: Client) 
         lines.answer(do="gripper", angle=0.0, wait=30)
 
 
+@pytest.mark.long
 def test_planned_path_is_waited_for(server: AppServer, watcher: Client) -> None:
     q = np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)).tolist()
     assert post(server, do="joints", q=q, wait=30)[1]["end"]["how"] == "reached"
@@ -359,6 +368,7 @@ def test_program_is_one_request_too(server: AppServer, watcher: Client) -> None:
     check_nothing_moves_later(watcher)
 
 
+@pytest.mark.long
 def test_end_of_a_program_that_does_not_reach_its_end_is_honest(
     server: AppServer, watcher: Client
 ) -> None:
@@ -398,6 +408,7 @@ def test_without_wait_the_program_falls_silent(server: AppServer, watcher: Clien
     watcher.clear_stop()
 
 
+@pytest.mark.long
 def test_simulated_arm_names_the_silence_too() -> None:
     with AppServer(SIMULATION_APP) as server, connect(server.url, "Watcher") as watcher:
         slow(watcher)
