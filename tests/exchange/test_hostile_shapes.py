@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.importers.reading import bind
 from katana450.extensions.importers.shape_file import (
     SECONDS,
     Format,
-    read_shape_guarded,
 )
 from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply

@@ -13,6 +13,7 @@ import pytest
 import trimesh
 
 from katana450.errors import InputError
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import (
     MAX_FILE_BYTES,
@@ -20,7 +21,6 @@ from katana450.extensions.importers.shape_file import (
     Format,
     Up,
     read_shape,
-    read_shape_guarded,
 )
 from katana450.maths.geometry import se3, so3
 from tests.exchange.mutations import check_mutations

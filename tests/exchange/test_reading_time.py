@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.extensions.importers import shape_file
+from katana450.extensions.importers import guarded_reading
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import SECONDS
 from katana450.extensions.importers.surface import MAX_TRIANGLES
@@ -73,7 +73,7 @@ def test_mesh_is_read_in_the_time_promised(
     monkeypatch: pytest.MonkeyPatch, name: str, data: bytes, count: int
 ) -> None:
     # The reading process limits its own processor time.
-    monkeypatch.setattr(shape_file, "SECONDS", 100.0)
+    monkeypatch.setattr(guarded_reading, "SECONDS", 100.0)
     own, others = spent()
     mesh = read_mesh(data, name)
     own, others = spent()[0] - own, spent()[1] - others

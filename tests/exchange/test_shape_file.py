@@ -21,7 +21,8 @@ from katana450.errors import InputError
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.vrml import world_of
 from katana450.extensions.export.vrml_text import world_text
-from katana450.extensions.importers import shape_file
+from katana450.extensions.importers import guarded_reading
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import (
     LONGEST_NAME,
@@ -32,7 +33,6 @@ from katana450.extensions.importers.shape_file import (
     label,
     object_name,
     read_shape,
-    read_shape_guarded,
 )
 from katana450.maths.collision.convex_body import convex_body
 from katana450.maths.geometry import se3, so3
@@ -49,6 +49,7 @@ FLAT, UPRIGHT = [60.0, 40.0, 25.0], [60.0, 25.0, 40.0]
     ("file", "standing", "colour"),
     [
         ("vtk.wrl", UPRIGHT, (255, 128, 0, 255)),
+        ("gmsh.wrl", UPRIGHT, None),
         ("meshlab.wrl", UPRIGHT, (230, 230, 230, 255)),
         ("gmsh.stl", FLAT, None),
         ("vtk.stl", FLAT, None),
@@ -110,7 +111,7 @@ def test_another_reader_finds_the_same_triangles(file: str) -> None:
 
 @pytest.mark.parametrize(
     ("file", "said"),
-    [("gmsh.wrl", "VRML 1.0, which is not supported"), ("assimp.gltf", "'assimp.bin'")],
+    [("assimp.gltf", "'assimp.bin', which is not there")],
 )
 def test_ignored_content_of_foreign_files_is_reported(file: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
@@ -226,9 +227,8 @@ def test_unit_is_given_or_guessed_and_reported(
 @pytest.mark.parametrize(
     ("size", "stated", "said"),
     [
-        (3000.0, None, "no unit would fit"),
-        (150.0, 1.0, "would fit with the unit mm or cm"),
-        (0.5, 1e-3, "0.5 mm long, with mm as its unit.*with the unit cm or in or m"),
+        (1e7, None, "no unit would fit"),
+        (5e3, 1.0, "would fit with the unit mm or cm"),
         (1e-9, None, "no unit would fit"),
         (1.0, 0.0, "above 0"),
         (1.0, float("nan"), "above 0"),
@@ -240,9 +240,29 @@ def test_an_invalid_size_is_refused(size: float, stated: float | None, said: str
         read_shape(tetrahedron(size), Format.OBJ, "a.obj", stated)
 
 
+@pytest.mark.parametrize(
+    ("size", "stated", "scale", "said"),
+    [
+        (3000.0, None, 0.5, "3000 mm long, over 2000 mm: place it with the scale 0.5, 1500 mm"),
+        (150.0, 1.0, 0.01, "1500 mm long, or read it with the unit mm or cm"),
+        (0.5, 1e-3, 20.0, "0.5 mm long, under 1 mm: .* scale 20, 10 mm long.* cm or in or m"),
+        (2000.0, None, 1.0, "2000 × 2000 × 2000 mm"),
+        (2.0002e3, 1e-3, 0.5, "2000.2 mm long, over 2000 mm"),
+    ],
+)
+def test_a_scale_is_proposed_for_a_size_that_cannot_be_placed(
+    size: float, stated: float | None, scale: float, said: str
+) -> None:
+    shape = read_shape(tetrahedron(size), Format.OBJ, "a.obj", stated)
+    assert shape.scale == scale
+    assert MIN_SIZE <= scale * np.ptp(shape.vertices, axis=0).max() <= MAX_SIZE
+    assert re.search(said, shape.text)
+
+
 def test_gltf_is_in_metres_even_where_that_is_too_large() -> None:
-    with pytest.raises(InputError, match="with the unit mm or cm"):
-        read_shape((FOREIGN / "assimp.glb").read_bytes(), Format.GLB, "a.glb")
+    shape = read_shape((FOREIGN / "assimp.glb").read_bytes(), Format.GLB, "a.glb")
+    assert shape.unit == 1.0
+    assert "with the unit mm or cm" in shape.text
 
 
 def test_the_axis_that_is_up_can_be_given() -> None:
@@ -282,7 +302,7 @@ def test_bounds_are_those_of_objects() -> None:
     assert scene_objects.MAX_NAME_LENGTH == LONGEST_NAME
 
 
-def test_gltf_of_2_m_is_read_and_a_longer_one_refused() -> None:
+def test_gltf_of_2_m_is_placed_and_a_longer_one_with_a_scale() -> None:
     """In single precision a side of 2 m is longer than 2 m by rounding."""
     side = float(np.nextafter(np.float32(2.0), np.float32(3.0)))
 
@@ -291,13 +311,12 @@ def test_gltf_of_2_m_is_read_and_a_longer_one_refused() -> None:
 
     mesh = read_mesh(cube(side), "long.glb")
     assert SceneObject("long", Shape.MESH, (), np.eye(4), solid=mesh.solid).size[0] > 2.0
-    with pytest.raises(InputError) as refused:
-        read_shape(cube(2.0002), Format.GLB, "long.glb")
-    found = re.search(
-        r"would be ([0-9.]+) mm long, .* the range is 1 to 2000 mm", str(refused.value)
-    )
-    assert found
-    assert float(found[1]) > 2000.0
+    longer = read_mesh(cube(2.0002), "long.glb")
+    assert longer.scale == 0.5
+    assert "It is 2000.2 mm long, over 2000 mm" in longer.text
+    with pytest.raises(InputError, match="must be from"):
+        SceneObject("long", Shape.MESH, (), np.eye(4), solid=longer.solid)
+    SceneObject("long", Shape.MESH, (), np.eye(4), solid=longer.solid, scale=longer.scale)
 
 
 def test_formats_follow_from_the_suffix() -> None:
@@ -326,10 +345,10 @@ def test_a_guarded_reading_fails_with_a_message(monkeypatch: pytest.MonkeyPatch)
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
     with pytest.raises(InputError, match=r"has 20\.0 MB"):
         read_shape_guarded(bytes(20_000_001), Format.PLY, "hull.ply")
-    monkeypatch.setattr(shape_file, "SECONDS", 0.01)
+    monkeypatch.setattr(guarded_reading, "SECONDS", 0.01)
     with pytest.raises(InputError, match=r"longer than 0.01 s"):
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
-    monkeypatch.setattr(shape_file, "SECONDS", 5.0)
+    monkeypatch.setattr(guarded_reading, "SECONDS", 5.0)
     monkeypatch.setattr("sys.executable", "false")
     with pytest.raises(InputError, match="needs more than 5 s or 1024 MiB"):
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")

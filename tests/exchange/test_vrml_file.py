@@ -184,7 +184,12 @@ def test_ignored_content_is_reported() -> None:
         'Shape { geometry Box { } appearance Appearance { texture ImageTexture { url "a" } } }'
     )
     assert volume(shape) == pytest.approx(8e-3)
-    for what in ("other files that it shows", "Wobbler", "Text", "pictures on the surface"):
+    for what in (
+        "It names files that are not there: a.wrl",
+        "Wobbler",
+        "Text",
+        "pictures on the surface",
+    ):
         assert what in shape.text
 
 
@@ -235,29 +240,28 @@ def test_nodes_that_use_others_can_be_deep() -> None:
         (chain(40, 2, "Group { }"), "more than 20000 nodes"),
         (chain(14, 2, "Shape { geometry Sphere { } }"), "more than 200000 triangles"),
         ("Group { children " * 300, "line 2: nodes are nested more than 200 deep"),
-        ("PROTO Bolt [ ] { Box { } }", "line 2: PROTO Bolt: prototypes are not supported"),
-        ('Group { EXTERNPROTO Bolt [ ] "b.wrl" }', "EXTERNPROTO Bolt"),
-        ("\nGroup { colour 1 }", "line 3: Group has no field 'colour'"),
+        ("PROTO Bolt [ ] { Box { } }", "has no triangles"),
+        ('EXTERNPROTO Bolt [ ] "b.wrl" Bolt { }', "It has Bolt. It names .* not there: b.wrl"),
+        ("\nGroup { colour }", "line 3: Group has no field 'colour'"),
+        ("\nGroup { center IS c Box { } colour 1 }", "It has Box in Group, colour of Group"),
         ("DEF a Group { children USE a }", "before it is defined"),
         ("Wobbler { a [ } ]", "'}' closes nothing"),
         ("Wobbler { a { ", "ends too early"),
         ("Wobbler", "expected '{'"),
-        ("Shape { geometry Box { size 1 0 1 } }", "Box whose size is not positive"),
-        ("Shape { geometry Sphere { radius -1 } }", "Sphere whose size is not positive"),
+        ("Shape { geometry Box { size 1 0 1 } }", "It has Box without a size"),
+        ("Shape { geometry Sphere { radius -1 } }", "It has Sphere without a size"),
         ("Shape { geometry Extrusion { spine [ 0 0 0 ] } }", "too few points"),
         ("Shape { geometry ElevationGrid { xDimension 2 height [ 1 ] } }", "heights"),
-        (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 4 ]'} }}", "vertex 4"),
-        (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 99999999999 ]'} }}", "whole number"),
         (
-            f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 2 ] color Color { }'} }}",
-            "colours do not match",
+            f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 4 ]'} }}",
+            "faces whose vertices are missing",
         ),
-        ("Shape { geometry Box { } geometry Box { } }", "given twice"),
+        (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 99999999999 ]'} }}", "whole number"),
         (
             f"Transform {{ scale 1e9 1 1 children Transform {{ scale 1e300 1 1 children {BOX} }}}}",
             "not finite numbers",
         ),
-        ("Shape { geometry Box { size nan 1 1 } }", "expected a number"),
+        ("Shape { geometry Box { size nan 1 1 } }", "not finite numbers"),
     ],
 )
 def test_invalid_worlds_are_refused(text: str, said: str) -> None:
@@ -269,8 +273,12 @@ def test_invalid_worlds_are_refused(text: str, said: str) -> None:
     ("data", "said"),
     [
         (b"", "must begin"),
-        (b"#VRML V1.0 ascii\nCube { }", "VRML 1.0"),
-        (b"#X3D V3.2 utf8\n", "must begin"),
+        (b"Wobbler { }", "must begin"),
+        (b"#VRML V1.0 ascii\nCube {", "line 2: the file ends too early"),
+        (b"#VRML V1.0 ascii\nUSE a", "'a' is used before it is defined"),
+        (b"#VRML V1.0 ascii\nSeparator { 1 }", "expected a value, not '}'"),
+        (b"#VRML V1.0 ascii\n" + b"Group { " * 300, "nested more than 200 deep"),
+        (b"#X3D V3.2 utf8\n", "has no triangles"),
         (gzip.compress(bytes(10), mtime=0)[:-6], "ends too early"),  # without its time
         (b"\x1f\x8b" + bytes(40), "corrupt"),
         (
@@ -279,6 +287,15 @@ def test_invalid_worlds_are_refused(text: str, said: str) -> None:
         ),
     ],
 )
-def test_invalid_vrml97_is_refused(data: bytes, said: str) -> None:
+def test_invalid_vrml_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.WRL, "a.wrl")
+
+
+def test_contradictions_in_a_world_are_left_out() -> None:
+    shape = world(f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 2 ] color Color { }'} }}")
+    assert shape.colours is None
+    assert "colours that do not match the faces" in shape.text
+    twice = world("Shape { geometry Sphere { } geometry Box { } }")
+    assert volume(twice) == pytest.approx(8e-3)
+    assert "the first value of geometry in Shape" in twice.text

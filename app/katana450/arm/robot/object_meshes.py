@@ -46,6 +46,7 @@ class Mesh:
         colours: (m, 4) of each face; None if the file has no colours.
         solid: The solid that represents it in collision checks.
         text: Sentences for people on what was read and how collisions are checked.
+        scale: Factor with which it can be placed; 1 if it can be as it is.
     """
 
     file: bytes
@@ -58,6 +59,7 @@ class Mesh:
     colours: Colours | None
     solid: Solid
     text: str
+    scale: float = 1.0
 
     @property
     def key(self) -> str:

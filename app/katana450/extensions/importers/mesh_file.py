@@ -9,12 +9,12 @@ import numpy as np
 from katana450.arm.control.solid import Solid
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
+from katana450.extensions.importers.guarded_reading import Beside, read_shape_guarded
 from katana450.extensions.importers.shape_file import (
     UNITS,
     Format,
     ShapeFile,
     Up,
-    read_shape_guarded,
 )
 from katana450.maths.collision.convex_body import ConvexBody
 
@@ -25,7 +25,15 @@ HULL_VOLUME_RATIO_TO_REPORT = 1.2
 """[1] Ratio of the volumes of hull and mesh from which it is reported."""
 
 
-def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = None) -> Mesh:
+def read_mesh(
+    data: bytes,
+    file: str,
+    unit: str | None = None,
+    up: Up | None = None,
+    *,
+    main: str = "",
+    beside: Beside | None = None,
+) -> Mesh:
     """Return the mesh in a file, read in a subprocess within some seconds.
 
     Args:
@@ -33,21 +41,23 @@ def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = N
         file: name of the file.
         unit: a key of UNITS; None to guess it.
         up: axis that points up, as in `read_shape`.
+        main: path of the shape file in a .zip, as in `read_shape`.
+        beside: returns the content of a file in the same folder, as in `read_shape_guarded`.
 
     Raises InputError with the defect of the file.
     """
     format = Format.of(file)
     metres = None if unit is None else unit_of(unit)
-    shape, found = read_shape_guarded(data, format, file, metres, up)
+    shape, found = read_shape_guarded(data, format, file, metres, up, main=main, beside=beside)
     sign = next(sign for sign, length in UNITS.items() if length == shape.unit)
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     foot = np.array((*(0.5 * (low + high)[:2]), low[2]))
-    settings = f"{format.value} {sign} {'' if up is None else up.value}\n".encode()
-    key = hashlib.sha256(settings + data).hexdigest()[:32]
+    settings = f"{shape.format.value} {sign} {'' if up is None else up.value}\n".encode()
+    key = hashlib.sha256(settings + shape.file).hexdigest()[:32]
     x, y, z = (high - low).tolist()
     return Mesh(
-        data,
-        format.value,
+        shape.file,
+        shape.format.value,
         sign,
         None if up is None else up.value,
         shape.name,
@@ -56,6 +66,7 @@ def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = N
         shape.colours,
         Solid(key, (x, y, z), found.corners - foot),
         f"{shape.text} {_counted(shape, found)}",
+        shape.scale,
     )
 
 

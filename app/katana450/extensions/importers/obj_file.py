@@ -1,18 +1,26 @@
-"""Wavefront OBJ: vertices with their colours, and polygons.
+"""Wavefront OBJ: vertices with their colours, and polygons with their materials.
 
-Source: Alias|Wavefront, Advanced Visualizer manual, appendix B1. No other file is opened, even if
-the file names one.
+Source: Alias|Wavefront, Advanced Visualizer manual, appendix B1. Materials are those of the MTL
+files of the same upload.
 """
 
 from __future__ import annotations
 
+import codecs
 import math
 from collections import Counter
 
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.surface import MeshReading, check_triangles, of_polygons
+from katana450.extensions.importers.companions import Companions
+from katana450.extensions.importers.mtl_file import PLAIN, Material, read_mtl
+from katana450.extensions.importers.surface import (
+    MeshReading,
+    as_bytes,
+    check_triangles,
+    of_polygons,
+)
 
 IGNORED_STATEMENTS = frozenset(
     [
@@ -27,8 +35,6 @@ LEFT_OUT = {
     "l": "lines",
     "call": "other files that it calls",
     "csh": "commands",
-    "usemtl": "materials, which are in another file",
-    "mtllib": "materials, which are in another file",
     **dict.fromkeys(
         [
             *("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole"),
@@ -40,10 +46,10 @@ LEFT_OUT = {
 """Statements that are not read, and their names in messages."""
 
 
-def read_obj(data: bytes, name: str) -> MeshReading:
+def read_obj(data: bytes, name: str, companions: Companions | None = None) -> MeshReading:
     """Return all polygons. Raises InputError with the line of an invalid statement."""
-    found = _Lines(name)
-    text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", " ")
+    found = _Lines(name, companions or Companions())
+    text = plain_text(data).replace("\r\n", "\n").replace("\\\n", " ")
     for number, line in enumerate(text.split("\n"), 1):
         words = line.partition("#")[0].split()
         if words:
@@ -51,11 +57,21 @@ def read_obj(data: bytes, name: str) -> MeshReading:
     return found.reading()
 
 
+def plain_text(data: bytes) -> str:
+    """Return a text in UTF-8, or in UTF-16 if it begins with the mark of its byte order."""
+    is_wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return data.decode("utf-16" if is_wide else "utf-8", "replace").removeprefix("\ufeff")
+
+
 class _Lines:
     """The statements of a file, collected line by line."""
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, companions: Companions) -> None:
+        self._name, self._companions = name, companions
+        self._materials: dict[str, Material] = {}
+        self._paints: list[Material] = []
+        self._paint = PLAIN
+        self._read: set[str] = set()
         self._vertices: list[list[float]] = []
         self._colours: dict[int, list[float]] = {}
         self._corners: list[int] = []
@@ -70,6 +86,10 @@ class _Lines:
             self._vertex(words[1:], line)
         elif kind == "f":
             self._face(words[1:], line)
+        elif kind == "usemtl":
+            self._paint = self._materials.get(" ".join(words[1:]), PLAIN)
+        elif kind == "mtllib":
+            self._library(words[1:])
         elif kind in LEFT_OUT:
             self._left_out[LEFT_OUT[kind]] += 1
         elif kind not in IGNORED_STATEMENTS:
@@ -82,14 +102,33 @@ class _Lines:
             vertex_colours = np.full((len(self._vertices), 4), 0.8)
             vertex_colours[:, 3] = 1.0
             vertex_colours[list(self._colours), :3] = list(self._colours.values())
+        colours = None
+        if any(paint != PLAIN for paint in self._paints):
+            colours = as_bytes(np.array(self._paints))
         surface = of_polygons(
             np.array(self._vertices, dtype=np.float64).reshape(-1, 3),
             np.array(self._corners, dtype=np.int64),
             np.array(self._sizes, dtype=np.int64),
             self._name,
+            colours,
             vertex_colours=vertex_colours,
         )
         return MeshReading(surface, tuple(self._left_out))
+
+    def _library(self, words: list[str]) -> None:
+        """Read the materials of the MTL files ``words``; one name may contain blanks."""
+        whole = " ".join(words)
+        for names in ([whole, words[0]], *([each] for each in words[1:])) if words else ():
+            found = self._companions.find(dict.fromkeys(names))
+            if found is None or found[0] in self._read:
+                continue
+            self._read.add(found[0])
+            materials, has_pictures = read_mtl(plain_text(found[1]))
+            self._materials |= materials
+            if has_pictures:
+                self._left_out["pictures on the surface"] += 1
+            if found[0].endswith(whole):
+                return
 
     def _vertex(self, words: list[str], line: int) -> None:
         try:
@@ -114,6 +153,7 @@ class _Lines:
                 raise self._wrong(line, f"there is no vertex {index}")
             self._corners.append(index - 1 if index > 0 else count + index)
         self._sizes.append(len(words))
+        self._paints.append(self._paint)
         self._triangles += max(len(words) - 2, 0)
         check_triangles(self._triangles, self._name)
 

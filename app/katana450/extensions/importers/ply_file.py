@@ -6,6 +6,7 @@ programs.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.importers.surface import MeshReading, as_bytes, doubles, of_polygons
+from katana450.extensions.importers.surface import (
+    MeshReading,
+    as_bytes,
+    check_triangles,
+    doubles,
+    of_polygons,
+)
 from katana450.maths.geometry.arrays import FloatArray
 
 TYPES = {
@@ -25,6 +32,9 @@ TYPES = {
 
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 """numpy byte orders by the formats in the header; empty for text."""
+
+STATEMENTS = ("format", "element", "property")
+"""First words of the lines of a header that matter."""
 
 MAX_HEADER_BYTES = 64 * 1024
 """[bytes] Maximum size of a header."""
@@ -75,7 +85,13 @@ def read_ply(data: bytes, name: str) -> MeshReading:
     source = _Binary(body, order, name) if order else _Text(body, name)
     found: dict[str, dict[str, Column]] = {}
     for element in elements:
-        found[element.name] = source.columns(element)
+        try:
+            found[element.name] = source.columns(element)
+        except InputError:
+            # Some programs declare elements after the faces that they do not write.
+            if not found.keys() >= {"vertex", "face"}:
+                raise
+            break
     vertices, faces = found.get("vertex", {}), found.get("face", {})
     if not all(axis in vertices and vertices[axis].sizes is None for axis in "xyz"):
         raise InputError(f"{name} has no vertices with x, y and z.")
@@ -87,6 +103,13 @@ def read_ply(data: bytes, name: str) -> MeshReading:
     # Values that cannot be an index become -1, which `of_polygons` refuses.
     usable = np.abs(doubles(listed.values)) < 2.0**53
     corners = np.where(usable, listed.values, -1).astype(np.int64)
+    strips = found.get("tristrips", {}).get("vertex_indices")
+    if strips is not None and strips.sizes is not None and not len(corners):
+        corners = _of_strips(strips.values.astype(np.int64), strips.sizes, name)
+        listed = Column(corners, np.full(len(corners) // 3, 3), "i4")
+        faces = {}
+        elements = [each for each in elements if each.name != "tristrips"]
+    assert listed.sizes is not None
     colours, of_vertices = _paint(faces), _paint(vertices)
     surface = of_polygons(
         points,
@@ -100,19 +123,37 @@ def read_ply(data: bytes, name: str) -> MeshReading:
     return MeshReading(surface, tuple(others))
 
 
+def _of_strips(
+    values: npt.NDArray[np.int64], sizes: npt.NDArray[np.int64], name: str
+) -> npt.NDArray[np.int64]:
+    """Return the corners (3 m,) of triangles in strips, which end with their list or with -1."""
+    check_triangles(len(values), name)
+    ends = np.zeros(len(values) + 1, dtype=bool)
+    ends[np.cumsum(sizes)] = True
+    # Number of each value within its strip; every second triangle has the other orientation.
+    starts = ends[:-1] | np.concatenate(([True], values[:-1] < 0))
+    first = np.maximum.accumulate(np.where(starts, np.arange(len(values)), 0))
+    place = np.arange(len(values)) - first
+    last = np.flatnonzero((place >= 2) & (values >= 0))
+    odd = place[last] % 2
+    return np.column_stack((values[last - 2 + odd], values[last - 1 - odd], values[last])).ravel()
+
+
 def _header(data: bytes, name: str) -> tuple[str, list[Element], bytes]:
     """Return the byte order, the elements, and the data after the header."""
-    if not data.startswith((b"ply\n", b"ply\r")):
+    if not re.match(rb"ply[ \t]*[\r\n]", data):
         raise InputError(f"{name} is not a PLY file: it must begin with 'ply'.")
-    ends = data.find(b"end_header", 0, MAX_HEADER_BYTES)
-    line_end = data.find(b"\n", ends)
-    if ends < 0 or line_end < 0:
+    ends = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\n|\r)").search(data, 0, MAX_HEADER_BYTES)
+    if ends is None:
         raise InputError(f"{name} is corrupt: its header does not end.")
     order: str | None = None
     elements: dict[str, Element] = {}
-    for line in data[:ends].decode("utf-8", "replace").splitlines()[1:]:
+    for line in data[: ends.start()].decode("utf-8", "replace").splitlines()[1:]:
         match line.split():
-            case [] | ["comment" | "obj_info", *_]:
+            # Some programs forget the word comment.
+            case []:
+                continue
+            case [word, *_] if word not in STATEMENTS:
                 continue
             case ["format", kind, "1.0"] if kind in ORDERS:
                 order = ORDERS[kind]
@@ -132,7 +173,7 @@ def _header(data: bytes, name: str) -> tuple[str, list[Element], bytes]:
         raise InputError(f"{name} is corrupt: {line[:60]!r} in its header is invalid.")
     if order is None:
         raise InputError(f"{name} is corrupt: its header has no format.")
-    return order, list(elements.values()), data[line_end + 1 :]
+    return order, list(elements.values()), data[ends.end() :]
 
 
 def _last(elements: dict[str, Element]) -> Element:

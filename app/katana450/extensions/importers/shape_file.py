@@ -1,29 +1,23 @@
 """Shapes of other programs as triangles in metres, z up: meshes and worlds in nine formats.
 
-Files are untrusted. Readers open no other file, execute nothing, and stop at limits of their own.
-`read_shape_guarded` adds limits of the system, in a disposable subprocess.
+Files are untrusted. Readers see no file but those of the same upload, execute nothing, and stop at
+limits of their own. `read_shape_guarded` adds limits of the system, in a disposable subprocess.
 """
 
 from __future__ import annotations
 
-import io
 import math
-import os
 import re
-import subprocess
-import sys
-import threading
-import time
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError, digits_beyond
+from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, packed, unpacked
+from katana450.extensions.importers.companions import Companions
 from katana450.extensions.importers.gltf_file import read_gltf
 from katana450.extensions.importers.obj_file import read_obj
 from katana450.extensions.importers.off_file import read_off
@@ -31,9 +25,7 @@ from katana450.extensions.importers.ply_file import read_ply
 from katana450.extensions.importers.stl_file import read_stl
 from katana450.extensions.importers.surface import MeshReading, MeshSurface
 from katana450.extensions.importers.vrml_file import read_wrl
-from katana450.maths.collision.convex_body import ConvexBody
-from katana450.maths.geometry.arrays import FloatArray, IntArray, frozen
-from katana450.maths.planning.checkpoint import checkpoint
+from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 MAX_FILE_BYTES = 20_000_000
 """[bytes] Maximum size of a file."""
@@ -43,6 +35,12 @@ MAX_SIZE, MIN_SIZE = 2.0, 1e-3
 to import.
 """
 
+SMALL = 1e-2
+"""[m] Minimum length of an object that is enlarged to be placed."""
+
+SCALES = (*(step * 10.0**power for power in range(-3, 3) for step in (1.0, 2.0, 5.0)), 1e3)
+"""[1] Factors that are proposed, within the bounds of those of an object."""
+
 ROUNDING = 1e-6
 """[1] Relative tolerance of a bound, for lengths rounded to single precision."""
 
@@ -51,9 +49,6 @@ LONGEST_NAME = 40
 
 SECONDS = 5.0
 """[s] Timeout of reading a file."""
-
-CHECK_EVERY = 0.1
-"""[s] Interval of the checks whether the reading was cancelled."""
 
 MAX_MEMORY_BYTES = 1 << 30
 """[bytes] Maximum memory for reading a file."""
@@ -74,12 +69,16 @@ class Format(Enum):
     DAE = "dae"
     THREEMF = "3mf"
     OFF = "off"
+    ZIP = "zip"
 
     @classmethod
     def of(cls, file: str) -> Format:
-        """Return the format of a file by its name; .wrz is a compressed .wrl. Raises InputError."""
+        """Return the format of a file by its name. Raises InputError.
+
+        .wrz is a compressed .wrl, .zae a .zip with a .dae.
+        """
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
-        known = {each.value: each for each in cls} | {"wrz": cls.WRL}
+        known = {each.value: each for each in cls} | {"wrz": cls.WRL, "zae": cls.ZIP}
         if suffix not in known:
             raise InputError(
                 f"{label(file)} has an unknown format. Use a file that ends in "
@@ -87,6 +86,9 @@ class Format(Enum):
             )
         return known[suffix]
 
+
+SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz")
+"""Suffixes of files with a shape."""
 
 Y_UP = (Format.WRL, Format.GLB, Format.GLTF)
 """Formats whose standard has y up."""
@@ -110,6 +112,8 @@ class ShapeFile:
         colours: (m, 4) sRGB and opacity of the faces; None if the file has none.
         unit: unit of the file [m].
         text: note for people: unit and its source, number of triangles, size, omitted parts.
+        scale: factor with which it is small and large enough to be placed; 1 if it is as it is.
+        format, file: the file as it can be read again: a .zip if it needs other files.
     """
 
     name: str
@@ -118,6 +122,9 @@ class ShapeFile:
     colours: Colours | None
     unit: float
     text: str
+    scale: float
+    format: Format
+    file: bytes
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.colours):
@@ -126,123 +133,80 @@ class ShapeFile:
 
 
 def read_shape(
-    data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
+    data: bytes,
+    format: Format,
+    name: str,
+    unit: float | None = None,
+    up: Up | None = None,
+    *,
+    main: str = "",
+    missing: list[str] | None = None,
 ) -> ShapeFile:
     """Return the shape in a file.
 
     Args:
-        data: content of the file.
+        data: content of the file, or of a .zip of it and the files that it names.
         format: its format.
         name: its name, with or without folders.
         unit: its unit [m]; None to guess it.
         up: its axis that points up; None for the default of the format.
+        main: path of the shape file in a .zip; chosen if it is left out.
+        missing: gets the paths of files that it names and that are not there, also before an error.
 
-    Raises InputError for a file that is corrupt, too large, or of another format.
+    Raises ChoiceError for a .zip of several shapes, and InputError for a file that is corrupt, too
+    large, or of another format.
     """
     file = label(name)
-    _check(data, file, unit)
+    check_file(data, file, unit, format)
+    others: dict[str, bytes] = {}
+    path = ""
+    if format is Format.ZIP:
+        path, others = unpacked(data, file, SHAPE_SUFFIXES, main)
+        name, format, data = path, Format.of(path), others[path]
+        file = label(name)
+        check_file(data, file, unit, format)
+    companions = Companions(others, path)
     try:
-        reading = _read(data, format, file)
+        reading = _read(data, format, file, companions)
     except RecursionError as error:
         raise InputError(f"{file} is corrupt: its parts are nested too deeply.") from error
+    finally:
+        if missing is not None:
+            missing += companions.missing
     reading = _in_known_unit(reading, file)
     surface = reading.surface.tidy()
+    left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
     if not len(surface.faces):
-        without = f" It has {_listed(reading.left_out)}." if reading.left_out else ""
-        raise InputError(f"{file} has no triangles.{without}")
+        without = f" It has {_listed(left_out)}." if left_out else ""
+        raise InputError(f"{file} has no triangles.{without}{_not_there(companions)}")
     sides = np.ptp(surface.vertices, axis=0)
     longest = float(sides.max())
     metres, why = _unit(format, longest, unit, reading.unit)
-    _check_size(longest, metres, file)
+    scale = fitting_scale(longest * metres)
+    if scale is None:
+        raise _beyond(longest, metres, file)
     axis = up or Up(reading.up or ("y" if format in Y_UP else "z"))
     vertices = surface.vertices * metres
     if axis is Up.Y:
         vertices = vertices[:, (0, 2, 1)] * (1.0, -1.0, 1.0)
     text = f"{_size(vertices, surface)}; {why}; {_turned(axis, up)}."
-    if reading.left_out:
-        text += f" Left out: {_listed(reading.left_out)}."
-    return ShapeFile(object_name(name), vertices, surface.faces, surface.colours, metres, text)
-
-
-def read_shape_guarded(
-    data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
-) -> tuple[ShapeFile, ConvexBody]:
-    """Return the result of `read_shape`, and its convex body, from a subprocess.
-
-    The subprocess has `SECONDS` and, where the system supports it, `MAX_MEMORY_BYTES`. Raises
-    InputError as `read_shape`, at these limits, and after a crash; and the error of a `checkpoint`,
-    which ends the subprocess.
-    """
-    file = label(name)
-    _check(data, file, unit)
-    words = [
-        format.value,
-        file,
-        "" if unit is None else str(float(unit)),
-        "" if up is None else up.value,
-    ]
-    # One thread, because a pool for every core would take address space, which is limited.
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    with subprocess.Popen(
-        [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
-        # The parent folder of the package.
-        cwd=Path(__file__).resolve().parents[3],
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    ) as process:
-        try:
-            output = _output(process, data, file)
-        except BaseException:
-            process.kill()
-            raise
-    if process.returncode:
-        raise InputError(
-            f"{file} cannot be read: it needs more than {SECONDS:g} s or {MAX_MEMORY_BYTES >> 20} "
-            "MiB, or the file is corrupt. Try a simpler export."
-        )
-    with np.load(io.BytesIO(output), allow_pickle=False) as found:
-        if "error" in found:
-            raise InputError(str(found["error"]))
-        shape = ShapeFile(
-            object_name(name),
-            found["vertices"],
-            found["faces"],
-            found.get("colours"),
-            float(found["unit"]),
-            str(found["text"]),
-        )
-        body = ConvexBody(
-            frozen(found["corners"]),
-            float(found["off"]),
-            bool(found["thickened"]),
-            float(found["volume"]),
-        )
-        return shape, body
-
-
-def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:
-    """Return the output of ``process`` for ``data``. Raises InputError after `SECONDS`."""
-    # communicate() sends no further input after a timeout, so a separate thread sends all of it.
-    threading.Thread(target=_send, args=(process.stdin, data), daemon=True).start()
-    process.stdin = None
-    due = time.monotonic() + SECONDS
-    while True:
-        checkpoint()
-        try:
-            return process.communicate(timeout=CHECK_EVERY)[0]
-        except subprocess.TimeoutExpired as error:
-            if time.monotonic() > due:
-                raise InputError(
-                    f"{file} takes longer than {SECONDS:g} s to read. Try a simpler export."
-                ) from error
-
-
-def _send(pipe: IO[bytes], data: bytes) -> None:
-    # A process that has ended reads nothing.
-    with suppress(OSError), pipe:
-        pipe.write(data)
+    if left_out:
+        text += f" Left out: {_listed(left_out)}."
+    text += _not_there(companions) + _scaled(longest, metres, scale)
+    used = {each: others[each] for each in companions.used if each != path}
+    if used:
+        data, format = packed(path, {path: data} | used), Format.ZIP
+    return ShapeFile(
+        object_name(name),
+        vertices,
+        surface.faces,
+        surface.colours,
+        metres,
+        text,
+        scale,
+        format,
+        data,
+    )
 
 
 def label(name: str) -> str:
@@ -260,24 +224,26 @@ def object_name(name: str) -> str:
     return stem or "shape"
 
 
-def _check(data: bytes, file: str, unit: float | None) -> None:
-    if len(data) > MAX_FILE_BYTES:
+def check_file(data: bytes, file: str, unit: float | None, format: Format) -> None:
+    """Raise InputError for a file that is too large, or a unit that is no length."""
+    maximum = MAX_ARCHIVE_BYTES if format is Format.ZIP else MAX_FILE_BYTES
+    if len(data) > maximum:
         raise InputError(
-            f"{file} has {len(data) / 1e6:.1f} MB; at most {MAX_FILE_BYTES // 1_000_000} are read. "
+            f"{file} has {len(data) / 1e6:.1f} MB; at most {maximum // 1_000_000} are read. "
             "Save it coarser, or as a binary file."
         )
     if unit is not None and not (math.isfinite(unit) and unit > 0.0):
         raise InputError(f"The unit must be a length in metres above 0, not {unit}.")
 
 
-def _read(data: bytes, format: Format, file: str) -> MeshReading:
+def _read(data: bytes, format: Format, file: str, companions: Companions) -> MeshReading:
     match format:
         case Format.WRL:
-            return read_wrl(data, file, MAX_FILE_BYTES)
+            return read_wrl(data, file, MAX_FILE_BYTES, companions)
         case Format.STL:
             return read_stl(data, file)
         case Format.OBJ:
-            return read_obj(data, file)
+            return read_obj(data, file, companions)
         case Format.PLY:
             return read_ply(data, file)
         case Format.OFF:
@@ -291,7 +257,24 @@ def _read(data: bytes, format: Format, file: str) -> MeshReading:
             from katana450.extensions.importers.threemf_file import read_3mf
 
             return read_3mf(data, file, MAX_FILE_BYTES)
-    return read_gltf(data, file)
+    return read_gltf(data, file, companions)
+
+
+def _not_there(companions: Companions) -> str:
+    """Return a sentence on the files that a file names and that are not there."""
+    names = tuple(companions.missing)
+    if not names:
+        return ""
+    return (
+        f" It names files that are not there: {_listed(names)}. Add them together with it, as "
+        "their folder or as a .zip."
+    )
+
+
+def _degenerate(surface: MeshSurface, tidy: MeshSurface) -> list[str]:
+    """Return a note on the triangles of ``surface`` that are not in ``tidy``."""
+    count = len(surface.faces) - len(tidy.faces)
+    return [f"{count} degenerate triangle{'' if count == 1 else 's'}"] if count else []
 
 
 def _in_known_unit(reading: MeshReading, file: str) -> MeshReading:
@@ -316,7 +299,8 @@ def _unit(
     if format in (Format.GLB, Format.GLTF):
         return 1.0, "the unit is m, as in all glTF files"
     if longest > MAX_SIZE * (1.0 + ROUNDING):
-        return 1e-3, f"the unit is assumed to be mm, since {longest:.4g} m would be too large"
+        metres = digits_beyond(longest, 0.0, MAX_SIZE)
+        return 1e-3, f"the unit is assumed to be mm, since {metres} m would be too large"
     return 1.0, f"the unit is assumed to be m, since {longest:.4g} mm would be small"
 
 
@@ -324,16 +308,42 @@ def _sign(unit: float) -> str:
     return next((sign for sign, metres in UNITS.items() if metres == unit), f"{unit:g} m")
 
 
-def _check_size(longest: float, unit: float, file: str) -> None:
-    length = longest * unit
+def fitting_scale(length: float) -> float | None:
+    """Return a round factor with which an object of ``length`` [m] can be placed.
+
+    1 if it can be as it is; None if none of the possible factors is enough.
+    """
     if MIN_SIZE * (1.0 - ROUNDING) <= length <= MAX_SIZE * (1.0 + ROUNDING):
-        return
-    fitting = [s for s, metres in UNITS.items() if MIN_SIZE <= longest * metres <= MAX_SIZE]
-    hint = f"it would fit with the unit {' or '.join(fitting)}" if fitting else "no unit would fit"
+        return 1.0
+    if length > MAX_SIZE:
+        return next((each for each in SCALES[::-1] if each * length <= MAX_SIZE), None)
+    return next((each for each in SCALES if each * length >= SMALL), None)
+
+
+def _scaled(longest: float, unit: float, scale: float) -> str:
+    """Return a sentence on the factor with which an object can be placed; empty for 1."""
+    if scale == 1.0:
+        return ""
+    length = longest * unit
     size = digits_beyond(1e3 * length, 1e3 * MIN_SIZE, 1e3 * MAX_SIZE)
-    raise InputError(
-        f"{file} would be {size} mm long, with {_sign(unit)} as its unit; "
-        f"the range is {MIN_SIZE * 1e3:g} to {MAX_SIZE * 1e3:g} mm, and {hint}."
+    bound = f"over {1e3 * MAX_SIZE:g}" if length > MAX_SIZE else f"under {1e3 * MIN_SIZE:g}"
+    fitting = [s for s, metres in UNITS.items() if fitting_scale(longest * metres) == 1.0]
+    hint = f", or read it with the unit {' or '.join(fitting)}" if fitting else ""
+    return (
+        f" It is {size} mm long, {bound} mm: place it with the scale {scale:g}, "
+        f"{1e3 * scale * length:.4g} mm long{hint}."
+    )
+
+
+def _beyond(longest: float, unit: float, file: str) -> InputError:
+    """Return the error for a size that no scale makes fit."""
+    fitting = [sign for sign, metres in UNITS.items() if fitting_scale(longest * metres)]
+    hint = f"it would fit with the unit {' or '.join(fitting)}" if fitting else "no unit would fit"
+    low, high = (SMALL / SCALES[-1], MAX_SIZE / SCALES[0])
+    size = digits_beyond(1e3 * longest * unit, 1e3 * low, 1e3 * high)
+    return InputError(
+        f"{file} would be {size} mm long, with {_sign(unit)} as its unit; with a scale, "
+        f"{1e3 * low:g} to {1e3 * high:g} mm can be placed, and {hint}."
     )
 
 
@@ -348,6 +358,6 @@ def _turned(axis: Up, given: Up | None) -> str:
     return f"z is up{why}" if axis is Up.Z else f"y of the file is up{why}, and rotated to z"
 
 
-def _listed(parts: tuple[str, ...]) -> str:
+def _listed(parts: Sequence[str]) -> str:
     few = [part if len(part) <= LONGEST_NAME else f"{part[:LONGEST_NAME]}…" for part in parts[:8]]
     return ", ".join(few) + (f" and {len(parts) - 8} more" if len(parts) > 8 else "")

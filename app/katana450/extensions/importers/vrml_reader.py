@@ -39,7 +39,7 @@ _TOKEN = re.compile(
 )
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?(?:[0-9]{1,10}|0[xX][0-9a-fA-F]{1,8})")
-_NUMBERS, _INTEGERS = (
+NUMBERS, INTEGERS = (
     re.compile(rf"\s*(?:{one}\s+)*+(?:{one})?+") for one in (_NUMBER.pattern, "[+-]?[0-9]{1,10}")
 )
 _NAME = re.compile(r"[^\x00-\x20\"#',.\[\]\\{}\x7f0-9+-][^\x00-\x20\"#',.\[\]\\{}\x7f]*")
@@ -132,7 +132,7 @@ class Reader:
             token = self._take()
         kinds = self.fields.get(token)
         if kinds is None:
-            node = self._unknown(token, name)
+            node = self._unknown(token, name, depth)
             if name is not None:
                 self._named[name] = node
             return node
@@ -141,10 +141,10 @@ class Reader:
         while self._ahead != "}":
             field = self._take()
             if field not in kinds:
-                self._stray(token, field)
+                self._stray(token, field, depth)
                 continue
             if field in fields:
-                raise self._error(f"the field {field} is given twice in one {token}")
+                self._again(token, field)
             fields[field] = self._value(kinds[field], depth)
         self._take()
         node = Node(token, tuple(fields.items()), name)
@@ -160,15 +160,25 @@ class Reader:
     def _used(self, _node: Node, name: str) -> Node | Use:
         return Use(name)
 
-    def _unknown(self, kind: str, _name: str | None) -> Node:
+    def _placeholder(self, _kind: Type) -> Value:
+        """Parse what stands for a field of a prototype."""
+        raise self._error("IS is not supported")
+
+    def _again(self, kind: str, field: str) -> None:
+        """Decide about a field that is given a second time."""
+        raise self._error(f"the field {field} is given twice in one {kind}")
+
+    def _unknown(self, kind: str, _name: str | None, _depth: int) -> Node:
         """Parse a node that is not in the table."""
         raise self._error(f"the node {kind!r} is not supported")
 
-    def _stray(self, kind: str, field: str) -> None:
+    def _stray(self, kind: str, field: str, _depth: int) -> None:
         """Parse a token in the place of a field of a node ``kind``."""
         raise self._error(f"{kind} has no field {field!r}")
 
     def _value(self, kind: Type, depth: int) -> Value:
+        if self._ahead == "IS":
+            return self._placeholder(kind)
         match kind:
             case Type.NODE:
                 return self._node(depth + 1)
@@ -186,7 +196,7 @@ class Reader:
             case Type.INT:
                 return self._integer()
             case Type.INT_LIST:
-                whole = self._row(_INTEGERS, int)
+                whole = self._row(INTEGERS, int)
                 return tuple(self._items(self._integer)) if whole is None else whole
         width = WIDTHS[kind]
         if kind not in LISTS:
@@ -195,7 +205,7 @@ class Reader:
         # A list of one value may omit its brackets.
         if self._ahead != "[":
             return tuple(self._float() for _ in range(width))
-        numbers = self._row(_NUMBERS, float)
+        numbers = self._row(NUMBERS, float)
         if numbers is None:
             numbers = tuple(self._items(self._float))
         if len(numbers) % width:

@@ -6,6 +6,7 @@ Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGr
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -20,13 +21,23 @@ ROUND = 32
 """Number of sides that approximate a circle."""
 
 
-def surface_of(node: Node, name: str) -> MeshSurface | None:
+def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | None:
     """Return the surface of a geometry node; None for a kind without one, such as lines.
 
-    ``name`` is the name of the file. Raises InputError for a node that contradicts itself.
+    ``name`` is the name of the file; ``left_out`` counts colours and faces that contradict the
+    rest. Raises InputError for a node that contradicts itself as a whole.
     """
     make = MAKERS.get(node.kind)
-    return None if make is None else make(node, name)
+    if make is not None and _is_empty(node):
+        left_out[f"{node.kind} without a size"] += 1
+        return MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    return None if make is None else make(node, name, left_out)
+
+
+def _is_empty(node: Node) -> bool:
+    """Return whether a solid has a side that is not positive."""
+    lengths = [numbers(node, name, (1.0,)) for name in LENGTHS.get(node.kind, ())]
+    return any(bool((each <= 0.0).any()) for each in lengths)
 
 
 def numbers(node: Node, field: str, default: Sequence[float], width: int = 1) -> FloatArray:
@@ -53,36 +64,27 @@ def part(node: Node, field: str) -> Node | None:
     return value if isinstance(value, Node) else None
 
 
-def _positive(node: Node, name: str, **fields: float) -> list[float]:
-    values = [number(node, field, default) for field, default in fields.items()]
-    if min(values) <= 0.0:
-        raise InputError(f"{name} has a {node.kind} whose size is not positive.")
-    return values
-
-
-def _box(node: Node, name: str) -> MeshSurface:
+def _box(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     half = numbers(node, "size", (2.0, 2.0, 2.0))[:, 0] / 2.0
-    if half.min() <= 0.0:
-        raise InputError(f"{name} has a Box whose size is not positive.")
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     sides = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
     return of_polygons(signs * half, np.array(sides), np.full(6, 4), name)
 
 
-def _cone(node: Node, name: str) -> MeshSurface:
-    radius, height = _positive(node, name, bottomRadius=1.0, height=2.0)
+def _cone(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
+    radius, height = number(node, "bottomRadius", 1.0), number(node, "height", 2.0)
     ring = [(radius, -height / 2.0), (0.0, height / 2.0)]
     return _turned(ring, flag(node, "bottom"), flag(node, "side"), False, name)
 
 
-def _cylinder(node: Node, name: str) -> MeshSurface:
-    radius, height = _positive(node, name, radius=1.0, height=2.0)
+def _cylinder(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
+    radius, height = number(node, "radius", 1.0), number(node, "height", 2.0)
     ring = [(radius, -height / 2.0), (radius, height / 2.0)]
     return _turned(ring, flag(node, "bottom"), flag(node, "side"), flag(node, "top"), name)
 
 
-def _sphere(node: Node, name: str) -> MeshSurface:
-    (radius,) = _positive(node, name, radius=1.0)
+def _sphere(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
+    radius = number(node, "radius", 1.0)
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, ROUND // 2 + 1)
     profile = np.column_stack((np.cos(angles), np.sin(angles))) * radius
     profile[[0, -1], 0] = 0.0
@@ -117,10 +119,11 @@ def _turned(
         corners.append((len(rows) - 1) * ROUND + here)
         sizes.append(ROUND)
     flat = np.concatenate([np.zeros(0, dtype=np.int64), *corners])
-    return of_polygons(points, flat, np.array(sizes, dtype=np.int64), name)
+    # At the axis, two corners are one.
+    return of_polygons(points, flat, np.array(sizes, dtype=np.int64), name).tidy()
 
 
-def _face_set(node: Node, name: str) -> MeshSurface:
+def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     coord, color = part(node, "coord"), part(node, "color")
     points = np.zeros((0, 3)) if coord is None else numbers(coord, "point", (), 3)
     index = numbers(node, "coordIndex", ())[:, 0].astype(np.int64)
@@ -132,13 +135,21 @@ def _face_set(node: Node, name: str) -> MeshSurface:
         if flag(node, "colorPerVertex"):
             places, their_sizes = _split(chosen) if len(chosen) else (corners, sizes)
             fits = np.array_equal(sizes, their_sizes)
-            corner_colours = _chosen(paint, places, fits, name)
+            corner_colours = _chosen(paint, places, fits, left_out)
         else:
             places = chosen if len(chosen) else np.arange(len(sizes))
-            face_colours = _chosen(paint, places[: len(sizes)], len(places) >= len(sizes), name)
+            fits = len(places) >= len(sizes)
+            face_colours = _chosen(paint, places[: len(sizes)], fits, left_out)
     turned = not flag(node, "ccw")
     if face_colours is not None:
         corner_colours = np.repeat(face_colours, sizes, axis=0)
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    whole = np.ones(len(sizes), dtype=bool)
+    whole[owner[corners >= len(points)]] = False
+    if not whole.all():
+        left_out["faces whose vertices are missing"] += int((~whole).sum())
+        corner_colours = None if corner_colours is None else corner_colours[whole[owner]]
+        corners, sizes = corners[whole[owner]], sizes[whole]
     surface = of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
     return _facing(surface, turned)
 
@@ -151,10 +162,16 @@ def _split(index: IntArray) -> tuple[IntArray, IntArray]:
     return index[index >= 0], sizes if len(index) == 0 or index[-1] >= 0 else sizes[:-1]
 
 
-def _chosen(paint: FloatArray, places: IntArray, fits: bool, name: str) -> FloatArray:
-    """Return the colours (k, 4) at ``places`` of the table ``paint`` (c, 3)."""
+def _chosen(
+    paint: FloatArray, places: IntArray, fits: bool, left_out: Counter[str]
+) -> FloatArray | None:
+    """Return the colours (k, 4) at ``places`` of the table ``paint`` (c, 3).
+
+    None if they do not match.
+    """
     if not fits or (places < 0).any() or (places >= len(paint)).any():
-        raise InputError(f"{name} has an IndexedFaceSet whose colours do not match its faces.")
+        left_out["colours that do not match the faces"] += 1
+        return None
     return np.column_stack((paint[places], np.ones(len(places))))
 
 
@@ -164,7 +181,7 @@ def _facing(surface: MeshSurface, turned: bool) -> MeshSurface:
     return MeshSurface(surface.vertices, surface.faces[:, ::-1], surface.colours)
 
 
-def _grid(node: Node, name: str) -> MeshSurface:
+def _grid(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     columns, rows = (int(number(node, f"{axis}Dimension", 0.0)) for axis in "xz")
     height = numbers(node, "height", ())[:, 0]
     if min(columns, rows) < 0 or columns * rows != len(height):
@@ -184,14 +201,14 @@ def _grid(node: Node, name: str) -> MeshSurface:
         paint = numbers(color, "color", (), 3)
         by_vertex = flag(node, "colorPerVertex")
         places = corners if by_vertex else np.repeat(np.arange(len(first)), 4)
-        corner_colours = _chosen(paint, places, True, name)
+        corner_colours = _chosen(paint, places, True, left_out)
     surface = of_polygons(
         points, corners, np.full(len(first), 4), name, corner_colours=corner_colours
     )
     return _facing(surface, not flag(node, "ccw"))
 
 
-def _extrusion(node: Node, name: str) -> MeshSurface:
+def _extrusion(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     square = (1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
     section = numbers(node, "crossSection", square, 2)
     spine = numbers(node, "spine", (0.0, 0.0, 0.0, 0.0, 1.0, 0.0), 3)
@@ -277,7 +294,15 @@ def unit(v: FloatArray) -> FloatArray:
     return np.asarray(v / np.linalg.norm(v))
 
 
-MAKERS: dict[str, Callable[[Node, str], MeshSurface]] = {
+LENGTHS = {
+    "Box": ("size",),
+    "Cone": ("bottomRadius", "height"),
+    "Cylinder": ("radius", "height"),
+    "Sphere": ("radius",),
+}
+"""Fields of a solid that must be positive."""
+
+MAKERS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
     "Box": _box,
     "Cone": _cone,
     "Cylinder": _cylinder,

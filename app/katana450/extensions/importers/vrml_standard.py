@@ -116,6 +116,9 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
 )
 """Types of the fields of each node, as far as a file can set them."""
 
+TEXTURES = ("ImageTexture", "PixelTexture", "MovieTexture")
+"""Kinds of nodes that are textures."""
+
 IGNORED_NODES = frozenset(
     [
         *("NULL", "WorldInfo", "NavigationInfo", "Viewpoint", "Background", "Fog"),

@@ -1,0 +1,151 @@
+"""An upload of several files as one .zip: a shape file, and the files that it names."""
+
+from __future__ import annotations
+
+import io
+import posixpath
+import re
+import zipfile
+import zlib
+from collections.abc import Iterable, Mapping
+
+from katana450.errors import InputError
+from katana450.extensions.importers.companions import is_inside
+
+MAX_ARCHIVE_BYTES = 60_000_000
+"""[bytes] Maximum size of a .zip, and of the files in it that are unpacked."""
+
+MAX_FILES = 1000
+"""Maximum number of files in a .zip."""
+
+COMPANION_SUFFIXES = ("bin", "mtl")
+"""Suffixes of files that shape files name, and that are no shapes themselves."""
+
+NAMING = ("wrl", "gltf", "obj")
+"""Suffixes of files that can name others."""
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""Time stamp of all files, the earliest of the format: the same files give the same bytes."""
+
+LONGEST_NAME = 200
+"""[bytes] Maximum length of the name of a file in another."""
+
+SCENE = "scene.yaml"
+"""A file that makes a .zip a scene instead."""
+
+
+class ChoiceError(InputError):
+    """One of several shape files must be chosen.
+
+    Attributes:
+        choices: their paths.
+    """
+
+    def __init__(self, text: str, choices: Iterable[str]) -> None:
+        super().__init__(text)
+        self.choices = tuple(choices)
+
+
+def unpacked(
+    data: bytes, name: str, suffixes: Iterable[str], main: str = ""
+) -> tuple[str, dict[str, bytes]]:
+    """Return the path of the shape file in a .zip, and the contents of its files by their paths.
+
+    Pictures and other files that no reader opens are not unpacked. The shape file is ``main``, or
+    the one that the comment of the .zip names, or the only one that no other names.
+
+    Args:
+        data: content of the .zip.
+        name: its name, for messages.
+        suffixes: suffixes of shape files.
+        main: path of the shape file, if it is known.
+
+    Raises ChoiceError if there are several, and InputError for a .zip that cannot be read.
+    """
+    shapes = tuple(f".{each}" for each in suffixes)
+    wanted = (*shapes, *(f".{each}" for each in COMPANION_SUFFIXES))
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            entries = archive.infolist()
+            if len(entries) > MAX_FILES:
+                raise InputError(f"{name} has more than {MAX_FILES} files.")
+            if any(entry.filename == SCENE for entry in entries):
+                raise InputError(f"{name} is a scene, not an object: load it as a scene.")
+            chosen = {
+                path: entry
+                for entry in entries
+                if not entry.is_dir()
+                and is_inside(path := posixpath.normpath(entry.filename.replace("\\", "/")))
+                and path.lower().endswith(wanted)
+                and not posixpath.basename(path).startswith(".")
+                and not path.startswith("__MACOSX/")
+            }
+            # zipfile never unpacks more than the size that is declared here.
+            if sum(entry.file_size for entry in chosen.values()) > MAX_ARCHIVE_BYTES:
+                raise InputError(
+                    f"{name} has more than {MAX_ARCHIVE_BYTES // 1_000_000} MB when unpacked."
+                )
+            files = {path: archive.read(entry) for path, entry in chosen.items()}
+            comment = archive.comment.decode("utf-8", "replace")
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError, zlib.error) as error:
+        raise InputError(f"{name} cannot be read as a .zip: {error}.") from error
+    except (OSError, EOFError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name} is corrupt: {error}.") from error
+    listed = [path for path in files if path.lower().endswith(shapes)]
+    return _main(listed, files, name, main or (comment if comment in listed else "")), files
+
+
+def _main(listed: list[str], files: Mapping[str, bytes], name: str, main: str) -> str:
+    """Return the path of the shape file among those ``listed``."""
+    if main:
+        if main not in listed:
+            raise InputError(f"There is no file {main[:80]!r} in {name}.")
+        return main
+    if not listed:
+        raise InputError(f"There is no file in {name} that can be read as a shape.")
+    named = _named(files, listed)
+    free = [path for path in listed if posixpath.basename(path).casefold() not in named] or listed
+    depth = min(path.count("/") for path in free)
+    top = [path for path in free if path.count("/") == depth]
+    alike = [path for path in top if _stem(path) == _stem(name)]
+    for found in (top, alike):
+        if len(found) == 1:
+            return found[0]
+    few = ", ".join(posixpath.basename(path) for path in top[:8])
+    more = f" and {len(top) - 8} more" if len(top) > 8 else ""
+    raise ChoiceError(f"{name} has several shapes: choose one of {few}{more}.", top)
+
+
+def _stem(path: str) -> str:
+    return posixpath.splitext(posixpath.basename(path))[0].casefold()
+
+
+def _named(files: Mapping[str, bytes], listed: Iterable[str]) -> set[str]:
+    """Return those names of the shape files ``listed`` that are in the text of another file."""
+    names = {posixpath.basename(path).casefold() for path in listed}
+    endings = "|".join(sorted({re.escape(posixpath.splitext(each)[1]) for each in names}))
+    pattern = re.compile(f"({endings})\\b".encode(), re.IGNORECASE)
+    found: set[str] = set()
+    for path, content in files.items():
+        if not path.lower().endswith(NAMING):
+            continue
+        for match in pattern.finditer(content):
+            before = content[max(match.end() - LONGEST_NAME, 0) : match.end()]
+            word = re.split(r"[\"'/\\\\\n]", before.decode("utf-8", "replace"))[-1].casefold()
+            # An OBJ file names its materials after a blank.
+            found |= {word, word.rpartition(" ")[2]} & (
+                names - {posixpath.basename(path).casefold()}
+            )
+    return found
+
+
+def packed(main: str, files: Mapping[str, bytes]) -> bytes:
+    """Return a .zip of ``files`` whose comment is the path of the shape file ``main``."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.comment = main.encode()
+        for path in sorted(files):
+            archive.writestr(zipfile.ZipInfo(path, EPOCH), files[path], zipfile.ZIP_DEFLATED)
+    return out.getvalue()

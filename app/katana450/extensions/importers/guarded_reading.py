@@ -1,0 +1,168 @@
+"""Reading of an untrusted shape file in a disposable subprocess."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.importers.archive import ChoiceError, packed
+from katana450.extensions.importers.companions import is_inside
+from katana450.extensions.importers.shape_file import (
+    MAX_FILE_BYTES,
+    MAX_MEMORY_BYTES,
+    SECONDS,
+    Format,
+    ShapeFile,
+    Up,
+    check_file,
+    label,
+)
+from katana450.maths.collision.convex_body import ConvexBody
+from katana450.maths.geometry.arrays import frozen
+from katana450.maths.planning.checkpoint import checkpoint
+
+CHECK_EVERY = 0.1
+"""[s] Interval of the checks whether the reading was cancelled."""
+
+MAX_PASSES = 8
+"""Maximum number of readings of a file whose companions name further files."""
+
+MAX_COMPANIONS = 500
+"""Maximum number of files that a file may name."""
+
+Beside = Callable[[str], bytes | None]
+"""A function that returns the content of a file by its path in the folder of the shape file; None
+if it is not there.
+"""
+
+
+def read_shape_guarded(
+    data: bytes,
+    format: Format,
+    name: str,
+    unit: float | None = None,
+    up: Up | None = None,
+    *,
+    main: str = "",
+    beside: Beside | None = None,
+) -> tuple[ShapeFile, ConvexBody]:
+    """Return the result of `read_shape`, and its convex body, from a subprocess.
+
+    The subprocess has `SECONDS` and, where the system supports it, `MAX_MEMORY_BYTES`. ``beside``
+    is asked for the files that the file names; their paths never lead out of its folder. Then the
+    file is read again with them. Raises InputError as `read_shape`, at these limits, and after a
+    crash; and the error of a `checkpoint`, which ends the subprocess.
+    """
+    file = label(name)
+    check_file(data, file, unit, format)
+    words = ["" if unit is None else str(float(unit)), "" if up is None else up.value]
+    own = Path(name.replace("\\", "/")).name or f"shape.{format.value}"
+    companions: dict[str, bytes] = {}
+    found = _parsed(data, [format.value, file, *words, main], file)
+    for _ in range(MAX_PASSES):
+        more = _companions(found, beside, companions.keys() | {own}, file)
+        if not more:
+            break
+        companions |= more
+        if len(data) + sum(map(len, companions.values())) > MAX_FILE_BYTES:
+            raise InputError(
+                f"{file} and the files that it names have over {MAX_FILE_BYTES // 1_000_000} MB."
+            )
+        bundle = packed(own, {own: data} | companions)
+        found = _parsed(bundle, [Format.ZIP.value, file, *words, own], file)
+    if "choices" in found:
+        raise ChoiceError(str(found["error"]), map(str, found["choices"]))
+    if "error" in found:
+        raise InputError(str(found["error"]))
+    shape = ShapeFile(
+        str(found["name"]),
+        found["vertices"],
+        found["faces"],
+        found.get("colours"),
+        float(found["unit"]),
+        str(found["text"]),
+        float(found["scale"]),
+        Format(str(found["format"])),
+        found["content"].tobytes() if "content" in found else data,
+    )
+    body = ConvexBody(
+        frozen(found["corners"]),
+        float(found["off"]),
+        bool(found["thickened"]),
+        float(found["volume"]),
+    )
+    return shape, body
+
+
+def _companions(
+    found: dict[str, Any], beside: Beside | None, known: set[str], file: str
+) -> dict[str, bytes]:
+    """Return those files beside a file that it names and that are not ``known`` yet."""
+    if beside is None:
+        return {}
+    paths = [path for path in map(str, found["missing"]) if is_inside(path) and path not in known]
+    if len(paths) + len(known) > MAX_COMPANIONS:
+        raise InputError(f"{file} names more than {MAX_COMPANIONS} other files.")
+    contents = {path: beside(path) for path in paths}
+    return {path: content for path, content in contents.items() if content is not None}
+
+
+def _parsed(data: bytes, words: list[str], file: str) -> dict[str, Any]:
+    """Return the answer of a new subprocess that reads ``data``."""
+    # One thread, because a pool for every core would take address space, which is limited.
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    with subprocess.Popen(
+        [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
+        # The parent folder of the package.
+        cwd=Path(__file__).resolve().parents[3],
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        try:
+            output = _output(process, data, file)
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode:
+        raise InputError(
+            f"{file} cannot be read: it needs more than {SECONDS:g} s or {MAX_MEMORY_BYTES >> 20} "
+            "MiB, or the file is corrupt. Try a simpler export."
+        )
+    with np.load(io.BytesIO(output), allow_pickle=False) as found:
+        return dict(found)
+
+
+def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:
+    """Return the output of ``process`` for ``data``. Raises InputError after `SECONDS`."""
+    # communicate() sends no further input after a timeout, so a separate thread sends all of it.
+    threading.Thread(target=_send, args=(process.stdin, data), daemon=True).start()
+    process.stdin = None
+    due = time.monotonic() + SECONDS
+    while True:
+        checkpoint()
+        try:
+            return process.communicate(timeout=CHECK_EVERY)[0]
+        except subprocess.TimeoutExpired as error:
+            if time.monotonic() > due:
+                raise InputError(
+                    f"{file} takes longer than {SECONDS:g} s to read. Try a simpler export."
+                ) from error
+
+
+def _send(pipe: IO[bytes], data: bytes) -> None:
+    # A process that has ended reads nothing.
+    with suppress(OSError), pipe:
+        pipe.write(data)

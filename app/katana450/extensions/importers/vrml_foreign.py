@@ -1,0 +1,224 @@
+"""Tolerant parser of VRML97 for worlds of other programs, with their prototypes."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from katana450.extensions.export.vrml_node import Node, Route, Type, Use, Value
+from katana450.extensions.importers.vrml_prototypes import IS, Instance, Prototype
+from katana450.extensions.importers.vrml_reader import Reader
+from katana450.extensions.importers.vrml_standard import STANDARD, TEXTURES
+
+CLOSERS = {"{": "}", "[": "]"}
+"""The closing token of each opening token."""
+
+EVENT_ACCESS = ("eventIn", "eventOut", "inputOnly", "outputOnly")
+"""Words before a part of an interface that has no value; the last two are those of X3D."""
+
+FIELD_ACCESS = ("field", "exposedField", "initializeOnly", "inputOutput")
+"""Words before a part of an interface that has a value."""
+
+X3D_STATEMENTS = {"PROFILE": 1, "COMPONENT": 1, "META": 2, "UNIT": 3, "EXPORT": 1}
+"""Statements of X3D files with this number of words after them, which change no surface."""
+
+NOT_NUMBERS = ("nan", "inf", "1.#")
+"""Beginnings of words that programs write for what is no number."""
+
+TYPES = {kind.value: kind for kind in Type}
+"""Types by their names in an interface."""
+
+WORDS = ("TRUE", "FALSE", "NULL")
+"""Values that are neither numbers, texts nor nodes."""
+
+
+class ForeignReader(Reader):
+    """A reader that knows the standard nodes and prototypes, and omits others.
+
+    It puts reused nodes in place.
+    """
+
+    fields = STANDARD
+
+    def __init__(self, text: str, name: str) -> None:
+        """Read ``text`` of the file ``name``."""
+        super().__init__(text, name)
+        self.left_out: Counter[str] = Counter()
+        self.prototypes: dict[str, Prototype] = {}
+
+    def _define(self, name: str) -> None:
+        # The standard allows a name to be defined again.
+        self._named[name] = None
+
+    def _new_name(self) -> str:
+        # Names that the standard does not allow are common.
+        name = self._take()
+        if name[0] in '"[]{}':
+            raise self._error(f"{name!r} is not a name")
+        return name
+
+    def _used(self, node: Node, _name: str) -> Node:
+        return node
+
+    def _again(self, kind: str, field: str) -> None:
+        # The last value counts.
+        self.left_out[f"the first value of {field} in {kind}"] += 1
+
+    def _float(self) -> float:
+        # Normals are often no numbers; vertices that are used are checked later.
+        if self._ahead.lstrip("+-").lower().startswith(NOT_NUMBERS):
+            self._take()
+            return math.nan
+        return super()._float()
+
+    def _placeholder(self, kind: Type) -> Value:
+        self._take()
+        return Node(IS, (("type", kind.value),), self._take())
+
+    def _unknown(self, kind: str, name: str | None, depth: int) -> Node:
+        if kind in self.prototypes:
+            return self._instance(self.prototypes[kind], name, depth)
+        if kind in ("PROTO", "EXTERNPROTO"):
+            self._prototype(kind, depth)
+            return Node("NULL")
+        if kind in X3D_STATEMENTS:
+            for _ in range(X3D_STATEMENTS[kind]):
+                self._take()
+            return Node("NULL")
+        if kind == "ROUTE":
+            self._ends()
+            return Node("NULL")
+        if kind != "NULL":
+            self._skip_braces()
+        if kind in TEXTURES:
+            self.left_out["pictures on the surface"] += 1
+        return Node(kind, (), name)
+
+    def _prototype(self, kind: str, depth: int) -> None:
+        """Parse a declaration after its first word."""
+        name = self._new_name()
+        types, defaults = self._interface(depth)
+        if kind == "EXTERNPROTO":
+            urls = tuple(self._items(self._string))
+            self.prototypes[name] = Prototype(name, types, defaults, None, urls)
+            return
+        named, prototypes = self._named, self.prototypes
+        self._named, self.prototypes = {}, dict(prototypes)
+        self._expect("{")
+        body: list[Node] = []
+        while self._ahead != "}":
+            node = self._node(depth + 1)
+            if isinstance(node, Node) and node.kind != "NULL":
+                body.append(node)
+        self._take()
+        self._named, self.prototypes = named, prototypes
+        first = body[0] if body else Node("NULL")
+        self.prototypes[name] = Prototype(name, types, defaults, first)
+
+    def _interface(self, depth: int) -> tuple[dict[str, Type | None], dict[str, Value]]:
+        """Return types and defaults of the fields of a prototype."""
+        types: dict[str, Type | None] = {}
+        defaults: dict[str, Value] = {}
+        self._expect("[")
+        while self._ahead != "]":
+            access = self._take()
+            if access not in (*EVENT_ACCESS, *FIELD_ACCESS):
+                raise self._error(f"{access!r} is not a part of the interface of a prototype")
+            kind, field = TYPES.get(self._take()), self._take()
+            if access in EVENT_ACCESS:
+                continue
+            types[field] = kind
+            # A prototype in another file has its defaults there.
+            if self._ahead in ("]", *EVENT_ACCESS, *FIELD_ACCESS):
+                continue
+            if kind is None:
+                self._skip_value(depth)
+            else:
+                defaults[field] = self._value(kind, depth)
+        self._take()
+        return types, defaults
+
+    def _instance(self, prototype: Prototype, name: str | None, depth: int) -> Node:
+        """Parse a node of a declared kind after its name."""
+        self._expect("{")
+        fields: dict[str, Value] = {}
+        while self._ahead != "}":
+            field = self._take()
+            kind = prototype.types.get(field)
+            if kind is None:
+                self._stray(prototype.name, field, depth)
+            else:
+                fields[field] = self._value(kind, depth)
+        self._take()
+        return Instance(prototype.name, tuple(fields.items()), name, prototype)
+
+    def _skip_braces(self) -> None:
+        if self._ahead != "{":
+            raise self._error(f"expected '{{', not {self._ahead[:40]!r}")
+        self._skip_brackets()
+
+    def _skip_brackets(self) -> None:
+        """Skip a part in brackets or braces; nodes that are named in it can be used later."""
+        closers: list[str] = []
+        while True:
+            token = self._take()
+            if token in CLOSERS:
+                closers.append(CLOSERS[token])
+            elif token in ("}", "]"):
+                if token != closers.pop():
+                    raise self._error(f"{token!r} closes nothing")
+                if not closers:
+                    return
+            elif token == "DEF":
+                name = self._new_name()
+                self._named[name] = Node(self._ahead, (), name)
+
+    def _stray(self, kind: str, field: str, depth: int) -> None:
+        if field in ("PROTO", "EXTERNPROTO"):
+            self._prototype(field, depth)
+        elif field == "ROUTE":
+            self._ends()
+        elif self._ahead == IS:
+            self._take()
+            self._take()
+        elif self._ahead == "{":
+            self._skip_braces()
+            self.left_out[f"{field} in {kind}"] += 1
+        elif field[0] in '"[]{}' or not self._skip_value(depth):
+            super()._stray(kind, field, depth)
+        else:
+            self.left_out[f"{field} of {kind}"] += 1
+
+    def _skip_value(self, depth: int) -> bool:
+        """Skip the value of a field of unknown type; return whether there is one."""
+        if self._ahead == "[":
+            self._skip_brackets()
+            return True
+        if self._ahead in WORDS:
+            self._take()
+            return True
+        plain = 0
+        while self._ahead[:1] in '"+-.0123456789' and self._ahead:
+            self._take()
+            plain += 1
+        if not plain and self._ahead[:1].isupper():
+            self._node(depth + 1)
+            return True
+        return plain > 0
+
+    def _route(self) -> Route:
+        self._take()
+        return self._ends()
+
+    def _ends(self) -> Route:
+        """Return the rest of a ROUTE after its first word; its target does not matter here."""
+        source = self._take()
+        self._expect("TO")
+        return Route(source, "", self._take(), "")
+
+
+def parsed(text: str, name: str) -> tuple[tuple[Node, ...], ForeignReader]:
+    """Return the nodes of a world, and its reader. Raises InputError with the line of an error."""
+    reader = ForeignReader(text, name)
+    nodes = reader.world().nodes
+    return tuple(each for each in nodes if not isinstance(each, Use)), reader
