@@ -273,7 +273,7 @@ def test_a_corrupt_or_too_large_zip_is_refused(mesh: Mesh, monkeypatch: pytest.M
     for cut in random.integers(0, len(whole), 40).tolist():
         with pytest.raises(InputError):
             read_scene_zip(whole[:cut], T_PALM_TOOL)
-    monkeypatch.setattr(scene_file, "read_mesh", lambda *_: mesh)
+    monkeypatch.setattr(scene_file, "read_mesh", lambda *_, **__: mesh)
     for _ in range(60):
         bent = bytearray(whole)
         bent[int(random.integers(len(bent)))] ^= int(random.integers(1, 256))

@@ -120,7 +120,10 @@ class SceneObject:
                 else f"{self.scale * each:.4g}"
                 for each in size.tolist()
             )
-            raise InputError(f"{what} must be from {MIN_SIZE} to {MAX_SIZE:g} m, not {actual}.")
+            hint = " Change its scale." if self.shape is Shape.MESH else ""
+            raise InputError(
+                f"{what} must be from {MIN_SIZE} to {MAX_SIZE:g} m, not {actual}.{hint}"
+            )
         object.__setattr__(self, "size", tuple(size.tolist()))
         if self.fixed and self.held:
             raise InputError(f"{self.name!r} must be either fixed to the hand or held by it.")

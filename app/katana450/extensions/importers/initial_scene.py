@@ -16,16 +16,17 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
-from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh_file
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
-from katana450.extensions.importers.shape_file import MAX_FILE_BYTES
 from katana450.extensions.programs.scene_draft import Scene
 from katana450.extensions.programs.script_scene import check_scene
 from katana450.maths.geometry import se3
 from katana450.server.service.scenes import free_name
 
-PLACED = re.compile(r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?")
-"""Pattern of an ``--object`` value: FILE, or FILE@x,y,z."""
+PLACED = re.compile(
+    r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?(?:@(?P<scale>[0-9.]+(?:e-?[0-9]+)?))?"
+)
+"""Pattern of an ``--object`` value: FILE[@x,y,z][@SCALE]."""
 
 
 def initial_scene(
@@ -42,7 +43,7 @@ def load_initial_scene(
 ) -> tuple[StoredScene, tuple[str, ...]]:
     """Return the scene of the file ``scene`` with the objects of ``object_files``, and notes.
 
-    Each of ``object_files`` is FILE[@x,y,z] in mm. Without a scene file, the scene has the robot's
+    Each of ``object_files`` is FILE[@x,y,z][@SCALE] with x, y, z in mm. Without a scene file, the scene has the robot's
     own objects. Raises InputError for a file that cannot be read, and for an object that cannot
     stand at its place.
     """
@@ -69,15 +70,20 @@ def load_initial_scene(
 def _object(argument: str, objects: Sequence[SceneObject]) -> tuple[Mesh, SceneObject]:
     match = PLACED.fullmatch(argument)
     assert match is not None
-    path = Path(match["file"])
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-    mesh = read_mesh(data, path.name)
+    mesh = read_mesh_file(Path(match["file"]))
     name = free_name(mesh.name, {scene_object.name for scene_object in objects})
-    scene_object = SceneObject(name, Shape.MESH, (), np.eye(4), solid=mesh.solid)
+    scale = 1.0
+    if match["scale"] is not None:
+        try:
+            scale = float(match["scale"])
+        except ValueError:
+            raise InputError(f"{argument!r}: the scale must be a number, as in @0.5.") from None
+    elif mesh.scale != 1.0:
+        raise InputError(
+            f"{match['file']}: {mesh.text} Give the scale after the file, as in "
+            f"{match['file']}@{mesh.scale:g}."
+        )
+    scene_object = SceneObject(name, Shape.MESH, (), np.eye(4), solid=mesh.solid, scale=scale)
     if match["at"] is None:
         return mesh, replace(scene_object, T=free_place(scene_object, objects))
     try:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+from pathlib import Path
 
 import numpy as np
 
 from katana450.arm.control.solid import Solid
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
+from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES
 from katana450.extensions.importers.guarded_reading import Beside, read_shape_guarded
 from katana450.extensions.importers.shape_file import (
+    MAX_FILE_BYTES,
     UNITS,
     Format,
     ShapeFile,
@@ -68,6 +71,31 @@ def read_mesh(
         f"{shape.text} {_counted(shape, found)}",
         shape.scale,
     )
+
+
+def read_mesh_file(path: Path, unit: str | None = None, up: Up | None = None) -> Mesh:
+    """Return the mesh in a file on this machine, with the files in its folder that it names.
+
+    Arguments and errors are those of `read_mesh`. No file outside of the folder is opened.
+    """
+    folder = path.resolve().parent
+
+    def beside(name: str) -> bytes | None:
+        found = (folder / name).resolve()
+        if not found.is_relative_to(folder) or not found.is_file():
+            return None
+        return _content(found, MAX_FILE_BYTES)
+
+    maximum = MAX_ARCHIVE_BYTES if Format.of(path.name) is Format.ZIP else MAX_FILE_BYTES
+    return read_mesh(_content(path, maximum), path.name, unit, up, beside=beside)
+
+
+def _content(path: Path, maximum: int) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(maximum + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
 
 
 def unit_of(sign: str) -> float:

@@ -5,6 +5,7 @@ All of it is read and checked before it is used. Paths cannot lead outside of th
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 import zipfile
@@ -15,8 +16,9 @@ from pathlib import Path, PurePosixPath
 
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
+from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES
 from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Up
+from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
 from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.scene_draft import MeshFile, Scene, SceneDraft
 from katana450.extensions.programs.scene_reader import parsed
@@ -196,14 +198,23 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
         or not file.path.isprintable()
     ):
         raise InputError(f"{file.path!r} is not a relative path within the scene.")
-    content = opened(file.path, MAX_FILE_BYTES)
-    mesh = read_mesh(content, file.path, file.unit, None if file.up is None else Up(file.up))
-    if file.sha256 is not None and mesh.sha256 != file.sha256:
+    is_archive = Format.of(file.path) is Format.ZIP
+    content = opened(file.path, MAX_ARCHIVE_BYTES if is_archive else MAX_FILE_BYTES)
+    sha256 = hashlib.sha256(content).hexdigest()
+    if file.sha256 is not None and sha256 != file.sha256:
         raise InputError(
             f"{file.path} is not the file that the scene was saved with: its SHA-256 is "
-            f"{mesh.sha256}. To use it nevertheless, remove `sha256`."
+            f"{sha256}. To use it nevertheless, remove `sha256`."
         )
-    return mesh
+
+    def beside(name: str) -> bytes | None:
+        try:
+            return opened(str(parts.parent / name), MAX_FILE_BYTES)
+        except InputError:
+            return None
+
+    up = None if file.up is None else Up(file.up)
+    return read_mesh(content, file.path, file.unit, up, beside=beside)
 
 
 def _content(path: Path, maximum: int) -> bytes:

@@ -28,6 +28,7 @@ def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
         text=mesh.text,
         size=list(mesh.solid.size),
         triangles=len(mesh.faces),
+        scale=mesh.scale,
     )
 
 

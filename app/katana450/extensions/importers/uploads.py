@@ -14,10 +14,11 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.actor import CommandChannel
 from katana450.errors import CancelledError, InputError, LeaseError
+from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import MAX_ZIP_BYTES, read_scene_zip
 from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene, zipped
-from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES
+from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES, Format
 from katana450.maths.planning.checkpoint import checked_by
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
@@ -87,14 +88,19 @@ class Uploads:
     async def _mesh(self, request: Request) -> Response:
         query = request.query_params
         name, unit, format = query.get("name", ""), query.get("unit"), query.get("format")
+        main = query.get("main", "")
         if format and not name.lower().endswith(f".{format}"):
             name = f"{name or 'shape'}.{format}"
 
         async def keep() -> answers.Answer:
-            if len(name) > 4 * LONGEST_NAME:
+            if max(len(name), len(main) // 4) > 4 * LONGEST_NAME:
                 raise InputError("The name of the file is too long.")
-            data = await body_of(request, MAX_FILE_BYTES, UPLOAD_TIMEOUT, MIN_RATE)
-            mesh = await self._in_thread(request, lambda: read_mesh(data, name, unit or None))
+            is_archive = Format.of(name) is Format.ZIP
+            maximum = MAX_ARCHIVE_BYTES if is_archive else MAX_FILE_BYTES
+            data = await body_of(request, maximum, UPLOAD_TIMEOUT, MIN_RATE)
+            mesh = await self._in_thread(
+                request, lambda: read_mesh(data, name, unit or None, main=main)
+            )
             return keep_mesh(self._hub, mesh)
 
         return await self._answered(request, keep)
@@ -145,6 +151,9 @@ class Uploads:
             except TimeoutError:
                 why = f"The upload took more than {UPLOAD_TIMEOUT:g} s."
                 return as_json(answers.Refused(why=why), TOO_SLOW)
+            except ChoiceError as error:
+                refused = answers.Refused(why=str(error), choices=list(error.choices))
+                return as_json(refused, NOT_UNDERSTOOD)
             except InputError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
             except (LeaseError, CancelledError) as error:

@@ -97,7 +97,9 @@ class Refused(Answer, frozen=True, kw_only=True):
     Attributes:
         why: Reason, and what to do.
         retry: Time [s] after which the request can be repeated.
+        choices: Files of an upload, one of which must be chosen as ``main``.
     """
 
     why: str
     retry: float | None = None
+    choices: list[str] | None = None

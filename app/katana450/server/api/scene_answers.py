@@ -123,6 +123,7 @@ class Mesh(Answer, frozen=True, kw_only=True):
         text: Summary of the file's content in words.
         size: Size along x, y, z [m].
         triangles: Number of triangles.
+        scale: Scale for ``place``, with which its size is allowed; 1 if it is as it is.
     """
 
     key: str
@@ -130,6 +131,7 @@ class Mesh(Answer, frozen=True, kw_only=True):
     text: str
     size: Numbers
     triangles: int
+    scale: float = 1.0
 
 
 class Scene(Answer, frozen=True, kw_only=True):
