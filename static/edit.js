@@ -47,8 +47,11 @@ const Edit = (() => {
     // dragover comes all the time while the file is over the page.
     leaving = setTimeout(() => byId("stage").classList.remove("dropping"), 300);
     if (event.type !== "drop") return;
-    const [file] = event.dataTransfer.files;
-    if (file) (/\.mcap$/i.test(file.name) ? page.replay : Objects.take)(file);
+    const files = [...event.dataTransfer.files];
+    // Folders are read after this event, which ends the access to what was dropped.
+    const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
+    if (files.length === 1 && /\.mcap$/i.test(files[0].name)) page.replay(files[0]);
+    else if (files.length || entries.length) Objects.take(files, entries);
   }
 
   function listen(target) {

@@ -8,7 +8,11 @@ const Objects = (() => {
   /** @type {(request: object) => void} */
   let say = () => {};
   let file = null; // the last file that was chosen
+  let main = ""; // the file to read in it, if it is a .zip file of several
   let placed = null; // the name of its object
+  let fitted = false; // whether its scale was chosen to fit
+  let waiting = null; // an answer whose object is placed when its scale is chosen
+  const files = () => import("./objects/files.js");
 
   function tell(words, bad) {
     const line = byId("read");
@@ -25,7 +29,9 @@ const Objects = (() => {
       const answer = await fetch(API + path, { method: "POST", body });
       const text = await answer.text();
       if (answer.ok) return JSON.parse(text);
-      tell(text.startsWith("{") ? JSON.parse(text).why : text, true);
+      const refused = text.startsWith("{") ? JSON.parse(text) : { why: text };
+      tell(refused.why, true);
+      offer(refused.choices ?? []);
     } catch {
       tell(UNREACHABLE, true);
     } finally {
@@ -36,16 +42,63 @@ const Objects = (() => {
 
   async function add(again) {
     if (!file) return;
+    byId("fit").hidden = true;
+    offer([]);
     tell(`Reading ${file.name} …`);
     const query = new URLSearchParams({ name: file.name });
     if (byId("unit").value) query.set("unit", byId("unit").value);
+    if (main) query.set("main", main);
     const mesh = await ask(`mesh?${query}`, file);
     if (!mesh) return;
     // A changed unit applies to the object that is already placed.
-    placed = again && placed ? placed : mesh.name;
+    mesh.name = again && placed ? placed : mesh.name;
+    tell(`${mesh.name}: ${mesh.text}`);
+    if (mesh.scale === 1) {
+      // A unit that fits replaces a scale that was chosen to fit, but not one that was set in the panel.
+      place(mesh, fitted ? 1 : undefined);
+      fitted = false;
+      return;
+    }
+    waiting = mesh;
+    byId("fit-scale").value = String(mesh.scale);
+    byId("fit").hidden = false;
+    resize();
+  }
+
+  function place(mesh, scale) {
+    placed = mesh.name;
     window.dispatchEvent(new Event("placed"));
-    say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key });
-    tell(`${placed}: ${mesh.text}`);
+    say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(scale && { scale }) });
+  }
+
+  const millimetres = (metres) => String(Number((1e3 * metres).toPrecision(3)));
+
+  // Show the size that the typed scale gives.
+  function resize() {
+    const scale = Number(byId("fit-scale").value);
+    const sides = waiting.size.map((side) => scale * side);
+    const longest = Math.max(...sides);
+    const fits = longest >= 1e-3 && longest <= 2 && scale >= 1e-3 && scale <= 1e3;
+    byId("fit-size").textContent = fits || longest > 0 ? `${sides.map(millimetres).join(" × ")} mm` : "";
+    byId("fit-size").classList.toggle("bad", !fits);
+    byId("fit-place").disabled = !fits;
+  }
+
+  // Offer the files of a .zip file, one of which is to be read.
+  function offer(choices) {
+    byId("which").hidden = !choices.length;
+    byId("which").replaceChildren(
+      ...choices.slice(0, 24).map((path) => {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.textContent = path;
+        button.addEventListener("click", () => {
+          main = path;
+          add(false);
+        });
+        return button;
+      }),
+    );
   }
 
   async function load(scene) {
@@ -69,10 +122,10 @@ const Objects = (() => {
 
   function chosen(input, use) {
     input.addEventListener("change", () => {
-      const [first] = input.files;
+      const list = [...input.files];
       // Cleared, so that the same file can be chosen again.
       input.value = "";
-      if (first) use(first);
+      if (list.length) use(list);
     });
   }
 
@@ -82,16 +135,50 @@ const Objects = (() => {
     byId("load").addEventListener("click", () => byId("scene-file").click());
     byId("save").addEventListener("click", save);
     byId("unit").addEventListener("change", () => add(true));
+    byId("add-folder").addEventListener("click", () => byId("object-folder").click());
+    byId("add-folder").hidden = !("webkitdirectory" in byId("object-folder")) || matchMedia("(pointer: coarse)").matches;
+    byId("fit-scale").addEventListener("input", resize);
+    byId("fit").addEventListener("submit", (event) => {
+      event.preventDefault();
+      const scale = Number(byId("fit-scale").value);
+      byId("fit").hidden = true;
+      fitted = true;
+      place(waiting, scale);
+      tell(`${waiting.name}: placed at the scale ${scale}, ${byId("fit-size").textContent}.`);
+    });
     chosen(byId("object-file"), take);
-    chosen(byId("scene-file"), load);
+    chosen(byId("object-folder"), take);
+    chosen(byId("scene-file"), ([first]) => load(first));
   }
 
-  // Read a file that was chosen or dropped: an object, or a scene in a .zip file.
-  function take(first) {
+  // Read files that were chosen or dropped: one object or several, or a scene in a .zip file. `entries` are the dropped
+  // files and folders.
+  async function take(list, entries) {
     if (byId("objects").hidden) byId("objects-button").click();
-    if (/\.zip$/i.test(first.name)) return load(first);
+    const { gathered, areAlone, excess, zipped, isScene } = await files();
+    const found = await gathered(list, entries).catch(() => []);
+    if (!found.length) {
+      // One file of another kind is refused by the server, which lists the kinds it can read.
+      if (list.length === 1 && list[0].size) return read(list[0]);
+      return tell("There is no file of an object among these.", true);
+    }
+    const why = excess(found);
+    if (why) return tell(why, true);
+    if (found.length > 1 && !areAlone(found)) {
+      const [folder] = found[0].path.split("/").slice(0, -1);
+      return read(await zipped(found, `${folder ?? "files"}.zip`));
+    }
+    for (const each of found) {
+      if (/\.zip$/i.test(each.path) && (await isScene(each.file))) await load(each.file);
+      else await read(each.file);
+    }
+  }
+
+  function read(first) {
     file = first;
+    main = "";
     placed = null;
+    fitted = false;
     return add(false);
   }
 

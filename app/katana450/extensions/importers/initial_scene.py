@@ -43,9 +43,9 @@ def load_initial_scene(
 ) -> tuple[StoredScene, tuple[str, ...]]:
     """Return the scene of the file ``scene`` with the objects of ``object_files``, and notes.
 
-    Each of ``object_files`` is FILE[@x,y,z][@SCALE] with x, y, z in mm. Without a scene file, the scene has the robot's
-    own objects. Raises InputError for a file that cannot be read, and for an object that cannot
-    stand at its place.
+    Each of ``object_files`` is FILE[@x,y,z][@SCALE] with x, y, z in mm. Without a scene file, the
+    scene has the robot's own objects. Raises InputError for a file that cannot be read, and for an
+    object that cannot stand at its place.
     """
     hand = session.environment.hand
     stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).objects))
