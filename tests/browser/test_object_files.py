@@ -17,7 +17,7 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, prepare
-from tests.exchange.test_gltf_parts import DATA, SQUARE
+from tests.exchange.compressed_gltf import DATA, SQUARE
 
 DROP = """async (files) => {
     const data = new DataTransfer();

@@ -67,7 +67,7 @@ def looked_at(data: bytes, format: Format) -> ShapeFile | None:
     assert shape.faces.min() >= 0
     assert shape.faces.max() == len(shape.vertices) - 1
     assert shape.colours is None or shape.colours.shape == (len(shape.faces), 4)
-    assert MIN_SIZE <= np.ptp(shape.vertices, axis=0).max() <= MAX_SIZE
+    assert MIN_SIZE <= shape.scale * np.ptp(shape.vertices, axis=0).max() <= MAX_SIZE
     return shape
 
 

@@ -6,37 +6,15 @@ import base64
 import json
 from typing import Any
 
-import DracoPy
-import meshopt
 import numpy as np
 import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import packed
 from katana450.extensions.importers.shape_file import Format, ShapeFile, read_shape
+from tests.exchange.compressed_gltf import DATA, POINTS, SQUARE, draco, quantized
 from tests.exchange.solids import sides
-
-POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4")
-
-FACES = np.array([[0, 1, 2], [0, 2, 3]], "<u2")
-
-DATA = POINTS.tobytes() + FACES.tobytes()
-
-SQUARE: dict[str, Any] = {
-    "asset": {"version": "2.0"},
-    "buffers": [{"byteLength": 60, "uri": "parts/a%20b.bin"}],
-    "bufferViews": [
-        {"buffer": 0, "byteLength": 48},
-        {"buffer": 0, "byteOffset": 48, "byteLength": 12},
-    ],
-    "accessors": [
-        {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
-        {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"},
-    ],
-    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-    "nodes": [{"mesh": 0}],
-    "scenes": [{"nodes": [0]}],
-}
+from tests.exchange.test_broken_shapes import glb
 
 
 def read(document: dict[str, Any], **files: bytes) -> ShapeFile:
@@ -108,97 +86,28 @@ def test_sparse_numbers_replace_others() -> None:
 
 
 def test_draco_is_decompressed() -> None:
-    shift = POINTS * 3.0
-    data = DracoPy.encode(shift.astype("f4"), FACES.astype("u4"), quantization_bits=14)
-    document = SQUARE | {
-        "extensionsRequired": ["KHR_draco_mesh_compression"],
-        "buffers": [{"byteLength": len(data), "uri": "a.bin"}],
-        "bufferViews": [{"buffer": 0, "byteLength": len(data)}],
-        "accessors": [
-            {"componentType": 5126, "count": 4, "type": "VEC3"},
-            {"componentType": 5123, "count": 6, "type": "SCALAR"},
-        ],
-        "meshes": [
-            {
-                "primitives": [
-                    {
-                        "attributes": {"POSITION": 0},
-                        "indices": 1,
-                        "extensions": {
-                            "KHR_draco_mesh_compression": {
-                                "bufferView": 0,
-                                "attributes": {"POSITION": 0},
-                            }
-                        },
-                    }
-                ]
-            }
-        ],
-    }
-    shape = read(document, a_bin=data)
+    document, data = draco(3.0 * POINTS)
+    shape = read_shape(glb(json.dumps(document).encode(), data), Format.GLB, "a.glb")
     assert len(shape.faces) == 2
     assert sides(shape) == pytest.approx([3e3, 0.0, 3e3], abs=1.0)
     assert shape.scale == 0.5
-    for broken in (data[:20], bytes(len(data)), b"DRACO" + bytes(200)):
-        with pytest.raises(InputError, match=r"corrupt|beyond"):
-            read(document, a_bin=broken + bytes(max(0, len(data) - len(broken))))
+    for broken in (data[:20], b"", b"DRACO"):
+        content = broken + bytes(len(data) - len(broken))
+        with pytest.raises(InputError, match="corrupt"):
+            read_shape(glb(json.dumps(document).encode(), content), Format.GLB, "a.glb")
 
 
 @pytest.mark.parametrize("name", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
 def test_meshopt_is_decompressed(name: str) -> None:
-    # Quantized to a step of 1/100: normalized 16-bit integers need 4 bytes a row, so 8 for three.
-    rows = np.zeros((4, 4), "<u2")
-    rows[:, :3] = POINTS * 65535
-    vertices = meshopt.encode_gltf_buffer(rows, "ATTRIBUTES")
-    faces = meshopt.encode_gltf_buffer(FACES.ravel().astype("<u4"), "TRIANGLES")
-    data = vertices + faces
-
-    def document(count: int = 4) -> dict[str, Any]:
-        views = [(0, len(vertices), count, 8, "ATTRIBUTES")]
-        views += [(len(vertices), len(faces), 6, 2, "TRIANGLES")]
-        return SQUARE | {
-            "extensionsRequired": [name, "KHR_mesh_quantization"],
-            # The second buffer is a fallback that no file holds.
-            "buffers": [
-                {"byteLength": len(data), "uri": "a.bin"},
-                {"byteLength": 60, "extensions": {name: {"fallback": True}}},
-            ],
-            "bufferViews": [
-                {
-                    "buffer": 1,
-                    "byteLength": n * stride,
-                    "extensions": {
-                        name: {
-                            "buffer": 0,
-                            "byteOffset": at,
-                            "byteLength": length,
-                            "count": n,
-                            "byteStride": stride,
-                            "mode": mode,
-                        }
-                    },
-                }
-                for at, length, n, stride, mode in views
-            ],
-            "accessors": [
-                {
-                    "bufferView": 0,
-                    "componentType": 5123,
-                    "normalized": True,
-                    "count": 4,
-                    "type": "VEC3",
-                },
-                SQUARE["accessors"][1],
-            ],
-        }
-
-    shape = read(document(), a_bin=data)
+    document, data = quantized(name)
+    shape = read_shape(glb(json.dumps(document).encode(), data), Format.GLB, "a.glb")
     assert sides(shape) == pytest.approx([1e3, 0.0, 1e3])
     assert len(shape.faces) == 2
+    large = json.dumps(quantized(name, 10_000_000)[0]).encode()
     with pytest.raises(InputError, match="over 64 MB in one part"):
-        read(document(10_000_000), a_bin=data)
+        read_shape(glb(large, data), Format.GLB, "a.glb")
     with pytest.raises(InputError, match="corrupt"):
-        read(document(), a_bin=bytes(len(data)))
+        read_shape(glb(json.dumps(document).encode(), bytes(len(data))), Format.GLB, "a.glb")
 
 
 def test_a_mesh_is_repeated_at_instances() -> None:

@@ -16,14 +16,18 @@ from hypothesis import strategies as st
 
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.importers.archive import packed
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.importers.reading import bind
 from katana450.extensions.importers.shape_file import (
     SECONDS,
     Format,
 )
+from tests.exchange.compressed_gltf import draco_glb, meshopt_glb
 from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply
+from tests.exchange.test_several_files import ARTICULATED
+from tests.exchange.test_vrml_prototypes import JOINT
 
 resource = pytest.importorskip("resource")
 
@@ -35,7 +39,15 @@ SEEDS = {
         *("vtk.wrl", "castle.wrl", "meshlab.stl", "vtk.stl", "meshlab.obj", "vtk.ply"),
         *("meshlab.ply", "assimp.glb", "vtk.gltf"),
     )
-} | {"colours.obj": OBJ, "colours.ply": PAINTED}
+} | {
+    "colours.obj": OBJ,
+    "colours.ply": PAINTED,
+    "gmsh.wrl": (FOREIGN / "gmsh.wrl").read_bytes(),
+    "joint.wrl": f"{HEADER}\n{JOINT} Joint {{ children Joint {{ }} }}".encode(),
+    "robot.zip": packed("robot.wrl", {name: each.encode() for name, each in ARTICULATED.items()}),
+    "draco.glb": draco_glb(),
+    "meshopt.glb": meshopt_glb(),
+}
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -115,7 +115,7 @@ def _main(listed: list[str], files: Mapping[str, bytes], name: str, main: str) -
             return found[0]
     few = ", ".join(posixpath.basename(path) for path in top[:8])
     more = f" and {len(top) - 8} more" if len(top) > 8 else ""
-    raise ChoiceError(f"{name} has several shapes: choose one of {few}{more}.", top)
+    raise ChoiceError(f"There are several shapes: choose one of {few}{more}.", top)
 
 
 def _stem(path: str) -> str:

@@ -116,10 +116,11 @@ class _Lines:
         return MeshReading(surface, tuple(self._left_out))
 
     def _library(self, words: list[str]) -> None:
-        """Read the materials of the MTL files ``words``; one name may contain blanks."""
+        """Read the materials of the MTL files ``words``, or of one whose name has blanks."""
         whole = " ".join(words)
-        for names in ([whole, words[0]], *([each] for each in words[1:])) if words else ():
-            found = self._companions.find(dict.fromkeys(names))
+        is_list = all(word.lower().endswith(".mtl") for word in words)
+        for name in words if is_list else [whole]:
+            found = self._companions.find([name])
             if found is None or found[0] in self._read:
                 continue
             self._read.add(found[0])
@@ -127,8 +128,6 @@ class _Lines:
             self._materials |= materials
             if has_pictures:
                 self._left_out["pictures on the surface"] += 1
-            if found[0].endswith(whole):
-                return
 
     def _vertex(self, words: list[str], line: int) -> None:
         try:

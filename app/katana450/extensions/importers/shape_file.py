@@ -194,6 +194,13 @@ def read_shape(
         text += f" Left out: {_listed(left_out)}."
     text += _not_there(companions) + _scaled(longest, metres, scale)
     used = {each: others[each] for each in companions.used if each != path}
+    unread = [
+        label(each)
+        for each in others
+        if each.lower().endswith(SHAPE_SUFFIXES) and each not in used and each != path
+    ]
+    if unread:
+        text += f" Other shapes of the .zip were not read: {_listed(unread)}."
     if used:
         data, format = packed(path, {path: data} | used), Format.ZIP
     return ShapeFile(

@@ -1,0 +1,191 @@
+"""Test shapes of several files: as a .zip, from a folder, and in scenes."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.errors import InputError
+from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.importers import archive
+from katana450.extensions.importers.archive import ChoiceError, packed
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
+from katana450.extensions.importers.initial_scene import load_initial_scene
+from katana450.extensions.importers.mesh_file import read_mesh, read_mesh_file
+from katana450.extensions.importers.scene_file import (
+    StoredScene,
+    read_scene_folder,
+    read_scene_zip,
+    scene_zip,
+)
+from katana450.extensions.importers.shape_file import Format, read_shape
+from katana450.extensions.programs.scene_draft import Scene
+from tests.exchange.compressed_gltf import DATA, SQUARE
+
+ROBOT = f'{HEADER}\nInline {{ url "parts/arm.wrl" }} Inline {{ url "parts/tool/grip.wrl" }}'
+
+PARTS = {
+    "parts/arm.wrl": f'{HEADER}\nInline {{ url "tool/grip.wrl" }} '
+    'Inline { url "../parts/x.wrl" }',
+    "parts/tool/grip.wrl": f"{HEADER}\nShape {{ geometry Box {{ size .1 .1 .1 }} }}",
+    "parts/x.wrl": f"{HEADER}\nTransform {{ translation .4 0 0 children Shape {{ "
+    "geometry Box { size .1 .1 .1 } } }",
+}
+
+ARTICULATED = {"robot.wrl": ROBOT} | PARTS
+
+
+def zipped(files: Mapping[str, str | bytes], folder: str = "") -> bytes:
+    """Return a .zip as other programs write it, with its files in ``folder``."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(folder + name, content)
+    return out.getvalue()
+
+
+def written(folder: Path, files: dict[str, str]) -> Path:
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(content)
+    return folder / next(iter(files))
+
+
+def test_a_zip_is_read_by_the_file_that_no_other_names() -> None:
+    others: dict[str, str | bytes] = {"a.png": b"x", "__MACOSX/._robot.wrl": b"x", ".b.wrl": b"x"}
+    for folder in ("", "models/robot/"):
+        data = zipped(PARTS | {"robot.wrl": ROBOT} | others, folder)
+        shape = read_shape(data, Format.ZIP, "download.zip")
+        assert (shape.name, len(shape.faces)) == ("robot", 36)
+        assert np.ptp(shape.vertices[:, 0]) == pytest.approx(0.5)
+        again = read_shape(shape.file, shape.format, "other.zip")
+        assert (again.name, again.file) == ("robot", shape.file)
+
+
+def test_a_zip_of_one_file_is_that_file() -> None:
+    mesh = read_mesh(zipped({"a/part.wrl": PARTS["parts/x.wrl"]}), "download.ZIP")
+    assert (mesh.name, mesh.format) == ("part", "wrl")
+    assert mesh.file == PARTS["parts/x.wrl"].encode()
+
+
+def test_one_of_several_shapes_is_chosen() -> None:
+    part = PARTS["parts/x.wrl"]
+    data = zipped({"left.wrl": part, "right.wrl": part})
+    for read in (read_shape, read_shape_guarded):
+        with pytest.raises(ChoiceError, match=r"choose one of left.wrl, right.wrl") as refused:
+            read(data, Format.ZIP, "pair.zip")
+        assert refused.value.choices == ("left.wrl", "right.wrl")
+    shape = read_shape(data, Format.ZIP, "pair.zip", main="right.wrl")
+    assert shape.name == "right"
+    assert "Other shapes of the .zip were not read: left.wrl." in shape.text
+    # A shape with the name of the .zip is the first one.
+    assert read_shape(data, Format.ZIP, "LEFT.zip").name == "left"
+    with pytest.raises(InputError, match=r"no file 'up.wrl' in pair.zip"):
+        read_shape(data, Format.ZIP, "pair.zip", main="up.wrl")
+
+
+def flooded() -> bytes:
+    return zipped({f"{number}.wrl": "" for number in range(archive.MAX_FILES + 1)})
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "cannot be read as a .zip"),
+        (b"PK\x03\x04", "cannot be read as a .zip"),
+        (zipped({}), "no file in a.zip that can be read"),
+        (zipped({"a.txt": "x"}), "no file in a.zip that can be read"),
+        (zipped({"scene.yaml": "scene: 1"}), "is a scene"),
+        (zipped({"../a.wrl": ROBOT}), "no file in a.zip that can be read"),
+        (zipped({"/a.wrl": ROBOT}), "no file in a.zip that can be read"),
+        (zipped({"a.zip": zipped({"a.wrl": ROBOT})}), "no file in a.zip that can be read"),
+        (zipped({"a.bin": bytes(70_000_000)}), "more than 60 MB when unpacked"),
+        (zipped({"a.stl": bytes(20_000_001)}), "has 20.0 MB"),
+        (flooded(), "more than 1000 files"),
+        (zipped(ARTICULATED)[:-40], "cannot be read as a .zip"),
+    ],
+)
+def test_invalid_archives_are_refused(data: bytes, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape(data, Format.ZIP, "a.zip")
+
+
+def test_a_changed_file_of_a_zip_is_refused() -> None:
+    data = bytearray(packed("a.wrl", {"a.wrl": PARTS["parts/x.wrl"].encode() * 5}))
+    data[60] ^= 255
+    with pytest.raises(InputError, match=r"cannot be read as a .zip|corrupt"):
+        read_shape(bytes(data), Format.ZIP, "a.zip")
+
+
+def test_a_file_takes_others_of_its_folder(tmp_path: Path) -> None:
+    mesh = read_mesh_file(written(tmp_path / "robot", ARTICULATED))
+    assert (mesh.name, mesh.format, len(mesh.faces)) == ("robot", "zip", 36)
+    assert sorted(zipfile.ZipFile(io.BytesIO(mesh.file)).namelist()) == sorted(ARTICULATED)
+    assert read_mesh(mesh.file, "again.zip").key == mesh.key
+    alone = read_mesh_file(tmp_path / "robot" / "parts" / "x.wrl")
+    assert alone.format == "wrl"
+
+
+def test_no_file_outside_of_the_folder_is_read(tmp_path: Path) -> None:
+    secret = tmp_path / "secret.wrl"
+    secret.write_text(PARTS["parts/x.wrl"])
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (folder / "link.wrl").symlink_to(secret)
+    for url in ("../secret.wrl", str(secret), f"file://{secret}", "link.wrl", "", "."):
+        (folder / "a.wrl").write_text(f'{HEADER}\nInline {{ url "{url}" }}')
+        with pytest.raises(InputError, match="no triangles"):
+            read_mesh_file(folder / "a.wrl")
+
+
+def test_files_of_a_folder_are_bounded(tmp_path: Path) -> None:
+    document = SQUARE | {"buffers": [{"byteLength": 60, "uri": "a.bin"}]}
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    (tmp_path / "a.bin").write_bytes(DATA + bytes(20_000_000))
+    with pytest.raises(InputError, match="and the files that it names have over 20 MB"):
+        read_mesh_file(tmp_path / "a.gltf")
+
+
+def test_serve_places_objects_of_several_files_and_with_a_scale(
+    tmp_path: Path, session: object
+) -> None:
+    path = written(tmp_path, ARTICULATED)
+    big = tmp_path / "big.wrl"
+    big.write_text(f"{HEADER}\nShape {{ geometry Box {{ size 3000 3000 3000 }} }}")
+    with pytest.raises(InputError, match=r"3000 mm long, over 2000 mm.*big.wrl@0.5"):
+        load_initial_scene(session, None, [str(big)])  # type: ignore[arg-type]
+    stored, notes = load_initial_scene(
+        session,  # type: ignore[arg-type]
+        None,
+        [f"{path}@400,300,0", f"{big}@0.05", f"{path}@400,-300,0@0.1"],
+    )
+    placed = {each.name: each for each in stored.scene.objects if each.shape is Shape.MESH}
+    assert [each.scale for each in placed.values()] == [1.0, 0.05, 0.1]
+    assert placed["robot"].T[:3, 3] == pytest.approx([0.4, 0.3, 0.0])
+    assert "36 triangles" in notes[0]
+
+
+def test_a_scene_keeps_all_files_of_an_object(tmp_path: Path) -> None:
+    text = (
+        "scene: 1\nobjects:\n- name: robot\n  shape: mesh\n  mesh: {file: meshes/robot.wrl}\n"
+        "  pose: [400, 0, 0, 0, 0, 0]\n"
+    )
+    (tmp_path / "scene.yaml").write_text(text)
+    written(tmp_path / "meshes", ARTICULATED)
+    stored = read_scene_folder(tmp_path / "scene.yaml", None)
+    again = read_scene_zip(scene_zip(stored, None), None)
+    assert [mesh.format for mesh in again.meshes] == ["zip"]
+    np.testing.assert_array_equal(again.meshes[0].vertices, stored.meshes[0].vertices)
+    beside = zipped({"scene.yaml": text} | {f"meshes/{n}": c for n, c in ARTICULATED.items()})
+    assert len(read_scene_zip(beside, None).meshes[0].faces) == 36
+    big = read_mesh(f"{HEADER}\nShape {{ geometry Box {{ size 3000 1 1 }} }}".encode(), "big.wrl")
+    scaled = SceneObject("big", Shape.MESH, (), np.eye(4), solid=big.solid, scale=big.scale)
+    kept = read_scene_zip(scene_zip(StoredScene(Scene((scaled,)), (big,)), None), None)
+    assert kept.scene.objects[0].scale == 0.5
