@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import posixpath
 import re
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
@@ -74,7 +75,8 @@ def unpacked(
             chosen = {
                 path: entry
                 for entry in entries
-                if not entry.is_dir()
+                if entry.filename
+                and not entry.is_dir()
                 and is_inside(path := posixpath.normpath(entry.filename.replace("\\", "/")))
                 and path.lower().endswith(wanted)
                 and not posixpath.basename(path).startswith(".")
@@ -89,7 +91,7 @@ def unpacked(
             comment = archive.comment.decode("utf-8", "replace")
     except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError, zlib.error) as error:
         raise InputError(f"{name} cannot be read as a .zip: {error}.") from error
-    except (OSError, EOFError, ValueError) as error:
+    except (OSError, EOFError, ValueError, struct.error) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{name} is corrupt: {error}.") from error
