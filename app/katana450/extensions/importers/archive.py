@@ -90,11 +90,12 @@ def unpacked(
             files = {path: archive.read(entry) for path, entry in chosen.items()}
             comment = archive.comment.decode("utf-8", "replace")
     except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError, zlib.error) as error:
-        raise InputError(f"{name} cannot be read as a .zip: {error}.") from error
+        reason = str(error)[:80].rstrip(".")
+        raise InputError(f"{name} cannot be read as a .zip: {reason}.") from error
     except (OSError, EOFError, ValueError, struct.error) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{name} is corrupt: {error}.") from error
+        raise InputError(f"{name} is corrupt: {str(error)[:80]}.") from error
     listed = [path for path in files if path.lower().endswith(shapes)]
     return _main(listed, files, name, main or (comment if comment in listed else "")), files
 
