@@ -21,7 +21,7 @@ from katana450.extensions.importers.vrml1_reader import parsed_vrml1
 from katana450.extensions.importers.vrml1_traversal import Traversal
 from katana450.extensions.importers.vrml_flattening import Flattening
 from katana450.extensions.importers.vrml_foreign import ForeignReader, parsed
-from katana450.extensions.importers.vrml_prototypes import Expansion, Prototype
+from katana450.extensions.importers.vrml_prototypes import Prototype, PrototypeExpansion
 from katana450.extensions.importers.vrml_standard import STANDARD
 
 GZIP = b"\x1f\x8b"
@@ -65,7 +65,7 @@ class _Worlds:
                 return Traversal(name, self.left_out, self._shown).surface(nodes)
             found, reader = self._parsed(text, name)
             self.left_out += reader.left_out
-            expansion = Expansion(name, lambda prototype: self._external(prototype, path))
+            expansion = PrototypeExpansion(name, lambda prototype: self._external(prototype, path))
             world = tuple(map(expansion.expanded, found))
             return Flattening(name, self.left_out, self._shown).surface(world)
         finally:

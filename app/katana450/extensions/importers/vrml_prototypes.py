@@ -51,7 +51,7 @@ class Instance(Node):
     prototype: Prototype = field(default_factory=lambda: Prototype("", {}))
 
 
-class Expansion:
+class PrototypeExpansion:
     """Expands the instances in trees of nodes; what holds none is shared, not copied."""
 
     def __init__(self, name: str, external: Callable[[Prototype], Prototype | None]) -> None:
