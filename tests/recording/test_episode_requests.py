@@ -167,7 +167,7 @@ def test_connection_that_fails_does_not_end_the_listener(
 def test_people_who_only_watch_do_not_learn_where_files_are(tmp_path: Path) -> None:
     (tmp_path / "episode-0001.mcap").write_bytes(b"broken")
     hub = SimpleNamespace(shown={})
-    context = RouteContext(hub, None, None)  # type: ignore[arg-type]
+    context = RouteContext(hub, None, None, None)  # type: ignore[arg-type]
     routes = EpisodeRoutes(context, tmp_path, PORT)
     for paths in (True, False):
         told = json.dumps(routes._listed(paths=paths))

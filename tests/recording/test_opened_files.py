@@ -54,7 +54,7 @@ def context(urdf: Path | None = None) -> RouteContext:
     who = Identity("session", "Ada", Role.OPERATOR)
     hub = SimpleNamespace(recorder=SimpleNamespace(note=lambda *_: None))
     options = SimpleNamespace(urdf=urdf)
-    return RouteContext(hub, None, lambda _: who, options)  # type: ignore[arg-type]
+    return RouteContext(hub, None, lambda _: who, None, options)  # type: ignore[arg-type]
 
 
 def uploaded(store: RecordingStore, receive: Receive, urdf: Path | None = None) -> dict[str, Any]:

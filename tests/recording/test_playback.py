@@ -299,7 +299,7 @@ def replace_row(row: StateRow, **changes: object) -> StateRow:
 @pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])
 def test_viewers_open_no_files(tmp_path: Path, role: Role) -> None:
     who = Identity("session", "Vera", role)
-    context = RouteContext(None, None, lambda _: who)  # type: ignore[arg-type]
+    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
     (_, *_, timeline) = PlaybackRoutes(context, RecordingStore(tmp_path)).routes()
     request = Request({"type": "http", "path_params": {"name": "0" * 16}, "headers": []})
     with pytest.raises(HTTPException) as caught:

@@ -129,7 +129,7 @@ def _pids(server: AppServer) -> tuple[int, int]:
 @pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])
 def test_viewers_get_no_recording(folder: Path, role: Role) -> None:
     who = Identity("session", "Vera", role)
-    context = RouteContext(None, None, lambda _: who)  # type: ignore[arg-type]
+    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
     request = Request({"type": "http", "query_string": b"", "headers": []})
     with pytest.raises(HTTPException) as caught:
         asyncio.run(recording_routes(context, RecordingStore(folder))[0].endpoint(request))
@@ -145,7 +145,8 @@ def test_script_leaves_no_file_even_if_nobody_takes_it(
         Path(command[-1]).write_bytes(b"recorded")
 
     monkeypatch.setattr(route, "_record", made)
-    context = RouteContext(None, None, lambda _: Identity("session", "Ada", Role.OPERATOR))  # type: ignore[arg-type]
+    who = Identity("session", "Ada", Role.OPERATOR)
+    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
     store = RecordingStore(folder)
     request = Request({"type": "http", "query_string": b"", "headers": []})
     answer = asyncio.run(recording_routes(context, store)[1].endpoint(request))

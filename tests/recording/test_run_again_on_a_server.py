@@ -122,7 +122,7 @@ def test_script_is_made_for_the_robot_of_the_server_only(recorded: Path, tmp_pat
     other.write_bytes(URDF_PATH.read_bytes() + b"<!-- another -->")
     options = Namespace(urdf=other)
     ada = Identity("session", "Ada", Role.OPERATOR)
-    context = RouteContext(None, None, lambda _: ada, options)  # type: ignore[arg-type]
+    context = RouteContext(None, None, lambda _: ada, None, options)  # type: ignore[arg-type]
     store = RecordingStore(recorded.parent)
     request = Request({"type": "http", "query_string": b"", "headers": []})
     with pytest.raises(HTTPException, match="is a recording of") as caught:

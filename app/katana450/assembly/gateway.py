@@ -19,6 +19,7 @@ from typing import Any, cast
 import uvicorn
 import viser
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import Frame
 from websockets.http11 import Request
 
 from katana450.arm.robot.object_meshes import Meshes
@@ -40,9 +41,10 @@ from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
 from katana450.server.web.authenticator import Authenticator, identity_of
-from katana450.server.web.channel import ARRIVAL
+from katana450.server.web.channel import ARRIVAL, PING
 from katana450.server.web.http_api import RouteProvider
 from katana450.server.web.program_socket import LineServer
+from katana450.server.web.security import FOR_PROGRAMS
 from katana450.server.web.stop_monitor import watch_stop_path
 from katana450.settings import Settings
 
@@ -50,6 +52,9 @@ log = logging.getLogger(__name__)
 
 MAX_UNSENT_BYTES = 16_384
 """Bytes that may wait to be sent to a browser. Newer states do not replace waiting bytes."""
+
+MAX_PROGRAM_MESSAGE_BYTES = 524_288
+"""Maximum size of a message of a program. Each channel refuses less than that in words."""
 
 READ_CHUNK_BYTES = 4_096
 """Bytes that are read at once from a browser. All clients wait while they are parsed."""
@@ -314,4 +319,19 @@ class _BrowserSocket(WebSocketsSansIOProtocol):
         if self.response.status_code == HTTPStatus.SWITCHING_PROTOCOLS:
             # The socket knows when its newest message arrived.
             sock = self.transport.get_extra_info("socket")
-            cast(dict[str, Any], self.scope)[ARRIVAL] = Arrival(sock)
+            self.arrival = Arrival(sock)
+            cast(dict[str, Any], self.scope).update({ARRIVAL: self.arrival, PING: self.ping})
+            if self.scope["path"].startswith(FOR_PROGRAMS):
+                self.conn.max_message_size = MAX_PROGRAM_MESSAGE_BYTES
+
+    def ping(self) -> None:
+        """Ask the client for an answer; nothing happens while the websocket opens or closes."""
+        if self.handshake_complete and not (self.close_sent or self.transport.is_closing()):
+            self.conn.send_ping(b"")
+            self.transport.write(b"".join(self.conn.data_to_send()))
+
+    def handle_pong(self, event: Frame) -> None:
+        """Count the answer to ``ping`` as a heartbeat; those to other pings have content."""
+        super().handle_pong(event)
+        if not event.data:
+            self.arrival.note()

@@ -21,6 +21,7 @@ from katana450.server.service.participants import actor_of
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
+from katana450.server.web.security import FOR_PROGRAMS
 
 SOCKETS, SOCKETS_EACH, RESERVED_SOCKETS = 256, 32, 6
 """Maximum of open websockets, in total and of one identity, and number reserved for the driver and
@@ -50,8 +51,17 @@ def client_of(authenticator: Authenticator, connection: HTTPConnection) -> Ident
     if found is not None:
         return found
     if authenticator.requires_link:
-        return authenticator.program("", connection.headers.get("authorization", ""))
+        return authenticator.program("", authorization_of(connection))
     return Identity(address_of(connection), None, Role.ADMIN)
+
+
+def authorization_of(connection: HTTPConnection) -> str:
+    """Return the Authorization header, or one with the ``token`` in the address of a websocket.
+
+    A page cannot add headers to a websocket.
+    """
+    token = connection.query_params.get("token", "") if connection["type"] == "websocket" else ""
+    return connection.headers.get("authorization", "") or (f"Bearer {token}" if token else "")
 
 
 def identity(authenticator: Authenticator, connection: HTTPConnection) -> str | None:
@@ -73,8 +83,8 @@ def channel_of(scope: Scope) -> CommandChannel:
     """Return the channel of the commands that come on the connection of ``scope``."""
     if scope["type"] != "websocket":
         return CommandChannel.HTTP
-    api = scope["path"].startswith("/api/")
-    return CommandChannel.WEBSOCKET if api else CommandChannel.PAGE
+    program = scope["path"].startswith(FOR_PROGRAMS)
+    return CommandChannel.WEBSOCKET if program else CommandChannel.PAGE
 
 
 def address_of(connection: HTTPConnection) -> str:

@@ -8,7 +8,7 @@ import secrets
 import time
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -51,12 +51,14 @@ class Address:
         any_address: Whether every bare IP address is accepted; False on loopback alone.
         secure: Whether the server itself uses TLS.
         public: Origin of a reverse proxy in front, such as ``https://arm.example.org``.
+        guests: Origins of pages of other sites that may open the websockets of programs.
     """
 
     names: frozenset[str]
     any_address: bool
     secure: bool
     public: str | None = None
+    guests: set[str] = field(default_factory=set, compare=False)
 
     @property
     def cookies_are_secure(self) -> bool:

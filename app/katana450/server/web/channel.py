@@ -9,6 +9,7 @@ import asyncio
 import logging
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -32,6 +33,10 @@ log = logging.getLogger(__name__)
 
 ARRIVAL = "katana450.arrival"
 """Key of the ``Arrival`` in the scope of a websocket."""
+
+PING = "katana450.ping"
+"""Key of the function in the scope of a websocket that sends a ping of the protocol. The answer of
+the client counts as a heartbeat."""
 
 MAX_WAITING_ANSWERS = 64
 """Maximum number of answers that wait for a slow connection; beyond it the oldest are dropped."""
@@ -71,6 +76,7 @@ class WebSocketJsonChannel:
         self._socket = socket
         arrival: Arrival | None = socket.scope.get(ARRIVAL)
         self.arrival = Arrival(None) if arrival is None else arrival
+        self.ping: Callable[[], None] = socket.scope.get(PING, lambda: None)
 
     async def receive(self) -> str | bytes:
         """Return the next message. Raises GoneError on a closed connection."""
@@ -121,6 +127,14 @@ class Channel(ABC):
         self._notices.append(notice)
         self._news.set()
 
+    def decoded(self, text: str | bytes) -> Any:
+        """Return the request in ``text``. Raises InputError with the reason if it is invalid."""
+        return self.hub.requests.decoded(text)
+
+    def id_of(self, text: str | bytes) -> Any:
+        """Return the id in ``text``, which need not be a valid request; None without one."""
+        return requests.id_of(text)
+
     @abstractmethod
     def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
         """Return the message to send now, or None, and the time until the next call [s].
@@ -165,14 +179,14 @@ class Channel(ABC):
             await asyncio.sleep(0)
             text = await self._line.receive()
             try:
-                request = self.hub.requests.decoded(text)
+                request = self.decoded(text)
             except InputError as error:
                 log.warning("Invalid request from %s: %s", participant.person.name, error)
                 self.hub.recorder.refuse("invalid", participant.actor, error)
                 if not self._bad.take(self.hub.clock()):
                     await self._disconnect(BAD_REQUEST_CLOSE_CODE, "Too many invalid requests.")
                     return
-                self.refuse(str(error), requests.id_of(text))
+                self.refuse(str(error), self.id_of(text))
                 continue
             # STOP is exempt from the rate limit.
             if not self._often.take(self.hub.clock()) and not request.traits.safety:

@@ -61,12 +61,14 @@ class RouteContext(NamedTuple):
         hub: The hub with the arm and the lease.
         authenticator: Identifies clients by their cookies and links.
         identity: Returns the identity of a request's sender, or raises HTTPException.
+        budgets: The processor time of each identity.
         options: Options of the extensions; None if no extension takes part.
     """
 
     hub: Hub
     authenticator: Authenticator
     identity: Callable[[Request], Identity]
+    budgets: Budgets
     options: Namespace | None = None
 
 
@@ -97,7 +99,7 @@ class Api:
         self._budgets = budgets
         self._authenticator = authenticator
         self._dispatcher = Dispatcher(hub)
-        context = RouteContext(hub, authenticator, self._identity)
+        context = RouteContext(hub, authenticator, self._identity, budgets)
         self._provided = [route for provider in provided for route in provider(context)]
         self._programs: dict[str, _HttpProgram] = {}
 

@@ -10,7 +10,7 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, nullcontext, suppress
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 from starlette.websockets import WebSocket
@@ -30,7 +30,13 @@ from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.admission import address_of, client_of, refuse, reserved
+from katana450.server.web.admission import (
+    LIMIT_CLOSE_CODE,
+    address_of,
+    authorization_of,
+    client_of,
+    reserved,
+)
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED, Authenticator
 from katana450.server.web.channel import (
     BAD_REQUEST_CLOSE_CODE,
@@ -152,29 +158,49 @@ class ProgramChannel(Channel):
         )
 
 
+class Greets(Protocol):
+    """Interface of the channel of a program on a socket; ``ProgramChannel`` implements it."""
+
+    def greet(self, participant: Participant) -> None:
+        """Take ``participant``, which is the program."""
+
+    def notify(self, notice: Any) -> None:
+        """Queue ``notice``, any JSON value."""
+
+    async def run(self, participant: Participant) -> None:
+        """Receive and send until one side closes the connection."""
+
+
 async def serve_socket(
-    hub: Hub, authenticator: Authenticator, budgets: Budgets, socket: WebSocket
+    hub: Hub,
+    authenticator: Authenticator,
+    budgets: Budgets,
+    socket: WebSocket,
+    make: Callable[[Hub, JsonChannel, Budget], Greets] = ProgramChannel,
+    line: Callable[[WebSocket], JsonChannel] = WebSocketJsonChannel,
 ) -> None:
-    """Serve a websocket of a program until it closes."""
-    name = socket.query_params.get("name", "")
+    """Serve a websocket of a program until it closes.
+
+    ``make`` returns its channel, and ``line`` the texts on the accepted websocket.
+    """
+    name, token = socket.query_params.get("name", ""), authorization_of(socket)
 
     def current_identity() -> Identity | None:
-        return authenticator.program(name, socket.headers.get("authorization", ""), socket.cookies)
+        return authenticator.program(name, token, socket.cookies)
 
     found = client_of(authenticator, socket)
     budget = budgets.of(address_of(socket) if found is None else found.session)
+    await socket.accept()
+    channel = line(socket)
     if budget.is_exhausted():
         if found is not None:
             actor = actor_of(found, CommandChannel.WEBSOCKET, address_of(socket))
             hub.recorder.refuse("connection", actor, InputError(BUDGET_EXHAUSTED))
-        await refuse(socket, BUDGET_EXHAUSTED)
+        await channel.close(LIMIT_CLOSE_CODE, BUDGET_EXHAUSTED)
         return
-    await socket.accept()
-    channel = WebSocketJsonChannel(socket)
-    token = socket.headers.get("authorization", "")
     why = authenticator.refusal(socket.cookies, token) or TOKEN_REQUIRED
     client = ProgramClient(current_identity, CommandChannel.WEBSOCKET, address_of(socket), why)
-    await _serve(hub, authenticator, budget, channel, client)
+    await _serve(hub, authenticator, budget, channel, client, make)
 
 
 class LineServer:
@@ -272,7 +298,12 @@ class LineServer:
 
 
 async def _serve(
-    hub: Hub, authenticator: Authenticator, budget: Budget, line: JsonChannel, client: ProgramClient
+    hub: Hub,
+    authenticator: Authenticator,
+    budget: Budget,
+    line: JsonChannel,
+    client: ProgramClient,
+    make: Callable[[Hub, JsonChannel, Budget], Greets] = ProgramChannel,
 ) -> None:
     found = client.identity()
     if found is None:
@@ -280,7 +311,7 @@ async def _serve(
         hub.recorder.note("sign-in", refused, outcome=REFUSED, why=client.why)
         await line.close(SIGN_IN_CLOSE_CODE, client.why)
         return
-    program = ProgramChannel(hub, line, budget)
+    program = make(hub, line, budget)
     page = secrets.token_hex(16)
     found = replace(found, address=client.address)
     participant = hub.join(found, page, program.notify, line.arrival, client.channel)

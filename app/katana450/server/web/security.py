@@ -27,8 +27,8 @@ EVERYWHERE = {
     FEATURES: USED + "serial=()",
 }
 
-FOR_PROGRAMS = "/api/"
-"""Prefix of the paths that need no Origin header. Programs have none, but browsers send one."""
+FOR_PROGRAMS = ("/api/", "/rosbridge")
+"""Prefixes of the paths that need no Origin header. Programs have none, but browsers send one."""
 
 TLS_ONLY = "max-age=31536000"
 
@@ -88,13 +88,12 @@ class SecurityMiddleware:
         if not self._address.is_ours(host):
             return "This server does not serve that host name."
         safe = scope["type"] == "http" and scope["method"] in SAFE_METHODS
+        program = scope["path"].startswith(FOR_PROGRAMS)
         # Every browser sends Origin when a page opens a websocket or sends data.
         if origin is None:
-            program = scope["path"].startswith(FOR_PROGRAMS)
-            if safe or program:
-                return None
-            return "The header Origin is missing."
-        if not self._address.is_our_page(origin, host):
+            return None if safe or program else "The header Origin is missing."
+        guest = program and scope["type"] == "websocket" and origin in self._address.guests
+        if not (guest or self._address.is_our_page(origin, host)):
             return "Pages of other sites may not send this request."
         return None
 
