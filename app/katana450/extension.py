@@ -66,6 +66,7 @@ BUILT_IN = (
     "real_arm",
     "touch",
     "leader",
+    "rosbridge",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 

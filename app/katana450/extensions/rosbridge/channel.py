@@ -1,0 +1,385 @@
+"""The channel of one client of rosbridge: its operations, subscriptions, commands and goals."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import msgspec
+
+from katana450.arm.control.lease import HEARTBEAT_INTERVAL
+from katana450.errors import InputError, KatanaError, LeaseError
+from katana450.extensions.rosbridge import names, ops, rosapi
+from katana450.extensions.rosbridge.follow_goal import FollowGoal
+from katana450.extensions.rosbridge.goals import Goal, GoalHost
+from katana450.extensions.rosbridge.gripper_goal import GripperGoal
+from katana450.extensions.rosbridge.messages import (
+    JointJog,
+    NoArguments,
+    TriggerResponse,
+    TwistStamped,
+)
+from katana450.extensions.rosbridge.publications import Publications
+from katana450.extensions.rosbridge.servo_commands import ServoCommands
+from katana450.extensions.rosbridge.servoing import Units
+from katana450.extensions.rosbridge.stream import ServoStream
+from katana450.extensions.rosbridge.subscriptions import Subscriptions
+from katana450.server.api import answers, requests
+from katana450.server.service.budget import Budget, BusyError
+from katana450.server.service.dispatcher import driver_key
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Participant, session_of
+from katana450.server.web.channel import Channel, GoneError, JsonChannel, WebSocketJsonChannel
+from katana450.server.web.program_socket import BURST, FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, RATE
+from katana450.server.web.token_bucket import TokenBucket
+
+log = logging.getLogger(__name__)
+
+TICK = 0.02
+"""[s] Interval at which goals and streams are continued."""
+
+MAX_GOALS = 4
+"""Maximum number of goals of one client at a time."""
+
+LEVELS = ("info", "warning", "error", "none")
+"""Levels of status messages, the most talkative first."""
+
+REPEAT_SECONDS = 1.0
+"""[s] Time in which the same refusal of the messages of a topic is sent once."""
+
+
+def status(why: str, op_id: ops.OpId = None, level: str = "error") -> dict[str, Any]:
+    """Return the operation that tells a client ``why``."""
+    named = {} if op_id is None else {"id": op_id}
+    return {"op": "status", **named, "level": level, "msg": why}
+
+
+class RosLine(WebSocketJsonChannel):
+    """Operations on an accepted websocket. Its end is preceded by a status with the reason."""
+
+    async def close(self, code: int, why: str) -> None:
+        """Send the reason ``why``, and close the websocket."""
+        with suppress(GoneError):
+            await self.send(msgspec.json.encode(status(why)).decode())
+        await super().close(code, why)
+
+
+class Endpoint(NamedTuple):
+    """The topics of a client, and the units that it has chosen in its address."""
+
+    publications: Publications
+    units: Units
+
+
+class RosChannel(Channel):
+    """Channel of one client. Messages of topics that a slow client cannot take are dropped."""
+
+    def __init__(self, hub: Hub, line: JsonChannel, budget: Budget, endpoint: Endpoint) -> None:
+        t = hub.clock()
+        super().__init__(
+            hub,
+            line,
+            budget,
+            often=TokenBucket(RATE, BURST, t),
+            bad=TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, t),
+        )
+        self._publications = endpoint.publications
+        self._subscriptions = Subscriptions(endpoint.publications.hub.clock)
+        self._stream = ServoStream(hub, self._ask)
+        self._servo = ServoCommands(hub, self._stream, endpoint.units)
+        self._goals: list[Goal] = []
+        self._newest: dict[str, dict[str, Any]] = {}
+        self._acting = asyncio.Event()
+        self._level = LEVELS.index("info")
+        self._refused: dict[str, tuple[str, float]] = {}
+        self._pinged = -math.inf
+        self._ping: Callable[[], None] = getattr(line, "ping", lambda: None)
+
+    # Channel
+
+    def decoded(self, text: str | bytes) -> ops.AnyOp:
+        """Return the operation in ``text``. Raises InputError with the reason if it is invalid."""
+        return ops.decoded(text)
+
+    def id_of(self, text: str | bytes) -> ops.OpId:
+        """Return the id in ``text``, which need not be a valid operation; None without one."""
+        return ops.id_of(text)
+
+    def greet(self, participant: Participant) -> None:
+        """Take ``participant``, which is the client. The protocol has no greeting."""
+        self.participant = participant
+
+    def notify(self, notice: Any) -> None:
+        """Queue ``notice``: an operation, or a notice of the server, which becomes a status."""
+        if "op" not in notice:
+            notice = status(notice.get("why", ""), level="warning")
+        if notice["op"] == "status" and LEVELS.index(notice["level"]) < self._level:
+            return
+        super().notify(notice)
+
+    def refuse(self, why: str, request_id: Any, **_more: float) -> None:
+        """Send a status with the reason ``why``."""
+        if self.participant is not None:
+            self.hub.people.refused(session_of(self.participant.person.key))
+        self.notify(status(why, request_id))
+
+    def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
+        """Return the next message of a topic or goal, and the time until the next call [s]."""
+        if self._newest:
+            return self._newest.pop(next(iter(self._newest))), 0.0
+        if urgent:
+            self._subscriptions.hurry()
+        topic, pause = self._subscriptions.next_due()
+        if topic is None:
+            return None, pause
+        driver = "" if self.participant is None else driver_key(self.hub, self.participant)
+        try:
+            with self.budget.charged(driver):
+                message = self._publications.message(topic)
+        except BusyError as error:
+            self._subscriptions.delay(error.retry)
+            return None, error.retry
+        except LeaseError:
+            message = None
+        if message is None:
+            self._subscriptions.missed(topic)
+            return None, 0.0
+        self._subscriptions.sent(topic)
+        return {"op": "publish", "topic": topic, "msg": message}, 0.0
+
+    async def run(self, participant: Participant) -> None:
+        """Receive, send, and continue goals until one side closes the connection."""
+        acting = asyncio.create_task(self._act())
+        try:
+            await super().run(participant)
+        finally:
+            acting.cancel()
+            await asyncio.gather(acting, return_exceptions=True)
+
+    def answer(self, participant: Participant, request: Any) -> None:
+        """Execute the operation ``request``. Raises KatanaError if it is refused."""
+        op: ops.AnyOp = request
+        self.hub.heartbeat(participant)
+        if isinstance(op, ops.CallService) and op.service == names.STOP_SERVICE:
+            self._trigger(op, requests.Stop())
+            return
+        with self.budget.charged(driver_key(self.hub, participant), question=False):
+            self._execute(participant, op)
+        self.wake()
+
+    # Operations
+
+    def _execute(self, participant: Participant, op: ops.AnyOp) -> None:
+        match op:
+            case ops.Subscribe():
+                self._subscriptions.add(op)
+            case ops.Unsubscribe():
+                self._subscriptions.remove(op.topic, op.id)
+            case ops.Advertise(topic=topic, type=kind):
+                self._check_commanded(topic, kind)
+            case ops.Unadvertise(topic=topic):
+                self._check_commanded(topic)
+            case ops.Publish():
+                self._publish(op)
+            case ops.CallService():
+                self._call(op)
+            case ops.SendActionGoal():
+                self._send_goal(participant, op)
+            case ops.CancelActionGoal():
+                self._cancel_goal(op)
+            case ops.SetLevel(level=level):
+                if level not in LEVELS:
+                    raise InputError(f"There is no level {level[:40]!r}, only {', '.join(LEVELS)}.")
+                self._level = LEVELS.index(level)
+
+    def _check_commanded(self, topic: str, kind: str = "") -> None:
+        """Raise InputError unless clients can publish to ``topic``, with messages of ``kind``."""
+        known = names.COMMANDED.get(topic)
+        if known is None:
+            of = "published by the server" if topic in names.PUBLISHED else "unknown"
+            raise InputError(
+                f"The topic {topic} is {of}. Clients can publish to {', '.join(names.COMMANDED)}."
+            )
+        if kind and not names.is_type(kind, known):
+            raise InputError(f"The messages of {topic} are {known}, not {kind}.")
+
+    def _publish(self, op: ops.Publish) -> None:
+        self._check_commanded(op.topic)
+        try:
+            if op.topic == names.TWIST:
+                self._servo.twist(ops.read(op.msg, TwistStamped, names.TOPICS[names.TWIST]))
+            else:
+                self._servo.jog(ops.read(op.msg, JointJog, names.TOPICS[names.JOINT_JOG]))
+        except BusyError:
+            raise
+        except KatanaError as error:
+            # A stream can be refused a hundred times a second.
+            text, since = self._refused.get(op.topic, ("", -math.inf))
+            t = self.hub.clock()
+            if text != str(error) or t - since >= REPEAT_SECONDS:
+                self._refused[op.topic] = str(error), t
+                raise
+        if self._stream.moves:
+            self._acting.set()
+
+    def _call(self, op: ops.CallService) -> None:
+        service = op.service
+        if service not in names.SERVICES:
+            known = ", ".join(each for each in names.SERVICES if names.CANCEL not in each)
+            why = f"There is no service {service}. The services are {known}."
+            self._respond(op, why, result=False)
+            raise InputError(why)
+        if service.startswith(rosapi.ROSAPI):
+            try:
+                values = rosapi.call(service, op.args, self._publications.description)
+            except InputError as error:
+                self._respond(op, str(error), result=False)
+                raise
+            self._respond(op, values)
+        elif service.endswith(names.CANCEL):
+            for goal in self._goals:
+                if goal.action == service.removesuffix(names.CANCEL):
+                    goal.cancel("The client cancelled it.")
+            self._respond(op, {"return_code": 0, "goals_canceling": []})
+        elif service == names.HOLD_SERVICE:
+            self._hold(op)
+        else:
+            self._trigger(op, requests.ClearStop())
+
+    def _hold(self, op: ops.CallService) -> None:
+        """Bring the arm to rest: end the goals of this client, or give the command `hold`."""
+        running = [goal for goal in self._goals if not goal.ends]
+        for goal in running:
+            goal.cancel("The client called /hold.")
+        if running:
+            self._respond(op, TriggerResponse(success=True, message="The goal is cancelled."))
+        else:
+            self._trigger(op, requests.Hold())
+
+    def _trigger(self, op: ops.CallService, request: requests.Request) -> None:
+        """Execute ``request`` and answer a std_srvs/Trigger with its outcome."""
+        try:
+            ops.read(op.args, NoArguments, "a call of std_srvs/Trigger")
+        except InputError as error:
+            # STOP counts all the same.
+            if not isinstance(request, requests.Stop):
+                self._respond(op, str(error), result=False)
+                raise
+        try:
+            done = self._ask(request)
+        except KatanaError as error:
+            self._respond(op, TriggerResponse(success=False, message=str(error)))
+            return
+        if self._dispatcher.is_pending(done):
+            self._later(self._conclude_trigger(op, done))
+        else:
+            self._respond(op, _triggered(done))
+
+    async def _conclude_trigger(self, op: ops.CallService, pending: answers.Answer) -> None:
+        self._respond(op, _triggered(await self._dispatcher.concluded(pending)))
+
+    def _later(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.ensure_future(work)
+        self._concluding.add(task)
+        task.add_done_callback(self._concluding.discard)
+
+    def _respond(self, op: ops.CallService, values: Any, *, result: bool = True) -> None:
+        named = {} if op.id is None else {"id": op.id}
+        response = {"op": "service_response", **named, "service": op.service}
+        self.notify({**response, "values": values, "result": result})
+
+    # Actions
+
+    def _send_goal(self, participant: Participant, op: ops.SendActionGoal) -> None:
+        known = names.ACTIONS.get(op.action)
+        try:
+            if op.id is None:
+                raise InputError("A goal needs an `id`, by which it can be cancelled.")
+            if known is None:
+                raise InputError(
+                    f"There is no action {op.action}. The actions are {', '.join(names.ACTIONS)}."
+                )
+            if op.action_type and not names.is_type(op.action_type, known):
+                raise InputError(f"The action {op.action} is {known}, not {op.action_type}.")
+            self._check_goals(op)
+            host = GoalHost(self.hub, participant, self._ask, self.notify, self._show_newest)
+            follows = op.action == names.FOLLOW
+            goal = FollowGoal(host, op) if follows else GripperGoal(host, op)
+        except InputError as error:
+            refused = {"op": "action_result", "action": op.action, "id": op.id, "result": False}
+            self.notify({**refused, "values": str(error), "status": 6})
+            raise
+        goal.begin()
+        if not goal.ended:
+            self._goals.append(goal)
+            self._acting.set()
+
+    def _check_goals(self, op: ops.SendActionGoal) -> None:
+        """Raise InputError if another goal is in the way of ``op``; fingers take the newest."""
+        if any(goal.id == op.id for goal in self._goals):
+            raise InputError(f"There is a goal with the id {op.id!r} already.")
+        if len(self._goals) >= MAX_GOALS:
+            raise InputError(f"A client can have {MAX_GOALS} goals at a time. Wait for a result.")
+        for goal in self._goals:
+            if goal.action == op.action == names.FOLLOW:
+                raise InputError("Another trajectory is being followed. Cancel it first, or wait.")
+
+    def _cancel_goal(self, op: ops.CancelActionGoal) -> None:
+        for goal in self._goals:
+            if (goal.id, goal.action) == (op.id, op.action):
+                goal.cancel("The client cancelled it.")
+                return
+        raise InputError(f"There is no goal {op.id!r} of {op.action}. It may have ended.")
+
+    def _show_newest(self, key: str, op: dict[str, Any]) -> None:
+        self._newest[key] = op
+        self.wake()
+
+    async def _act(self) -> None:
+        """Continue goals and streams while there are any."""
+        while True:
+            await self._acting.wait()
+            self._acting.clear()
+            while self._goals or self._stream.moves or self._comes_to_rest():
+                self._continue()
+                await asyncio.sleep(TICK)
+
+    def _comes_to_rest(self) -> bool:
+        """Return whether the arm still moves and this client drives it."""
+        person = None if self.participant is None else self.participant.person
+        return self.hub.lease.holder == person and self.hub.gate.moves()
+
+    def _continue(self) -> None:
+        t = self.hub.clock()
+        if t - self._pinged >= HEARTBEAT_INTERVAL:
+            # Clients of rosbridge send no heartbeats; their websockets answer pings.
+            self._pinged = t
+            self._ping()
+        try:
+            self._stream.tick()
+        except KatanaError as error:
+            self.notify(status(str(error)))
+        for goal in self._goals:
+            try:
+                goal.tick()
+            except Exception:
+                log.exception("Error in a goal.")
+                goal.cancel("The server met an internal error; see its log.")
+        self._goals = [goal for goal in self._goals if not goal.ended]
+
+    def _ask(self, request: requests.Request) -> answers.Answer:
+        """Execute ``request`` of the client. Raises KatanaError if it is refused."""
+        assert self.participant is not None
+        return self._dispatcher.handle(self.participant, request, self.budget)
+
+
+def _triggered(done: answers.Answer) -> TriggerResponse:
+    """Return the answer to a request as the response of a std_srvs/Trigger."""
+    if isinstance(done, answers.Refused):
+        return TriggerResponse(success=False, message=done.why)
+    outcome = done.outcome if isinstance(done, answers.Done) else None
+    return TriggerResponse(success=True, message=outcome or "accepted")

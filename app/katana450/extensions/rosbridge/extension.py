@@ -1,0 +1,47 @@
+"""The extension ``rosbridge``: ROS clients without ROS."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from katana450.extension import Extension, ServeExtension
+
+if TYPE_CHECKING:
+    from starlette.routing import BaseRoute
+
+    from katana450.server.web.http_api import RouteContext
+
+
+def _add_options(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--ros-page",
+        action="append",
+        type=_origin,
+        default=[],
+        metavar="ORIGIN",
+        help="let pages of this site, such as http://localhost:3000, connect to /rosbridge; may be "
+        "repeated",
+    )
+
+
+def _origin(text: str) -> str:
+    parts = urlsplit(text)
+    if parts.scheme not in ("http", "https") or not parts.netloc or parts.path.strip("/"):
+        raise ArgumentTypeError(f"{text!r} is not an origin such as http://localhost:3000")
+    return f"{parts.scheme}://{parts.netloc.lower()}"
+
+
+def _routes(context: RouteContext) -> list[BaseRoute]:
+    from katana450.extensions.rosbridge.routes import RosRoutes
+
+    assert context.options is not None
+    context.authenticator.address.guests.update(context.options.ros_page)
+    return RosRoutes(context, context.options.urdf).routes()
+
+
+EXTENSION = Extension(
+    "rosbridge",
+    serve=ServeExtension(_add_options, routes=_routes, needs=("programs", "export")),
+)

@@ -1,0 +1,277 @@
+"""Messages of ROS 2 as they are in JSON. Fields that a client leaves out are zero, as in ROS.
+
+Source: the .msg and .action files of common_interfaces and control_msgs.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+NANOSECONDS = 1_000_000_000
+
+Seconds = Annotated[int, Meta(ge=-(2**31), le=2**32 - 1)]
+Nanoseconds = Annotated[int, Meta(ge=0, lt=NANOSECONDS)]
+Names = Annotated[list[Annotated[str, Meta(max_length=200)]], Meta(max_length=64)]
+Numbers = Annotated[list[float], Meta(max_length=64)]
+
+
+class RosMessage(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of the messages of this module."""
+
+
+class Time(RosMessage, frozen=True, kw_only=True):
+    """builtin_interfaces/Time or Duration."""
+
+    sec: int = 0
+    nanosec: int = 0
+
+
+class GivenTime(RosMessage, frozen=True, kw_only=True):
+    """A time or duration from a client, with the names of ROS 2 or of ROS 1."""
+
+    sec: Seconds = 0
+    nanosec: Nanoseconds = 0
+    secs: Seconds = 0
+    nsecs: Nanoseconds = 0
+
+    @property
+    def seconds(self) -> float:
+        """The time [s]."""
+        return self.sec + self.secs + (self.nanosec + self.nsecs) / NANOSECONDS
+
+
+class Header(RosMessage, frozen=True, kw_only=True):
+    """std_msgs/Header."""
+
+    stamp: Time
+    frame_id: str = ""
+
+
+class GivenHeader(RosMessage, frozen=True, kw_only=True):
+    """A std_msgs/Header from a client; ``seq`` is of ROS 1."""
+
+    stamp: GivenTime = GivenTime()
+    frame_id: Annotated[str, Meta(max_length=200)] = ""
+    seq: int = 0
+
+
+class Vector3(RosMessage, frozen=True, kw_only=True):
+    """geometry_msgs/Vector3."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+class Quaternion(RosMessage, frozen=True, kw_only=True):
+    """geometry_msgs/Quaternion."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    w: float = 1.0
+
+
+class RosTransform(RosMessage, frozen=True, kw_only=True):
+    """geometry_msgs/Transform."""
+
+    translation: Vector3
+    rotation: Quaternion
+
+
+class TransformStamped(RosMessage, frozen=True, kw_only=True):
+    """geometry_msgs/TransformStamped."""
+
+    header: Header
+    child_frame_id: str
+    transform: RosTransform
+
+
+class TFMessage(RosMessage, frozen=True, kw_only=True):
+    """tf2_msgs/TFMessage."""
+
+    transforms: list[TransformStamped]
+
+
+class JointState(RosMessage, frozen=True, kw_only=True):
+    """sensor_msgs/JointState."""
+
+    header: Header
+    name: list[str]
+    position: list[float]
+    velocity: list[float]
+    effort: list[float]
+
+
+class KeyValue(RosMessage, frozen=True, kw_only=True):
+    """diagnostic_msgs/KeyValue."""
+
+    key: str
+    value: str
+
+
+class DiagnosticStatus(RosMessage, frozen=True, kw_only=True):
+    """diagnostic_msgs/DiagnosticStatus. ``level``: 0 ok, 1 warning, 2 error, 3 stale."""
+
+    level: int
+    name: str
+    message: str
+    hardware_id: str
+    values: list[KeyValue]
+
+
+class DiagnosticArray(RosMessage, frozen=True, kw_only=True):
+    """diagnostic_msgs/DiagnosticArray."""
+
+    header: Header
+    status: list[DiagnosticStatus]
+
+
+class String(RosMessage, frozen=True, kw_only=True):
+    """std_msgs/String."""
+
+    data: str
+
+
+class Twist(RosMessage, frozen=True, kw_only=True):
+    """geometry_msgs/Twist."""
+
+    linear: Vector3 = Vector3()
+    angular: Vector3 = Vector3()
+
+
+class TwistStamped(RosMessage, frozen=True, kw_only=True):
+    """geometry_msgs/TwistStamped."""
+
+    header: GivenHeader = GivenHeader()
+    twist: Twist = Twist()
+
+
+class JointJog(RosMessage, frozen=True, kw_only=True):
+    """control_msgs/JointJog."""
+
+    header: GivenHeader = GivenHeader()
+    joint_names: Names = []
+    displacements: Numbers = []
+    velocities: Numbers = []
+    duration: float = 0.0
+
+
+class JointTrajectoryPoint(RosMessage, frozen=True, kw_only=True):
+    """trajectory_msgs/JointTrajectoryPoint."""
+
+    positions: Numbers = []
+    velocities: Numbers = []
+    accelerations: Numbers = []
+    effort: Numbers = []
+    time_from_start: GivenTime = GivenTime()
+
+
+class JointTrajectory(RosMessage, frozen=True, kw_only=True):
+    """trajectory_msgs/JointTrajectory."""
+
+    header: GivenHeader = GivenHeader()
+    joint_names: Names = []
+    points: list[JointTrajectoryPoint] = []
+
+
+class MultiDOFJointTrajectory(RosMessage, frozen=True, kw_only=True):
+    """trajectory_msgs/MultiDOFJointTrajectory, which is accepted only if it is empty."""
+
+    header: GivenHeader = GivenHeader()
+    joint_names: Annotated[list[str], Meta(max_length=0)] = []
+    points: Annotated[list[float], Meta(max_length=0)] = []
+
+
+class JointTolerance(RosMessage, frozen=True, kw_only=True):
+    """control_msgs/JointTolerance."""
+
+    name: str = ""
+    position: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+Tolerances = Annotated[list[JointTolerance], Meta(max_length=64)]
+NoTolerances = Annotated[list[float], Meta(max_length=0)]
+
+
+class FollowJointTrajectory(RosMessage, frozen=True, kw_only=True):
+    """The goal of control_msgs/FollowJointTrajectory."""
+
+    trajectory: JointTrajectory = JointTrajectory()
+    multi_dof_trajectory: MultiDOFJointTrajectory = MultiDOFJointTrajectory()
+    path_tolerance: Tolerances = []
+    component_path_tolerance: NoTolerances = []
+    goal_tolerance: Tolerances = []
+    component_goal_tolerance: NoTolerances = []
+    goal_time_tolerance: GivenTime = GivenTime()
+
+
+class FollowJointTrajectoryResult(RosMessage, frozen=True, kw_only=True):
+    """The result of control_msgs/FollowJointTrajectory."""
+
+    error_code: int
+    error_string: str
+
+
+class FollowedPoint(RosMessage, frozen=True, kw_only=True):
+    """trajectory_msgs/JointTrajectoryPoint in a feedback."""
+
+    positions: list[float]
+    velocities: list[float]
+    time_from_start: Time
+    accelerations: list[float] = []
+    effort: list[float] = []
+
+
+class FollowJointTrajectoryFeedback(RosMessage, frozen=True, kw_only=True):
+    """The feedback of control_msgs/FollowJointTrajectory."""
+
+    header: Header
+    joint_names: list[str]
+    desired: FollowedPoint
+    actual: FollowedPoint
+    error: FollowedPoint
+
+
+class GripperPosition(RosMessage, frozen=True, kw_only=True):
+    """control_msgs/GripperCommand, the message."""
+
+    position: float = 0.0
+    max_effort: float = 0.0
+
+
+class GripperCommand(RosMessage, frozen=True, kw_only=True):
+    """The goal of the action control_msgs/GripperCommand."""
+
+    command: GripperPosition = GripperPosition()
+
+
+class GripperCommandResult(RosMessage, frozen=True, kw_only=True):
+    """The result of the action control_msgs/GripperCommand, and its feedback."""
+
+    position: float
+    effort: float
+    stalled: bool
+    reached_goal: bool
+
+
+class TriggerResponse(RosMessage, frozen=True, kw_only=True):
+    """The response of std_srvs/Trigger."""
+
+    success: bool
+    message: str
+
+
+class NoArguments(RosMessage, frozen=True, kw_only=True):
+    """The request of std_srvs/Trigger."""
+
+
+def time_of(seconds: float) -> Time:
+    """Return ``seconds`` [s] as a time of ROS 2, rounded to 1 ns."""
+    sec, nanosec = divmod(round(seconds * NANOSECONDS), NANOSECONDS)
+    return Time(sec=sec, nanosec=nanosec)

@@ -1,0 +1,194 @@
+"""Messages of the topics, made from the state of the arm."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from katana450.arm.robot.link import Link
+from katana450.arm.robot.robot import Robot
+from katana450.extensions.rosbridge import names
+from katana450.extensions.rosbridge.messages import (
+    DiagnosticArray,
+    DiagnosticStatus,
+    Header,
+    JointState,
+    KeyValue,
+    Quaternion,
+    RosMessage,
+    RosTransform,
+    String,
+    TFMessage,
+    Time,
+    TransformStamped,
+    Vector3,
+    time_of,
+)
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.api import answers
+from katana450.server.service import serialize
+from katana450.server.service.hub import Hub
+from katana450.server.service.interfaces import ArmInterface
+
+SILENT_AFTER = 0.3
+"""[s] Age of the state from which on it is unknown, and the topics of the arm fall silent."""
+
+OK, WARN, ERROR, STALE = 0, 1, 2, 3
+"""Levels of a diagnostic_msgs/DiagnosticStatus."""
+
+PERIODS: Mapping[str, float] = {
+    names.JOINT_STATES: 0.02,
+    names.TF: 1.0 / 30.0,
+    names.DIAGNOSTICS: 1.0,
+    names.STATE: 0.1,
+}
+"""[s] Interval of each topic. A topic without one is sent once, to each new subscriber."""
+
+
+class Publications(NamedTuple):
+    """The topics of one server. ``description`` returns the text of /robot_description."""
+
+    hub: Hub
+    description: Callable[[], str]
+
+    def message(self, topic: str) -> RosMessage | None:
+        """Return the present message of ``topic``; None while there is none.
+
+        Raises LeaseError until there is an arm.
+        """
+        arm = self.hub.present()
+        match topic:
+            case names.ROBOT_DESCRIPTION:
+                return String(data=self.description())
+            case names.DIAGNOSTICS:
+                return diagnostics(self.hub, arm)
+            case names.TF_STATIC:
+                fixed = [link for link in arm.robot.links if link.joint is None]
+                return transforms(fixed, {}, time_of(time.time()))
+        if arm.age > SILENT_AFTER:
+            return None
+        stamp = time_of(self.stamp(arm))
+        match topic:
+            case names.JOINT_STATES:
+                return joint_state(arm, stamp)
+            case names.TF:
+                moving = [link for link in arm.robot.links if link.joint is not None]
+                values = arm.robot.joint_values(arm.state.q, arm.state.gripper)
+                return transforms(moving, values, stamp)
+        return String(data=answers.encoded(serialize.state(self.hub)))
+
+    def stamp(self, arm: ArmInterface) -> float:
+        """Return the time of the newest state [s since the epoch]; an arm at rest has it now."""
+        now = time.time()
+        return now - max(self.hub.clock() - arm.state.t, 0.0) if arm.state.moving else now
+
+
+def joint_state(arm: ArmInterface, stamp: Time) -> JointState:
+    """Return all movable joints: positions [rad or m], and the rates of the arm's setpoints.
+
+    The rate of a joint beside the arm's axes is 0. There are no efforts.
+    """
+    now, robot = arm.state, arm.robot
+    values = robot.joint_values(now.q, now.gripper)
+    rates = dict(zip(axis_names(robot), now.motion.qd.tolist(), strict=True))
+    return JointState(
+        header=Header(stamp=stamp),
+        name=list(values),
+        position=list(values.values()),
+        velocity=[rates.get(name, 0.0) for name in values],
+        effort=[],
+    )
+
+
+def axis_names(robot: Robot) -> tuple[str, ...]:
+    """Return the names of the joints of a joint vector, in its order."""
+    return robot.driven if robot.arm is None else robot.arm.chain.names
+
+
+def transforms(links: list[Link], values: Mapping[str, float], stamp: Time) -> TFMessage:
+    """Return the poses of ``links`` in their parents with the joints at ``values`` [rad or m]."""
+    found: list[TransformStamped] = []
+    for link in links:
+        if link.parent is None:
+            continue
+        T = link.T_parent_link
+        if link.joint is not None:
+            T = T @ link.joint.motion(values[link.joint.name])
+        header = Header(stamp=stamp, frame_id=link.parent)
+        found.append(
+            TransformStamped(header=header, child_frame_id=link.name, transform=_transform(T))
+        )
+    return TFMessage(transforms=found)
+
+
+def _transform(T: FloatArray) -> RosTransform:
+    x, y, z = T[:3, 3].tolist()
+    qw, qx, qy, qz = so3.to_quaternion(T[:3, :3]).tolist()
+    return RosTransform(
+        translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw)
+    )
+
+
+def diagnostics(hub: Hub, arm: ArmInterface) -> DiagnosticArray:
+    """Return the condition of the arm, of its control loop and of the right to drive."""
+    now = serialize.state(hub)
+    return DiagnosticArray(
+        header=Header(stamp=time_of(time.time())),
+        status=[_arm_status(now), _loop_status(arm), _driver_status(hub, now)],
+    )
+
+
+def _arm_status(now: answers.State) -> DiagnosticStatus:
+    if now.age > SILENT_AFTER:
+        level, message = STALE, f"The arm's process has not answered for {now.age:.1f} s."
+    elif now.stopped is not None:
+        level, message = ERROR, now.stopped
+    elif now.status == "fault":
+        level, message = ERROR, now.why
+    elif now.status == "ok":
+        level, message = OK, "ok"
+    else:
+        level, message = WARN, now.why or now.status
+    values = {"status": now.status, "stop": now.stop or "", "speed": f"{now.speed:g}"}
+    for number, found in enumerate(now.findings, 1):
+        values[f"finding {number}"] = found.text
+    if now.arm is not None:
+        values |= {"mode": now.arm.mode, "note": now.arm.note}
+    return _status("katana450: arm", level, message, values)
+
+
+def _loop_status(arm: ArmInterface) -> DiagnosticStatus:
+    timing = arm.loop_timing
+    late = timing.p99 > timing.period
+    message = "1 % of the ticks are more than a period late." if late else "ok"
+    values = {
+        "period [ms]": f"{1e3 * timing.period:.1f}",
+        "delay, median [ms]": f"{1e3 * timing.p50:.2f}",
+        "delay, 99th percentile [ms]": f"{1e3 * timing.p99:.2f}",
+        "ticks lost": str(timing.lost),
+    }
+    return _status("katana450: control loop", WARN if late else OK, message, values)
+
+
+def _driver_status(hub: Hub, now: answers.State) -> DiagnosticStatus:
+    message = "nobody drives" if now.holder is None else f"{now.holder} drives"
+    values = {"participants": str(len(hub.participants)), "stop port": hub.stop_path.problem}
+    return _status("katana450: driver", OK, message, values)
+
+
+def _status(name: str, level: int, message: str, values: Mapping[str, str]) -> DiagnosticStatus:
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticStatus(
+        level=level, name=name, message=message, hardware_id="katana450", values=pairs
+    )
+
+
+def frames(robot: Robot, values: Mapping[str, float]) -> dict[str, FloatArray]:
+    """Return the rotation (3, 3) of each link's frame in {S} with the joints at ``values``."""
+    T_base_shoulder = np.eye(4) if robot.arm is None else robot.arm.T_base_shoulder
+    R = T_base_shoulder[:3, :3].T
+    return {name: R @ T[:3, :3] for name, T in robot.frames(values).items()}

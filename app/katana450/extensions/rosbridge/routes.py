@@ -1,0 +1,129 @@
+"""The websocket of rosbridge and the meshes of the robot's description."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import threading
+from functools import partial
+from pathlib import Path, PurePosixPath
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from katana450.arm.control.actor import CommandChannel
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.extensions.rosbridge.channel import Endpoint, RosChannel, RosLine
+from katana450.extensions.rosbridge.description import MESHES, TYPES, RobotPackage
+from katana450.extensions.rosbridge.publications import Publications
+from katana450.extensions.rosbridge.servoing import Units
+from katana450.server.service.participants import actor_of
+from katana450.server.web.admission import LIMIT_CLOSE_CODE, address_of, client_of, reserved
+from katana450.server.web.channel import BAD_REQUEST_CLOSE_CODE
+from katana450.server.web.connection_limit import ConnectionLimit
+from katana450.server.web.http_api import RouteContext
+from katana450.server.web.program_socket import serve_socket
+
+log = logging.getLogger(__name__)
+
+CLIENTS, CLIENTS_EACH, RESERVED_CLIENTS = 32, 8, 2
+"""Maximum of ROS clients, of all together and of one identity, and number reserved for the driver
+and for each admin with a link."""
+
+UNITS = "command_in_type"
+"""Name of the parameter in the address with the units of commands."""
+
+
+class LateDescription:
+    """The robot's description, read in a thread when the first client wants it."""
+
+    def __init__(self, urdf: Path) -> None:
+        self._urdf = urdf
+        self._lock = threading.Lock()
+        self._found: RobotPackage | None = None
+
+    def read(self) -> RobotPackage:
+        """Return the description; the first call takes seconds. For any other thread.
+
+        Raises RobotDescriptionError for an invalid file.
+        """
+        with self._lock:
+            if self._found is None:
+                self._found = RobotPackage.read(self._urdf)
+            return self._found
+
+
+class RosRoutes:
+    """The routes of one server."""
+
+    def __init__(self, context: RouteContext, urdf: Path) -> None:
+        self._context = context
+        self._description = LateDescription(urdf)
+        self._places = ConnectionLimit(CLIENTS, CLIENTS_EACH)
+
+    def routes(self) -> list[BaseRoute]:
+        """Return the routes."""
+        return [
+            WebSocketRoute("/rosbridge", self._serve),
+            Route(f"{MESHES}/{{key}}/{{path:path}}", self._mesh),
+        ]
+
+    async def _serve(self, socket: WebSocket) -> None:
+        """Serve one client until its websocket closes."""
+        context = self._context
+        hub, authenticator = context.hub, context.authenticator
+        who = client_of(authenticator, socket)
+        session, places = "", 0
+        if who is not None:
+            session, places = who.session, reserved(hub, authenticator, who, RESERVED_CLIENTS)
+        with self._places.taken(session, places) as free:
+            if not free:
+                why = f"At most {CLIENTS} ROS clients can connect, and {CLIENTS_EACH} of a person."
+                if who is not None:
+                    actor = actor_of(who, CommandChannel.WEBSOCKET, address_of(socket))
+                    hub.recorder.refuse("connection", actor, InputError(why))
+                await _refuse(socket, LIMIT_CLOSE_CODE, why)
+                return
+            try:
+                units = Units(socket.query_params.get(UNITS, Units.UNITLESS.value))
+                scheme = "https" if authenticator.address.cookies_are_secure else "http"
+                origin = f"{scheme}://{socket.headers['host']}"
+                text = (await asyncio.to_thread(self._description.read)).at(origin)
+            except ValueError:
+                known = " or ".join(each.value for each in Units)
+                await _refuse(socket, BAD_REQUEST_CLOSE_CODE, f"`{UNITS}` must be {known}.")
+                return
+            except RobotDescriptionError as error:
+                log.warning("There is no /robot_description: %s", error)
+                text = ""
+            endpoint = Endpoint(Publications(hub, lambda: text), units)
+            make = partial(RosChannel, endpoint=endpoint)
+            await serve_socket(hub, authenticator, context.budgets, socket, make, RosLine)
+
+    async def _mesh(self, request: Request) -> Response:
+        """Answer with a file of the description, to everybody who knows its address."""
+        found = await asyncio.to_thread(self._description.read)
+        content = found.files.get(request.path_params["path"])
+        known = secrets.compare_digest(request.path_params["key"].encode(), found.key.encode())
+        if not known or content is None:
+            raise HTTPException(404)
+        suffix = PurePosixPath(request.path_params["path"]).suffix.lower()
+        headers = {
+            # Pages of any site that know the address may draw the robot.
+            "Access-Control-Allow-Origin": "*",
+            "Cross-Origin-Resource-Policy": "cross-origin",
+            "Cache-Control": "private, max-age=3600",
+        }
+        return Response(
+            content, headers=headers, media_type=TYPES.get(suffix, "application/octet-stream")
+        )
+
+
+async def _refuse(socket: WebSocket, code: int, why: str) -> None:
+    """Close a requested websocket with the reason ``why``, as a status and in the close frame."""
+    await socket.accept()
+    await RosLine(socket).close(code, why)

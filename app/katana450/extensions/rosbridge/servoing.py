@@ -1,0 +1,169 @@
+"""Twists and rates of joints as MoveIt Servo takes them, and the rates of the arm that they mean.
+
+An arm of five axes turns its tool about two axes only: that of pitch, which is horizontal and
+across the arm, and that of roll, which is the tool's own. How it turns about a third follows from
+the path of the tool point. So a twist without rotation keeps pitch and roll, and a rotation about
+another axis is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.rosbridge.messages import GivenHeader, JointJog, Twist, Vector3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.freedoms import pitched_frame
+from katana450.server.api.fields import MAX_ANGULAR_RATE, MAX_LINEAR_RATE
+
+COMMAND_TIMEOUT = 0.1
+"""[s] Time for which a command counts, as ``incoming_command_timeout`` of MoveIt Servo."""
+
+STREAM_GAP = 0.5
+"""[s] Pause between two commands from which on the second one begins another motion."""
+
+IMPOSSIBLE = 0.01
+"""Fraction of an angular velocity about an axis that the arm does not have: rounding, and the
+motion of the arm while the command is on its way."""
+
+
+class Units(Enum):
+    """Meaning of the numbers of a command, ``command_in_type`` of MoveIt Servo."""
+
+    UNITLESS = "unitless"
+    """-1 to 1, fractions of ``Scale``."""
+    SPEED_UNITS = "speed_units"
+    """m/s and rad/s."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Speeds of a command without unit at 1.
+
+    Attributes:
+        linear: of the tool point [m/s].
+        rotational: of pitch and roll [rad/s].
+        joint: of a joint [rad/s or m/s].
+    """
+
+    linear: float = 0.4
+    rotational: float = 0.8
+    joint: float = 0.5
+
+
+SCALE = Scale()
+"""The scale that MoveIt Servo comes with."""
+
+
+def check_fresh(header: GivenHeader, now: float) -> None:
+    """Raise InputError if ``header`` is older than COMMAND_TIMEOUT at ``now`` [s since the epoch].
+
+    A stamp of zero stands for the time of receipt.
+    """
+    stamp = header.stamp.seconds
+    if stamp and now - stamp > COMMAND_TIMEOUT:
+        raise InputError(
+            f"This command was stamped {now - stamp:.2f} s ago and counts for {COMMAND_TIMEOUT:g} "
+            "s. If the clocks differ, leave its stamp zero."
+        )
+
+
+def tool_rates(
+    twist: Twist,
+    R_shoulder_frame: FloatArray,
+    chain: Chain,
+    q: FloatArray,
+    units: Units,
+    scale: Scale = SCALE,
+) -> FloatArray:
+    """Return the rates (5,) of a jog along {S}: (x, y, z) [m/s], pitch and roll [rad/s].
+
+    Args:
+        twist: velocity of the tool point, and angular velocity of the tool.
+        R_shoulder_frame: (3, 3) orientation in {S} of the frame of ``twist``.
+        chain: the arm.
+        q: (5,) joint angles [rad].
+        units: units of ``twist``.
+        scale: speeds that 1 stands for.
+
+    Raises:
+        InputError: a number is out of range, or the arm has no axis for the rotation.
+    """
+    linear = _scaled(twist.linear, units, scale.linear, MAX_LINEAR_RATE, "linear", "m/s")
+    angular = _scaled(twist.angular, units, scale.rotational, MAX_ANGULAR_RATE, "angular", "rad/s")
+    omega = R_shoulder_frame @ angular
+    roll_axis, pitch_axis, other = pitched_frame(chain, q).T
+    size, impossible = float(np.linalg.norm(omega)), float(other @ omega)
+    if abs(impossible) > IMPOSSIBLE * size:
+        x, y, z = (R_shoulder_frame.T @ other).tolist()
+        raise InputError(
+            f"The arm has five axes and none for {abs(impossible):.3g} rad/s of this rotation, "
+            f"about ({x:.3f}, {y:.3f}, {z:.3f}) in the frame of the command. It can turn the tool "
+            "about the tool's own axis (roll) and about the horizontal axis across the arm "
+            "(pitch). Set this part of `angular` to 0."
+        )
+    return np.array([*(R_shoulder_frame @ linear), pitch_axis @ omega, roll_axis @ omega])
+
+
+def joint_rates(
+    jog: JointJog, joints: Sequence[str], units: Units, scale: Scale = SCALE
+) -> FloatArray:
+    """Return the rates (n,) [rad/s or m/s] of ``joints``; those that ``jog`` does not name are 0.
+
+    Raises InputError for unknown or repeated joints, and for numbers that are out of range.
+    """
+    if any(jog.displacements):
+        raise InputError("`displacements` are not supported. Send `velocities`.")
+    if len(jog.velocities) != len(jog.joint_names):
+        raise InputError(
+            f"There are {len(jog.joint_names)} names of joints and {len(jog.velocities)} "
+            "velocities. Send one velocity for each joint."
+        )
+    check_joints(jog.joint_names, joints)
+    given = dict(zip(jog.joint_names, jog.velocities, strict=True))
+    limit = 1.0 if units is Units.UNITLESS else MAX_ANGULAR_RATE
+    for name, value in given.items():
+        _check_range(value, limit, f"The velocity of {name}", units, "rad/s")
+    factor = scale.joint if units is Units.UNITLESS else 1.0
+    return np.array([factor * given.get(name, 0.0) for name in joints])
+
+
+def check_joints(given: Sequence[str], joints: Sequence[str]) -> None:
+    """Raise InputError unless ``given`` are different ones of ``joints``."""
+    unknown = [name for name in given if name not in joints]
+    if unknown:
+        raise InputError(f"There is no joint {unknown[0]!r}. The joints are {', '.join(joints)}.")
+    if len(set(given)) != len(given):
+        raise InputError("A joint is named twice.")
+
+
+def rotation_of(frame: str, frames: Mapping[str, FloatArray], root: str) -> FloatArray:
+    """Return the orientation (3, 3) in {S} of the frame ``frame``, by default of ``root``.
+
+    Raises InputError for an unknown frame.
+    """
+    found = frames.get(frame or root)
+    if found is None:
+        raise InputError(f"There is no frame {frame!r}. The frames are {', '.join(frames)}.")
+    return found
+
+
+def _scaled(
+    given: Vector3, units: Units, scale: float, maximum: float, part: str, unit: str
+) -> FloatArray:
+    limit = 1.0 if units is Units.UNITLESS else maximum
+    for axis, value in (("x", given.x), ("y", given.y), ("z", given.z)):
+        _check_range(value, limit, f"`{part}.{axis}`", units, unit)
+    factor = scale if units is Units.UNITLESS else 1.0
+    return factor * np.array([given.x, given.y, given.z])
+
+
+def _check_range(value: float, limit: float, what: str, units: Units, unit: str) -> None:
+    if not abs(value) <= limit:
+        meant = "without unit" if units is Units.UNITLESS else unit
+        raise InputError(f"{what} is {value:g}; it must be from {-limit:g} to {limit:g} {meant}.")
