@@ -89,7 +89,10 @@ GLTF_VALIDATOR = Package("gltf-validator@2.0.0-dev.3.10", "package/index.js")
 ASYNCAPI_PARSER = Package("@asyncapi/parser@3.6.6", "package/browser/index.js")
 """The parser of the makers of AsyncAPI, with all that it needs in one file."""
 
-NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR, ASYNCAPI_PARSER)
+ROSLIB = Package("roslib@2.1.0", "node_modules/roslib/dist/RosLib.js", alone=False)
+"""The client of rosbridge for browsers."""
+
+NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR, ASYNCAPI_PARSER, ROSLIB)
 """Packages of npm; nothing of them is executed when they are unpacked."""
 
 PYBULLET = Package("pybullet==3.2.7", "pybullet*.so")
@@ -111,7 +114,10 @@ OPENAPI_VALIDATOR = Package(
 )
 """A validator of OpenAPI documents."""
 
-WHEELS = (PYBULLET, VTK, PINOCCHIO, USD, OPENAPI_VALIDATOR)
+ROSLIBPY = Package("roslibpy==2.1.0", "roslibpy/__init__.py", alone=False)
+"""The client of rosbridge for Python; with Twisted, which nothing else needs."""
+
+WHEELS = (PYBULLET, VTK, PINOCCHIO, USD, OPENAPI_VALIDATOR, ROSLIBPY)
 """Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
@@ -182,6 +188,9 @@ def fetch_npm(package: Package) -> str:
         return "npm is not here"
     package.folder.mkdir(parents=True, exist_ok=True)
     pack = ["npm", "pack", package.name, "--silent"]
+    if not package.alone:
+        quiet = ["--ignore-scripts", "--no-audit", "--no-fund", "--silent"]
+        pack = ["npm", "install", *quiet, "--prefix", str(package.folder), package.name]
     print("Running:", *pack, flush=True)
     try:
         done = subprocess.run(

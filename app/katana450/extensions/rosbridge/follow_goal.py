@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import time
 from contextlib import suppress
 from dataclasses import replace
@@ -31,6 +32,9 @@ from katana450.extensions.rosbridge.trajectory import (
 )
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers
+
+PLACE = re.compile(r"^line \d+, (column \d+|[^:]*): ", re.IGNORECASE)
+"""Place in the script with which a reason begins. The client has not written the script."""
 
 _numbers = itertools.count(1)
 
@@ -81,9 +85,9 @@ class FollowGoal(Goal):
             case "ready" | "cancelled":
                 return self._canceled(now.why)
             case "refused":
-                raise GoalError(ErrorCode.INVALID_GOAL, now.why)
+                raise GoalError(ErrorCode.INVALID_GOAL, PLACE.sub("", now.why))
             case "failed":
-                raise GoalError(ErrorCode.PATH_TOLERANCE_VIOLATED, now.why)
+                raise GoalError(ErrorCode.PATH_TOLERANCE_VIOLATED, PLACE.sub("", now.why))
             case "stopped":
                 return self._canceled(now.why)
             case "done":

@@ -113,7 +113,7 @@ class RosRoutes:
             raise HTTPException(404)
         suffix = PurePosixPath(request.path_params["path"]).suffix.lower()
         headers = {
-            # Pages of any site that know the address may draw the robot.
+            # Of pages, only those of our site and of `--ros-page` get here.
             "Access-Control-Allow-Origin": "*",
             "Cross-Origin-Resource-Policy": "cross-origin",
             "Cache-Control": "private, max-age=3600",

@@ -100,7 +100,8 @@ def tool_rates(
     roll_axis, pitch_axis, other = pitched_frame(chain, q).T
     size, impossible = float(np.linalg.norm(omega)), float(other @ omega)
     if abs(impossible) > IMPOSSIBLE * size:
-        x, y, z = (R_shoulder_frame.T @ other).tolist()
+        # Without a minus sign in front of a zero.
+        x, y, z = (np.round(R_shoulder_frame.T @ other, 3) + 0.0).tolist()
         raise InputError(
             f"The arm has five axes and none for {abs(impossible):.3g} rad/s of this rotation, "
             f"about ({x:.3f}, {y:.3f}, {z:.3f}) in the frame of the command. It can turn the tool "

@@ -120,6 +120,7 @@ class ServoStream:
             return
         self._motion = ServoMotion.NOTHING
         if motion is ServoMotion.TOOL:
+            # Keeps the tool on its line; a hold brakes each joint by itself.
             self._ask(requests.Jog(rates=(0.0,) * 5, revocations=self._revocations))
         else:
             self._ask(requests.Hold(revocations=self._revocations))

@@ -51,7 +51,8 @@ class Address:
         any_address: Whether every bare IP address is accepted; False on loopback alone.
         secure: Whether the server itself uses TLS.
         public: Origin of a reverse proxy in front, such as ``https://arm.example.org``.
-        guests: Origins of pages of other sites that may open the websockets of programs.
+        guests: Origins of pages of other sites that may open the websockets of programs and read
+            files.
     """
 
     names: frozenset[str]

@@ -92,7 +92,8 @@ class SecurityMiddleware:
         # Every browser sends Origin when a page opens a websocket or sends data.
         if origin is None:
             return None if safe or program else "The header Origin is missing."
-        guest = program and scope["type"] == "websocket" and origin in self._address.guests
+        reads = safe or scope["type"] == "websocket"
+        guest = program and reads and origin in self._address.guests
         if not (guest or self._address.is_our_page(origin, host)):
             return "Pages of other sites may not send this request."
         return None

@@ -1,0 +1,414 @@
+"""A client of rosbridge sees the arm, jogs it, follows trajectories, cancels and stops."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.arm.robot.robot import Robot
+from katana450.maths.geometry import so3
+from tests.browser.server import AppServer
+from tests.gateway.client import controlling
+from tests.rosbridge.ros_client import (
+    FOLLOW,
+    GRIPPER,
+    JOINT_JOG,
+    JOINTS,
+    TWIST,
+    RosClient,
+    ros,
+    stamp,
+    trajectory,
+    twist,
+)
+
+AWAY = [0.4, -1.1, 1.4, 0.2, 0.3]
+
+
+def pose(message: dict[str, Any]) -> np.ndarray[Any, Any]:
+    """Return a geometry_msgs/Transform as a matrix (4, 4)."""
+    T = np.eye(4)
+    turned = message["rotation"]
+    T[:3, :3] = so3.from_quaternion([turned[each] for each in "wxyz"])
+    T[:3, 3] = [message["translation"][each] for each in "xyz"]
+    return T
+
+
+async def stream(client: RosClient, topic: str, message: dict[str, Any], seconds: float) -> None:
+    """Publish ``message`` 30 times a second."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        await client.say("publish", topic=topic, msg=message)
+        await asyncio.sleep(1 / 30)
+
+
+def test_topics_describe_the_arm_as_it_is(server: AppServer, robot: Robot) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            at_home = await client.home()
+            found = {}
+            for topic in ("/joint_states", "/tf", "/tf_static", "/robot_description"):
+                await client.say("subscribe", topic=topic)
+                found[topic] = await client.message(topic)
+            joints = found["/joint_states"]
+            assert joints["name"][:5] == JOINTS
+            assert joints["position"][:5] == pytest.approx(at_home["q"])
+            assert abs(joints["header"]["stamp"]["sec"] - time.time()) < 5.0
+            # Frames on the way from the root to the tool give the pose that the API reports.
+            edges = {
+                each["child_frame_id"]: (each["header"]["frame_id"], pose(each["transform"]))
+                for topic in ("/tf", "/tf_static")
+                for each in found[topic]["transforms"]
+            }
+            T, frame = np.eye(4), at_home["tool"]
+            while frame != robot.links[0].name:
+                frame, step = edges[frame]
+                T = step @ T
+            T_base_shoulder = robot.require_arm().T_base_shoulder
+            assert T_base_shoulder @ np.array(at_home["T"]) == pytest.approx(T, abs=1e-9)
+            assert f'<robot name="{robot.name}">' in found["/robot_description"]["data"]
+
+    asyncio.run(act())
+
+
+def test_topic_is_sent_at_its_rate_or_more_seldom(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url, watches=False) as client:
+            await client.say("subscribe", topic="/joint_states", id="a", throttle_rate=250)
+            await client.message("/joint_states")
+            before = client.counts["/joint_states"]
+            await asyncio.sleep(2.0)
+            assert 4 <= client.counts["/joint_states"] - before <= 9
+            await client.say("subscribe", topic="/joint_states", id="b")
+            await client.message("/joint_states")
+            before = client.counts["/joint_states"]
+            await asyncio.sleep(1.0)
+            assert 20 <= client.counts["/joint_states"] - before <= 55
+            await client.say("unsubscribe", topic="/joint_states")
+            await client.call("/rosapi/nodes")
+            before = client.counts["/joint_states"]
+            await asyncio.sleep(0.3)
+            assert client.counts["/joint_states"] == before
+
+    asyncio.run(act())
+
+
+def test_trajectory_is_followed_with_feedback(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            await client.home()
+            client.feedback.clear()
+            began = time.monotonic()
+            # The joints of a goal may be in any order.
+            goal = trajectory((1.0, [0.2, -1.15, 1.45, 0.15, 0.1]), (2.0, AWAY))
+            goal["trajectory"]["joint_names"] = JOINTS[::-1]
+            for point in goal["trajectory"]["points"]:
+                point["positions"] = point["positions"][::-1]
+            number = await client.goal(FOLLOW, goal)
+            result = await client.result(number)
+            assert result["result"] is True
+            assert (result["status"], result["values"]["error_code"]) == (4, 0)
+            assert time.monotonic() - began > 2.0
+            assert (await client.state())["q"] == pytest.approx(AWAY, abs=1e-3)
+            values = [each["values"] for each in client.feedback if each["id"] == number]
+            assert len(values) >= 10
+            first, last = (np.array(values[k]["actual"]["positions"]) for k in (0, -1))
+            assert np.abs(last - AWAY).max() < np.abs(first - AWAY).max()
+            # A goal where the arm stands is reached at once.
+            q = (await client.state())["q"]
+            result = await client.result(await client.goal(FOLLOW, trajectory((1.0, q))))
+            assert result["status"] == 4
+
+    asyncio.run(act())
+
+
+def test_cancel_brings_the_arm_to_rest(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            await client.home()
+            number = await client.goal(FOLLOW, trajectory((6.0, AWAY)))
+            await client.when(lambda state: state["moving"])
+            await asyncio.sleep(0.5)
+            await client.say("cancel_action_goal", id=number, action=FOLLOW)
+            result = await client.result(number)
+            assert result["status"] == 5
+            assert "cancelled" in result["values"]["error_string"]
+            state = await client.state()
+            assert not state["moving"]
+            assert state["stopped"] is None
+            assert abs(state["q"][0] - AWAY[0]) > 0.1
+            # All goals of an action, as roslib cancels them; and by /hold.
+            for cancel in (f"{FOLLOW}/_action/cancel_goal", "/hold"):
+                number = await client.goal(FOLLOW, trajectory((6.0, AWAY)))
+                await client.when(lambda state: state["moving"])
+                assert (await client.call(cancel))["result"] is True
+                assert (await client.result(number))["status"] == 5
+
+    asyncio.run(act())
+
+
+def test_stop_cancels_a_goal_and_nothing_moves_afterwards(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client, ros(server.url) as other:
+            await client.home()
+            number = await client.goal(FOLLOW, trajectory((6.0, AWAY)))
+            await client.when(lambda state: state["moving"])
+            response = await other.call("/stop")
+            assert response["values"] == {"success": True, "message": "requested"}
+            result = await client.result(number)
+            assert result["status"] == 5
+            assert "STOP" in result["values"]["error_string"]
+            state = await client.when(lambda state: state["stop"] == "confirmed")
+            refused = await client.result(await client.goal(FOLLOW, trajectory((1.0, AWAY))))
+            assert (refused["status"], refused["values"]["error_code"]) == (6, -1)
+            assert "stopped" in refused["values"]["error_string"]
+            await client.say("publish", id="t", topic=TWIST, msg=twist(vx=0.2))
+            assert "stopped" in await client.refusal("t")
+            values = (await other.call("/clear_stop"))["values"]
+            assert values["success"] is False, "the arm was stopped less than a second ago"
+            await client.clear()
+            await asyncio.sleep(0.5)
+            cleared = await client.state()
+            assert cleared["stopped"] is None
+            assert cleared["q"] == pytest.approx((await client.state())["q"])
+            assert cleared["q"] == pytest.approx(state["q"], abs=0.1)
+            assert not cleared["moving"]
+
+    asyncio.run(act())
+
+
+def test_stop_while_a_goal_is_planned_cancels_it(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            home = await client.home()
+            number = await client.goal(FOLLOW, trajectory((2.0, AWAY)))
+            await client.say("call_service", service="/stop", id="stop")
+            assert (await client.result(number))["status"] == 5
+            await client.clear()
+            assert (await client.state())["q"] == pytest.approx(home["q"], abs=0.05)
+
+    asyncio.run(act())
+
+
+def test_other_driver_ends_a_goal(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client, controlling(server.url) as page:
+            await client.home()
+            number = await client.goal(FOLLOW, trajectory((6.0, AWAY)))
+            await client.when(lambda state: state["moving"])
+            await page.say("take")
+            result = await client.result(number)
+            assert result["status"] == 5
+            assert "lease" in result["values"]["error_string"]
+            await page.say("release_lease")
+            await page.wait(holder=None)
+
+    asyncio.run(act())
+
+
+def test_fingers_move_and_report(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            await client.home()
+            client.feedback.clear()
+            number = await client.goal(GRIPPER, {"command": {"position": 0.3, "max_effort": 0.0}})
+            result = await client.result(number)
+            assert result["status"] == 4
+            assert result["values"]["reached_goal"] is True
+            assert result["values"]["stalled"] is False
+            assert result["values"]["position"] == pytest.approx(0.3, abs=0.01)
+            assert any(each["id"] == number for each in client.feedback)
+            number = await client.goal(GRIPPER, {"command": {"position": 0.0}})
+            await client.say("cancel_action_goal", id=number, action=GRIPPER)
+            result = await client.result(number)
+            assert result["status"] == 5
+            assert result["values"]["position"] > 0.1
+
+    asyncio.run(act())
+
+
+def test_twist_moves_the_tool_point_until_the_commands_end(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            before = np.array((await client.home())["T"])
+            await stream(client, TWIST, twist(vz=0.25), 1.0)
+            ended = time.monotonic()
+            after = np.array((await client.when(lambda state: not state["moving"]))["T"])
+            assert time.monotonic() - ended < 2.0
+            moved = after[:3, 3] - before[:3, 3]
+            # 0.25 of 0.4 m/s for a second and the way to rest; pitch and roll are kept.
+            assert 0.05 < moved[2] < 0.25
+            assert np.abs(moved[:2]).max() < 0.15 * moved[2]
+            assert after[:3, :3] == pytest.approx(before[:3, :3], abs=0.01)
+            state = await client.state()
+            assert state["stopped"] is None
+            assert state["status"] == "ok"
+            # In the frame of the tool: forwards is along the tool.
+            before = after
+            await stream(client, TWIST, twist("tcp", vx=-0.2), 0.8)
+            after = np.array((await client.when(lambda state: not state["moving"]))["T"])
+            moved = before[:3, :3].T @ (after[:3, 3] - before[:3, 3])
+            assert -0.12 < moved[0] < -0.02
+            assert np.abs(moved[1:]).max() < 0.01
+
+    asyncio.run(act())
+
+
+def test_twist_turns_the_tool_about_its_two_axes(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            before = await client.home()
+            await stream(client, TWIST, twist("tcp", wx=0.5), 0.8)
+            rolled = await client.when(lambda state: not state["moving"])
+            assert rolled["roll"] - before["roll"] > 0.1
+            assert rolled["pitch"] == pytest.approx(before["pitch"], abs=0.01)
+            # wrist_link pitches and does not roll: its y axis is the axis of pitch.
+            await stream(client, TWIST, twist("wrist_link", wy=-0.5), 0.8)
+            pitched = await client.when(lambda state: not state["moving"])
+            assert pitched["pitch"] - rolled["pitch"] < -0.1
+            assert pitched["roll"] == pytest.approx(rolled["roll"], abs=0.01)
+            await client.say("publish", id="t", topic=TWIST, msg=twist("wrist_link", wz=0.5))
+            why = await client.refusal("t")
+            assert "five axes" in why
+            assert "0.4 rad/s" in why
+            assert "(0.000, 0.000, 1.000)" in why
+
+    asyncio.run(act())
+
+
+def test_joint_jog_moves_a_joint_until_the_commands_end(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url, "?command_in_type=speed_units") as client:
+            before = (await client.home())["q"]
+            jog = {"joint_names": ["axis_1", "axis_5"], "velocities": [0.4, -0.2]}
+            await stream(client, JOINT_JOG, jog, 1.0)
+            ended = time.monotonic()
+            after = (await client.when(lambda state: not state["moving"]))["q"]
+            assert time.monotonic() - ended < 2.0
+            moved = np.array(after) - before
+            assert 0.2 < moved[0] < 0.6
+            assert -0.3 < moved[4] < -0.1
+            assert np.abs(moved[1:4]).max() < 1e-3
+
+    asyncio.run(act())
+
+
+def test_stream_over_a_stop_stays_refused_until_it_pauses(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            await client.home()
+            streaming = asyncio.create_task(stream(client, TWIST, twist(vz=0.2), 5.0))
+            await client.when(lambda state: state["moving"])
+            await client.call("/stop")
+            stopped = await client.when(lambda state: state["stop"] == "confirmed")
+            await client.clear()
+            assert not streaming.done(), "the stop was cleared while the stream went on"
+            await asyncio.sleep(0.5)
+            state = await client.state()
+            assert state["stopped"] is None
+            assert not state["moving"]
+            assert math.dist(state["q"], stopped["q"]) < 0.1
+            await streaming
+            why = "was stopped or the driver changed"
+            assert any(why in each.get("msg", "") for each in client.heard)
+            await asyncio.sleep(0.7)
+            await stream(client, TWIST, twist(vz=-0.2), 0.4)
+            await client.when(lambda state: math.dist(state["q"], stopped["q"]) > 1e-3)
+
+    asyncio.run(act())
+
+
+def test_client_that_leaves_ends_its_goal(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as other:
+            async with ros(server.url) as client:
+                await client.home()
+                await client.goal(FOLLOW, trajectory((8.0, AWAY)))
+                await client.when(lambda state: state["moving"])
+            state = await other.when(lambda state: not state["moving"], 5.0)
+            assert abs(state["q"][0] - AWAY[0]) > 0.1
+            await other.home()
+
+    asyncio.run(act())
+
+
+def test_diagnostics_report_a_stop_at_once(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            await client.home()
+            await client.say("subscribe", topic="/diagnostics")
+            arm, loop, driver = (await client.message("/diagnostics"))["status"]
+            assert (arm["name"], arm["level"], arm["message"]) == ("katana450: arm", 0, "ok")
+            assert {each["key"] for each in loop["values"]} >= {"period [ms]", "ticks lost"}
+            assert driver["message"].endswith("drives")
+            await client.call("/stop")
+            # The next one would be due within a second, which the news of the stop precedes.
+            async with asyncio.timeout(0.5):
+                while arm["level"] != 2:
+                    await asyncio.sleep(0.01)
+                    (arm, *_) = client.newest["/diagnostics"]["status"]
+            assert "STOP" in arm["message"]
+            await client.clear()
+
+    asyncio.run(act())
+
+
+def test_rosapi_lists_what_there_is(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url, watches=False) as client:
+            topics = (await client.call("/rosapi/topics"))["values"]
+            assert dict(zip(topics["topics"], topics["types"], strict=True))["/tf"] == (
+                "tf2_msgs/msg/TFMessage"
+            )
+            services = (await client.call("/rosapi/services"))["values"]["services"]
+            for service in services:
+                answer = await client.call("/rosapi/service_type", {"service": service})
+                kind = answer["values"]["type"]
+                found = (await client.call("/rosapi/services_for_type", type=kind))["values"]
+                assert service in found["services"]
+            servers = (await client.call("/rosapi/action_servers"))["values"]["action_servers"]
+            assert servers == [FOLLOW, GRIPPER]
+            given = await client.call("/rosapi/get_param", name="robot_description")
+            assert json.loads(given["values"]["value"]).startswith("<?xml")
+            now = (await client.call("/rosapi/get_time"))["values"]["time"]
+            assert abs(now["sec"] - time.time()) < 5.0
+            kind = (await client.call("/rosapi/topic_type", topic="/tf"))["values"]["type"]
+            answer = await client.call("/rosapi/topics_for_type", {"type": "tf2_msgs/TFMessage"})
+            assert answer["values"]["topics"] == ["/tf", "/tf_static"]
+            assert kind == "tf2_msgs/msg/TFMessage"
+
+    asyncio.run(act())
+
+
+def test_tolerances_of_a_goal_are_kept(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            home = await client.home()
+            # Half a turn of the first axis in 0.2 s is too fast for the arm.
+            goal = trajectory((0.2, [1.5, *home["q"][1:]]), goal_time_tolerance=stamp(0.1))
+            result = await client.result(await client.goal(FOLLOW, goal))
+            assert (result["status"], result["values"]["error_code"]) == (6, -5)
+            assert "Nothing has moved" in result["values"]["error_string"]
+            assert (await client.state())["q"] == pytest.approx(home["q"])
+
+    asyncio.run(act())
+
+
+def test_contact_refuses_a_goal_before_anything_moves(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            home = await client.home()
+            # Into the table.
+            goal = trajectory((3.0, [0.0, 0.05, 1.2, 0.6, 0.0]))
+            result = await client.result(await client.goal(FOLLOW, goal))
+            assert (result["status"], result["values"]["error_code"]) == (6, -1)
+            assert "table" in result["values"]["error_string"]
+            assert (await client.state())["q"] == pytest.approx(home["q"])
+
+    asyncio.run(act())

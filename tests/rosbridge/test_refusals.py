@@ -1,0 +1,317 @@
+"""Everything that a client may not send is refused in words, and nothing moves."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from typing import Any
+
+from katana450.extensions.rosbridge.ops import MAX_OP_BYTES
+from katana450.extensions.rosbridge.routes import CLIENTS_EACH
+from tests.browser.server import AppServer
+from tests.rosbridge.ros_client import (
+    FOLLOW,
+    GRIPPER,
+    JOINT_JOG,
+    JOINTS,
+    TWIST,
+    RosClient,
+    ros,
+    trajectory,
+    twist,
+)
+
+HOME = [0.0, -1.19, 1.48, 0.14, 0.0]
+
+TEXTS = {
+    "nothing": ("", "not a valid message"),
+    "no JSON": ("{op:", "not a valid message"),
+    "no object": ("[1, 2]", "not a valid message"),
+    "no op": ("{}", "missing required field `op`"),
+    "op of another type": ('{"op": 5}', "not a valid message"),
+    "unknown op": ('{"op": "teleport", "id": "x"}', "no op 'teleport'. It has advertise"),
+    "op of a server": ('{"op": "advertise_service", "service": "/a"}', "no op 'advertise_service'"),
+    "fragment": ('{"op": "fragment", "data": "x"}', "no op 'fragment'"),
+    "topic of another type": ('{"op": "subscribe", "topic": 5}', "$.topic"),
+    "NaN": ('{"op": "subscribe", "topic": "/tf", "throttle_rate": NaN}', "invalid character"),
+    "infinite": ('{"op": "subscribe", "topic": "/tf", "throttle_rate": 1e999}', "out of range"),
+    "negative": ('{"op": "subscribe", "topic": "/tf", "throttle_rate": -1}', ">= 0"),
+    "deep": ("[" * 100_000, "not a valid message"),
+    "too large": (json.dumps({"op": "x" * MAX_OP_BYTES}), "at most 320 KB"),
+}
+
+OPS: dict[str, tuple[dict[str, Any], str]] = {
+    "unknown topic": ({"op": "subscribe", "topic": "/camera"}, "/camera does not exist"),
+    "topic of commands": ({"op": "subscribe", "topic": TWIST}, "only for commands"),
+    "wrong type of a topic": (
+        {"op": "subscribe", "topic": "/tf", "type": "std_msgs/String"},
+        "are tf2_msgs/msg/TFMessage, not std_msgs/String",
+    ),
+    "compression": ({"op": "subscribe", "topic": "/tf", "compression": "cbor"}, "'cbor'"),
+    "fragments": ({"op": "subscribe", "topic": "/tf", "fragment_size": 100}, "fragment_size"),
+    "no subscription": ({"op": "unsubscribe", "topic": "/tf"}, "no subscription"),
+    "level": ({"op": "set_level", "level": "loud"}, "no level 'loud'"),
+    "advertised by the server": (
+        {"op": "advertise", "topic": "/joint_states", "type": "sensor_msgs/JointState"},
+        "published by the server",
+    ),
+    "advertised unknown": ({"op": "advertise", "topic": "/a", "type": "a/b"}, "/a is unknown"),
+    "advertised with a wrong type": (
+        {"op": "advertise", "topic": TWIST, "type": "geometry_msgs/Twist"},
+        "are geometry_msgs/msg/TwistStamped, not geometry_msgs/Twist",
+    ),
+    "unadvertised unknown": ({"op": "unadvertise", "topic": "/a"}, "/a is unknown"),
+    "published unknown": ({"op": "publish", "topic": "/cmd_vel", "msg": {}}, "is unknown"),
+    "unknown service": ({"op": "call_service", "service": "/dance"}, "no service /dance"),
+    "arguments of a trigger": (
+        {"op": "call_service", "service": "/hold", "args": {"hard": True}},
+        "unknown field `hard`",
+    ),
+    "arguments of rosapi": (
+        {"op": "call_service", "service": "/rosapi/topic_type", "args": {"topic": 5}},
+        "Expected `str`",
+    ),
+    "unknown parameter": (
+        {"op": "call_service", "service": "/rosapi/get_param", "args": {"name": "/speed"}},
+        "no parameter '/speed'",
+    ),
+    "unknown action": ({"op": "send_action_goal", "action": "/fly"}, "no action /fly"),
+    "wrong type of an action": (
+        {"op": "send_action_goal", "action": FOLLOW, "action_type": "a/b"},
+        "FollowJointTrajectory, not a/b",
+    ),
+    "goal of another type": (
+        {"op": "send_action_goal", "action": FOLLOW, "args": {"order": 5}},
+        "unknown field `order`",
+    ),
+    "goal of the fingers": (
+        {"op": "send_action_goal", "action": GRIPPER, "args": {"command": {"position": "open"}}},
+        "Expected `float`",
+    ),
+    "no goal": ({"op": "cancel_action_goal", "action": FOLLOW}, "There is no goal"),
+    "Twist without a header": (
+        {"op": "publish", "topic": TWIST, "msg": {"linear": {"x": 0.1}}},
+        "unknown field `linear`",
+    ),
+    "no number": (
+        {"op": "publish", "topic": TWIST, "msg": {"twist": {"linear": {"x": "fast"}}}},
+        "Expected `float`",
+    ),
+    "too fast": ({"op": "publish", "topic": TWIST, "msg": twist(vx=1.5)}, "from -1 to 1"),
+    "turning too fast": ({"op": "publish", "topic": TWIST, "msg": twist(wx=-2)}, "`angular.x`"),
+    "no axis": ({"op": "publish", "topic": TWIST, "msg": twist("tcp", wz=0.3)}, "five axes"),
+    "no frame": ({"op": "publish", "topic": TWIST, "msg": twist("map", vx=0.1)}, "no frame 'map'"),
+    "old": (
+        {
+            "op": "publish",
+            "topic": TWIST,
+            "msg": {**twist(vx=0.1), "header": {"stamp": {"sec": 1_600_000_000}}},
+        },
+        "leave its stamp zero",
+    ),
+    "unknown joint": (
+        {"op": "publish", "topic": JOINT_JOG, "msg": {"joint_names": ["a"], "velocities": [0.1]}},
+        "There is no joint 'a'. The joints are axis_1",
+    ),
+    "repeated joint": (
+        {
+            "op": "publish",
+            "topic": JOINT_JOG,
+            "msg": {"joint_names": ["axis_1"] * 2, "velocities": [0.1, 0.1]},
+        },
+        "named twice",
+    ),
+    "no velocity": (
+        {"op": "publish", "topic": JOINT_JOG, "msg": {"joint_names": ["axis_1"]}},
+        "1 names of joints and 0 velocities",
+    ),
+    "displacement": (
+        {
+            "op": "publish",
+            "topic": JOINT_JOG,
+            "msg": {"joint_names": ["axis_1"], "velocities": [0.1], "displacements": [0.1]},
+        },
+        "not supported",
+    ),
+    "joint too fast": (
+        {
+            "op": "publish",
+            "topic": JOINT_JOG,
+            "msg": {"joint_names": ["axis_1"], "velocities": [3.0]},
+        },
+        "The velocity of axis_1 is 3",
+    ),
+}
+
+GOALS: dict[str, tuple[dict[str, Any], int, str]] = {
+    "no points": (trajectory(), -1, "0 points"),
+    "too many points": (trajectory(*[(0.01 * k, HOME) for k in range(1, 802)]), -1, "801 points"),
+    "other joints": (
+        {"trajectory": {"joint_names": JOINTS[:4], "points": []}},
+        -2,
+        "must be axis_1, axis_2",
+    ),
+    "missing position": (trajectory((1.0, HOME[:4])), -1, "has 4 positions; it must have 5"),
+    "not later": (trajectory((1.0, HOME), (1.0, HOME)), -1, "Point 2 has the time 1 s"),
+    "beyond a limit": (trajectory((3.0, [9.0, *HOME[1:]])), -1, "axis 1 would be"),
+    "somewhere else at once": (
+        trajectory((0.0, [1.0, *HOME[1:]])),
+        -1,
+        "from where the arm stands",
+    ),
+    "unknown tolerance": (
+        trajectory((1.0, HOME), goal_tolerance=[{"name": "a", "position": 0.1}]),
+        -2,
+        "unknown joint 'a'",
+    ),
+    "tolerance of a rate": (
+        trajectory((1.0, HOME), path_tolerance=[{"name": "axis_1", "velocity": 0.1}]),
+        -1,
+        "only tolerances of `position`",
+    ),
+    "too long": (trajectory((4000.0, HOME)), -1, "at most 3600 s"),
+}
+
+
+async def moved(client: RosClient, before: dict[str, Any]) -> float:
+    """Return how far a joint or finger has moved since the state ``before``."""
+    now = await client.state()
+    q = zip((*now["q"], now["gripper"]), (*before["q"], before["gripper"]), strict=True)
+    return float(max(abs(a - b) for a, b in q))
+
+
+def test_text_that_is_no_operation_is_refused_in_words(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            before = await client.state()
+            for name, (text, why) in TEXTS.items():
+                await client.socket.send(text)
+                assert why in await client.refusal(), name
+            await client.socket.send(b"\x00\x01")
+            assert "not a valid message" in await client.refusal()
+            # The connection still serves, and an id is repeated.
+            await client.say("teleport", id="x")
+            assert "teleport" in await client.refusal("x")
+            assert await moved(client, before) == 0.0
+
+    asyncio.run(act())
+
+
+def test_operation_that_is_not_possible_is_refused_in_words(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            before = await client.state()
+            for number, (name, (op, why)) in enumerate(OPS.items()):
+                await client.say(**op, id=f"op {number}")
+                assert why in await client.refusal(f"op {number}"), name
+                if op["op"] in ("call_service", "send_action_goal"):
+                    ended = await client.answer_to(f"op {number}")
+                    assert ended["result"] is False, name
+                    assert why in ended["values"], name
+            assert await moved(client, before) == 0.0
+
+    asyncio.run(act())
+
+
+def test_goal_that_is_not_possible_is_aborted_with_its_code(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            before = await client.state()
+            for name, (goal, code, why) in GOALS.items():
+                result = await client.result(await client.goal(FOLLOW, goal))
+                assert (result["status"], result["values"]["error_code"]) == (6, code), name
+                assert why in result["values"]["error_string"], name
+            old = trajectory((1.0, HOME))
+            old["trajectory"]["header"] = {"stamp": {"sec": int(time.time()) - 60}}
+            result = await client.result(await client.goal(FOLLOW, old))
+            assert result["values"]["error_code"] == -3
+            for command, why in (
+                ({"position": 9.0}, "is not between"),
+                ({"position": 0.1, "max_effort": 5.0}, "max_effort"),
+            ):
+                result = await client.result(await client.goal(GRIPPER, {"command": command}))
+                assert (result["status"], result["result"]) == (6, False)
+                assert why in result["values"]
+            await client.say("send_action_goal", action=GRIPPER, args={})
+            assert "needs an `id`" in await client.refusal()
+            assert await moved(client, before) == 0.0
+
+    asyncio.run(act())
+
+
+def test_second_trajectory_is_refused(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as client:
+            first = await client.goal(FOLLOW, trajectory((5.0, [0.4, *HOME[1:]])))
+            second = await client.goal(FOLLOW, trajectory((5.0, HOME)))
+            refused = await client.result(second)
+            assert refused["result"] is False
+            assert "Another trajectory" in refused["values"]
+            await client.say("cancel_action_goal", id=first, action=FOLLOW)
+            assert (await client.result(first))["status"] == 5
+
+    asyncio.run(act())
+
+
+def test_unneeded_levels_are_not_sent(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url, watches=False) as client:
+            await client.say("set_level", level="none")
+            await client.say("teleport")
+            await client.call("/rosapi/nodes")
+            assert not [each for each in client.heard if each["op"] == "status"]
+
+    asyncio.run(act())
+
+
+def test_client_of_many_invalid_messages_is_disconnected_with_the_reason(
+    server: AppServer,
+) -> None:
+    async def act() -> None:
+        async with ros(server.url, watches=False) as client:
+            for _ in range(40):
+                await client.say("teleport")
+            await client.until(lambda each: "Too many invalid" in each.get("msg", ""))
+            await client.socket.wait_closed()
+            assert client.socket.close_code == 1008
+
+    asyncio.run(act())
+
+
+def test_message_beyond_all_limits_closes_the_connection_alone(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url) as other:
+            async with ros(server.url, watches=False) as client:
+                await client.socket.send("x" * 600_000)
+                await client.socket.wait_closed()
+                assert client.socket.close_code == 1009
+            await other.state()
+
+    asyncio.run(act())
+
+
+def test_connections_beyond_the_limit_are_refused_in_words(server: AppServer) -> None:
+    async def act() -> None:
+        async with asyncio.timeout(60.0):
+            kept = [ros(server.url, watches=False) for _ in range(CLIENTS_EACH)]
+            clients = [await each.__aenter__() for each in kept]
+            try:
+                await clients[-1].call("/rosapi/nodes")
+                async with ros(server.url, watches=False) as client:
+                    assert "At most" in await client.refusal()
+                    await client.socket.wait_closed()
+                    assert client.socket.close_code == 4429
+            finally:
+                for each in kept:
+                    await each.__aexit__(None, None, None)
+
+    asyncio.run(act())
+
+
+def test_unknown_units_are_refused_in_words(server: AppServer) -> None:
+    async def act() -> None:
+        async with ros(server.url, "?command_in_type=knots", watches=False) as client:
+            assert "unitless or speed_units" in await client.refusal()
+
+    asyncio.run(act())
