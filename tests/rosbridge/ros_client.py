@@ -176,3 +176,9 @@ async def ros(
             yield client
         finally:
             await client.close()
+
+
+async def cleared(url: str) -> None:
+    """Clear the stop of the arm at ``url``."""
+    async with ros(url) as client:
+        await client.clear()

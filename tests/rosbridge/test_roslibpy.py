@@ -1,0 +1,50 @@
+"""roslibpy sees the arm, jogs it, follows a trajectory, cancels and stops."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.browser.server import AppServer
+from tests.exchange.tools import ROSLIBPY, needs_package
+from tests.rosbridge.ros_client import cleared
+
+CLIENT = Path(__file__).with_name("roslibpy_client.py")
+
+
+@pytest.mark.long
+@needs_package(ROSLIBPY)
+@pytest.mark.parametrize("transport", ["twisted", "asyncio"])
+def test_roslibpy_drives_the_arm(server: AppServer, transport: str) -> None:
+    folder = str(ROSLIBPY.folder)
+    done = subprocess.run(
+        [sys.executable, CLIENT, server.url.replace("http", "ws") + "/rosbridge?name=roslibpy"],
+        env=os.environ | {"PYTHONPATH": folder, "ROSLIBPY_TRANSPORT": transport},
+        capture_output=True,
+        text=True,
+        timeout=90.0,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    seen = json.loads(done.stdout.strip().splitlines()[-1])
+    assert {"/joint_states", "/tf", "/robot_description"} <= set(seen["topics"])
+    assert seen["description"].startswith("<?xml")
+    status, code, q = seen["followed"]
+    assert (status, code) == (4, 0)
+    assert q == pytest.approx([0.4, -1.1, 1.4, 0.2, 0.3], abs=1e-3)
+    assert seen["feedback"] >= 10
+    status, pan = seen["cancelled"]
+    assert status == 5
+    assert 0.0 < pan < 0.4
+    assert seen["jogged"] > 0.01
+    assert seen["stop"] == {"success": True, "message": "requested"}
+    status, why = seen["stopped"]
+    assert status == 5
+    assert "roslibpy pressed STOP" in why
+    asyncio.run(cleared(server.url))

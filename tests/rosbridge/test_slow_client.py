@@ -1,0 +1,90 @@
+"""A client that reads nothing costs little memory, and no tick and no STOP comes late for it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import time
+from pathlib import Path
+from typing import Any
+
+from tests.browser.server import SIMULATION_APP, AppServer
+from tests.gateway.client import ask
+from tests.rosbridge.ros_client import FOLLOW, ros, trajectory
+
+SECONDS = 6.0
+"""[s] Time in which 1.5 MB would be sent to a client that reads."""
+
+MAX_KB = 1000
+"""[kB] Memory that one client may cost."""
+
+TOPICS = ("/joint_states", "/tf", "/katana450/state", "/robot_description", "/diagnostics")
+
+
+def memory(process: int) -> int:
+    """Return the private memory of ``process`` [kB]."""
+    rows = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii").splitlines()
+    values = {row.split(":")[0]: int(row.split()[1]) for row in rows[1:]}
+    return values["Private_Dirty"] + values["Private_Clean"]
+
+
+async def subscribe_and_read_nothing(url: str) -> socket.socket:
+    """Open a websocket by hand, subscribe to all topics, and return the socket."""
+    host, port = url.removeprefix("http://").split(":")
+    line = socket.create_connection((host, int(port)))
+    line.sendall(
+        f"GET /rosbridge HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+        "Sec-WebSocket-Version: 13\r\n\r\n".encode()
+    )
+    for topic in TOPICS:
+        text = json.dumps({"op": "subscribe", "topic": topic, "id": topic}).encode()
+        head = bytes([0x81, 0x80 | len(text)])
+        assert len(text) < 126
+        # A mask of zeros leaves the text as it is.
+        line.sendall(head + bytes(4) + text)
+    await asyncio.sleep(0.2)
+    return line
+
+
+def test_client_that_reads_nothing_costs_little() -> None:
+    def loop(url: str) -> dict[str, Any]:
+        return dict(json.loads(ask(f"{url}/api/v1/loop")[2]))
+
+    async def act() -> None:
+        with AppServer(SIMULATION_APP) as server:
+            async with ros(server.url) as client:
+                # What the first client of each kind costs for good is not counted.
+                for topic in TOPICS:
+                    await client.say("subscribe", topic=topic)
+                    await client.message(topic)
+                await client.home()
+                away = [0.5, -1.1, 1.4, 0.2, 0.3]
+                for goal in (away, [0.0, -1.19, 1.48, 0.14, 0.0]):
+                    await client.result(await client.goal(FOLLOW, trajectory((1.0, goal))))
+                before = memory(server.front)
+                # Only the end of each message is written after the buffers of the kernel are full.
+                lines = [await subscribe_and_read_nothing(server.url) for _ in range(4)]
+                number = await client.goal(FOLLOW, trajectory((SECONDS, away)))
+                await client.when(lambda state: state["moving"])
+                lost, began = loop(server.url)["lost"], time.monotonic()
+                longest = 0.0
+                while time.monotonic() - began < SECONDS / 2:
+                    asked = time.monotonic()
+                    await client.call("/rosapi/nodes")
+                    longest = max(longest, time.monotonic() - asked)
+                    await asyncio.sleep(0.05)
+                assert longest < 0.5
+                assert loop(server.url)["lost"] - lost <= 2
+                assert (await client.result(number))["status"] == 4
+                cost = (memory(server.front) - before) / len(lines)
+                print(f"{cost:.0f} kB for each client; longest answer {1e3 * longest:.0f} ms")
+                assert cost < MAX_KB
+                asked = time.monotonic()
+                await client.call("/stop")
+                assert time.monotonic() - asked < 0.5
+                for line in lines:
+                    line.close()
+
+    asyncio.run(act())
