@@ -139,7 +139,7 @@ class RosChannel(Channel):
         driver = "" if self.participant is None else driver_key(self.hub, self.participant)
         try:
             with self.budget.charged(driver):
-                message = self._publications.message(topic)
+                message = self._publications.message(names.resolved(topic))
         except BusyError as error:
             self._subscriptions.delay(error.retry)
             return None, error.retry
@@ -164,7 +164,7 @@ class RosChannel(Channel):
         """Execute the operation ``request``. Raises KatanaError if it is refused."""
         op: ops.AnyOp = request
         self.hub.heartbeat(participant)
-        if isinstance(op, ops.CallService) and op.service == names.STOP_SERVICE:
+        if isinstance(op, ops.CallService) and op.traits.safety:
             self._trigger(op, requests.Stop())
             return
         with self.budget.charged(driver_key(self.hub, participant), question=False):
@@ -198,6 +198,7 @@ class RosChannel(Channel):
 
     def _check_commanded(self, topic: str, kind: str = "") -> None:
         """Raise InputError unless clients can publish to ``topic``, with messages of ``kind``."""
+        topic = names.resolved(topic)
         known = names.COMMANDED.get(topic)
         if known is None:
             of = "published by the server" if topic in names.PUBLISHED else "unknown"
@@ -210,7 +211,7 @@ class RosChannel(Channel):
     def _publish(self, op: ops.Publish) -> None:
         self._check_commanded(op.topic)
         try:
-            if op.topic == names.TWIST:
+            if names.resolved(op.topic) == names.TWIST:
                 self._servo.twist(ops.read(op.msg, TwistStamped, names.TOPICS[names.TWIST]))
             else:
                 self._servo.jog(ops.read(op.msg, JointJog, names.TOPICS[names.JOINT_JOG]))
@@ -227,7 +228,7 @@ class RosChannel(Channel):
             self._acting.set()
 
     def _call(self, op: ops.CallService) -> None:
-        service = op.service
+        service = names.resolved(op.service)
         if service not in names.SERVICES:
             known = ", ".join(each for each in names.SERVICES if names.CANCEL not in each)
             why = f"There is no service {service}. The services are {known}."
@@ -242,7 +243,7 @@ class RosChannel(Channel):
             self._respond(op, values)
         elif service.endswith(names.CANCEL):
             for goal in self._goals:
-                if goal.action == service.removesuffix(names.CANCEL):
+                if names.resolved(goal.action) == service.removesuffix(names.CANCEL):
                     goal.cancel("The client cancelled it.")
             self._respond(op, {"return_code": 0, "goals_canceling": []})
         elif service == names.HOLD_SERVICE:
@@ -295,7 +296,8 @@ class RosChannel(Channel):
     # Actions
 
     def _send_goal(self, participant: Participant, op: ops.SendActionGoal) -> None:
-        known = names.ACTIONS.get(op.action)
+        action = names.resolved(op.action)
+        known = names.ACTIONS.get(action)
         try:
             if op.id is None:
                 raise InputError("A goal needs an `id`, by which it can be cancelled.")
@@ -307,7 +309,7 @@ class RosChannel(Channel):
                 raise InputError(f"The action {op.action} is {known}, not {op.action_type}.")
             self._check_goals(op)
             host = GoalHost(self.hub, participant, self._ask, self.notify, self._show_newest)
-            follows = op.action == names.FOLLOW
+            follows = action == names.FOLLOW
             goal = FollowGoal(host, op) if follows else GripperGoal(host, op)
         except InputError as error:
             refused = {"op": "action_result", "action": op.action, "id": op.id, "result": False}
@@ -325,7 +327,7 @@ class RosChannel(Channel):
         if len(self._goals) >= MAX_GOALS:
             raise InputError(f"A client can have {MAX_GOALS} goals at a time. Wait for a result.")
         for goal in self._goals:
-            if goal.action == op.action == names.FOLLOW:
+            if names.resolved(goal.action) == names.resolved(op.action) == names.FOLLOW:
                 raise InputError("Another trajectory is being followed. Cancel it first, or wait.")
 
     def _cancel_goal(self, op: ops.CancelActionGoal) -> None:

@@ -73,6 +73,11 @@ SERVICES: Final = {
 """Services that clients can call."""
 
 
+def resolved(name: str) -> str:
+    """Return ``name`` in the root, where relative names of a client without a namespace are."""
+    return name if name.startswith("/") else f"/{name}"
+
+
 def is_type(given: str, known: str) -> bool:
     """Return whether ``given`` names the type ``known``; the middle part is left out in ROS 1."""
     package, _, name = known.split("/")

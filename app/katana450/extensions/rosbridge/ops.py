@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from katana450.errors import InputError
-from katana450.extensions.rosbridge.names import STOP_SERVICE
+from katana450.extensions.rosbridge.names import STOP_SERVICE, resolved
 from katana450.server.api.fields import COMMAND, RequestTraits, tag_of
 
 MAX_OP_BYTES = 327_680
@@ -98,7 +98,7 @@ class CallService(Op, frozen=True, kw_only=True):
     @property
     def traits(self) -> RequestTraits:
         """The traits of the service: STOP is exempt from the rate limit."""
-        return self.STOP if self.service == STOP_SERVICE else COMMAND
+        return self.STOP if resolved(self.service) == STOP_SERVICE else COMMAND
 
 
 class SendActionGoal(Op, frozen=True, kw_only=True):

@@ -21,7 +21,10 @@ URGENT = (names.STATE, names.DIAGNOSTICS)
 
 
 class Subscriptions:
-    """The subscriptions of one client. A topic is sent at the rate of the fastest one."""
+    """The subscriptions of one client. A topic is sent at the rate of the fastest one.
+
+    Its name is repeated as the client gave it, with or without the first slash.
+    """
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """Begin without subscriptions. ``clock`` is in seconds."""
@@ -31,9 +34,10 @@ class Subscriptions:
 
     def add(self, op: Subscribe) -> None:
         """Subscribe; a topic without an interval is sent again. Raises InputError."""
-        known = names.PUBLISHED.get(op.topic)
+        name = names.resolved(op.topic)
+        known = names.PUBLISHED.get(name)
         if known is None:
-            of = "is only for commands" if op.topic in names.COMMANDED else "does not exist"
+            of = "is only for commands" if name in names.COMMANDED else "does not exist"
             raise InputError(
                 f"The topic {op.topic} {of}. The topics are {', '.join(names.PUBLISHED)}."
             )
@@ -46,7 +50,7 @@ class Subscriptions:
         intervals = self._intervals.setdefault(op.topic, {})
         if op.id not in intervals and len(intervals) >= MAX_SUBSCRIPTIONS:
             raise InputError(f"A client can subscribe {MAX_SUBSCRIPTIONS} times to a topic.")
-        intervals[op.id] = max(PERIODS.get(op.topic, 0.0), 1e-3 * op.throttle_rate)
+        intervals[op.id] = max(PERIODS.get(name, 0.0), 1e-3 * op.throttle_rate)
         self._due[op.topic] = self._clock()
 
     def remove(self, topic: str, op_id: OpId) -> None:
@@ -62,8 +66,8 @@ class Subscriptions:
 
     def hurry(self) -> None:
         """Make the topics that report a stop due."""
-        for topic in URGENT:
-            if topic in self._due:
+        for topic in self._due:
+            if names.resolved(topic) in URGENT:
                 self._due[topic] = self._clock()
 
     def next_due(self) -> tuple[str | None, float | None]:
@@ -78,7 +82,7 @@ class Subscriptions:
 
     def sent(self, topic: str) -> None:
         """Note that a message of ``topic`` is being sent now."""
-        if topic not in PERIODS:
+        if names.resolved(topic) not in PERIODS:
             del self._due[topic]
             return
         t, interval = self._clock(), min(self._intervals[topic].values())
