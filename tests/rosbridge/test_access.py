@@ -53,6 +53,7 @@ def test_link_is_required_and_its_role_decides(tmp_path: Path) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_client_is_refused_while_another_drives() -> None:
     async def act() -> None:
         with AppServer(APP) as server:
@@ -72,6 +73,7 @@ def test_client_is_refused_while_another_drives() -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_pages_of_named_sites_alone_may_connect() -> None:
     async def act() -> None:
         with AppServer((*APP, "--ros-page", ELSEWHERE)) as server:

@@ -77,6 +77,7 @@ def test_topics_describe_the_arm_as_it_is(server: AppServer, robot: Robot) -> No
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_topic_is_sent_at_its_rate_or_more_seldom(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url, watches=False) as client:
@@ -128,6 +129,7 @@ def test_trajectory_is_followed_with_feedback(server: AppServer) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_cancel_brings_the_arm_to_rest(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -183,6 +185,7 @@ def test_stop_cancels_a_goal_and_nothing_moves_afterwards(server: AppServer) -> 
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_stop_while_a_goal_is_planned_cancels_it(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -196,6 +199,7 @@ def test_stop_while_a_goal_is_planned_cancels_it(server: AppServer) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_other_driver_ends_a_goal(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client, controlling(server.url) as page:
@@ -212,6 +216,7 @@ def test_other_driver_ends_a_goal(server: AppServer) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_fingers_move_and_report(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -233,6 +238,7 @@ def test_fingers_move_and_report(server: AppServer) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_twist_moves_the_tool_point_until_the_commands_end(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -260,6 +266,7 @@ def test_twist_moves_the_tool_point_until_the_commands_end(server: AppServer) ->
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_twist_turns_the_tool_about_its_two_axes(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -282,6 +289,7 @@ def test_twist_turns_the_tool_about_its_two_axes(server: AppServer) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_joint_jog_moves_a_joint_until_the_commands_end(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url, "?command_in_type=speed_units") as client:
@@ -299,6 +307,7 @@ def test_joint_jog_moves_a_joint_until_the_commands_end(server: AppServer) -> No
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_stream_over_a_stop_stays_refused_until_it_pauses(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -324,6 +333,7 @@ def test_stream_over_a_stop_stays_refused_until_it_pauses(server: AppServer) -> 
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_client_that_leaves_ends_its_goal(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as other:
@@ -338,6 +348,7 @@ def test_client_that_leaves_ends_its_goal(server: AppServer) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_diagnostics_report_a_stop_at_once(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -386,6 +397,7 @@ def test_rosapi_lists_what_there_is(server: AppServer) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_tolerances_of_a_goal_are_kept(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:

@@ -9,6 +9,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.browser.server import SIMULATION_APP, AppServer
 from tests.gateway.client import ask
 from tests.rosbridge.ros_client import FOLLOW, ros, trajectory
@@ -48,6 +50,7 @@ async def subscribe_and_read_nothing(url: str) -> socket.socket:
     return line
 
 
+@pytest.mark.long
 def test_client_that_reads_nothing_costs_little() -> None:
     def loop(url: str) -> dict[str, Any]:
         return dict(json.loads(ask(f"{url}/api/v1/loop")[2]))

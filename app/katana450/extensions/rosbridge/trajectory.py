@@ -23,7 +23,7 @@ from katana450.extensions.rosbridge.messages import (
 )
 from katana450.maths.geometry.arrays import FloatArray
 
-MAX_POINTS = 800
+MAX_POINTS = 700
 """Maximum number of points, of which a script of 64 KB has room."""
 
 MAX_SECONDS = 3600.0
