@@ -33,6 +33,7 @@ CHECKED = {"c", "console", "csv", "json", "python", "sh", "toml", "yaml"}
 # Other languages, and why nothing runs them.
 NOT_CHECKED = {
     "text": "a diagram, or a summary of options, which is compared with the help",
+    "js": "tests/browser/test_roslib.py runs a page with the same calls",
     "caddy": "the configuration of another program, which is not installed here",
     "nginx": "the configuration of another program, which is not installed here",
     "ini": "the configuration of another program, which is not installed here",

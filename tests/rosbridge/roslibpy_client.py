@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import roslibpy  # type: ignore[import-not-found]
+import roslibpy
 
 JOINTS = ["axis_1", "axis_2", "axis_3", "axis_4", "axis_5"]
 READY = [0.0, -1.19, 1.48, 0.14, 0.0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -24,6 +25,21 @@ def _add_options(parser: ArgumentParser) -> None:
         help="let pages of this site, such as http://localhost:3000, connect to /rosbridge; may be "
         "repeated",
     )
+    parser.add_argument(
+        "--foxglove",
+        type=_foxglove_port,
+        metavar="PORT",
+        help="let Foxglove watch and stop the arm by this port, of this machine alone, without an "
+        "access link; needs the extra `foxglove`",
+    )
+
+
+def _foxglove_port(text: str) -> int:
+    if find_spec("foxglove") is None:
+        raise ArgumentTypeError("Foxglove needs `pip install 'katana450[foxglove]'`")
+    if not text.isdecimal() or not 0 < int(text) < 65536:
+        raise ArgumentTypeError(f"{text!r} is not a port")
+    return int(text)
 
 
 def _origin(text: str) -> str:
@@ -38,6 +54,10 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
 
     assert context.options is not None
     context.authenticator.address.guests.update(context.options.ros_page)
+    if context.options.foxglove is not None:
+        from katana450.extensions.rosbridge.foxglove_server import start
+
+        start(context.hub, context.options.foxglove)
     return RosRoutes(context, context.options.urdf).routes()
 
 
