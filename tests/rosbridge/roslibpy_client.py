@@ -1,4 +1,4 @@
-"""What a program with roslibpy does: see, jog, follow a trajectory, cancel, stop.
+"""A program with roslibpy: it sees, jogs, follows a trajectory, cancels and stops.
 
 Run by ``test_roslibpy.py`` in a process of its own: ``python roslibpy_client.py URL``.
 """

@@ -317,7 +317,7 @@ def test_stream_over_a_stop_stays_refused_until_it_pauses(server: AppServer) -> 
             await client.call("/stop")
             stopped = await client.when(lambda state: state["stop"] == "confirmed")
             await client.clear()
-            assert not streaming.done(), "the stop was cleared while the stream went on"
+            assert not streaming.done(), "the stop was cleared during the stream"
             await asyncio.sleep(0.5)
             state = await client.state()
             assert state["stopped"] is None

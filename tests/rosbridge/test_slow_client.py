@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import struct
 import time
 from pathlib import Path
 from typing import Any
@@ -31,8 +32,15 @@ def memory(process: int) -> int:
     return values["Private_Dirty"] + values["Private_Clean"]
 
 
-async def subscribe_and_read_nothing(url: str) -> socket.socket:
-    """Open a websocket by hand, subscribe to all topics, and return the socket."""
+def frame(**op: Any) -> bytes:
+    """Return an operation as a frame of a websocket; a mask of zeros leaves the text as it is."""
+    text = json.dumps(op).encode()
+    length = bytes([0x80 | 126]) + struct.pack(">H", len(text))
+    return b"\x81" + (bytes([0x80 | len(text)]) if len(text) < 126 else length) + bytes(4) + text
+
+
+def deaf_client(url: str, *ops: dict[str, Any]) -> socket.socket:
+    """Open a websocket by hand, send ``ops``, and return the socket, from which nobody reads."""
     host, port = url.removeprefix("http://").split(":")
     line = socket.create_connection((host, int(port)))
     line.sendall(
@@ -40,13 +48,8 @@ async def subscribe_and_read_nothing(url: str) -> socket.socket:
         "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
         "Sec-WebSocket-Version: 13\r\n\r\n".encode()
     )
-    for topic in TOPICS:
-        text = json.dumps({"op": "subscribe", "topic": topic, "id": topic}).encode()
-        head = bytes([0x81, 0x80 | len(text)])
-        assert len(text) < 126
-        # A mask of zeros leaves the text as it is.
-        line.sendall(head + bytes(4) + text)
-    await asyncio.sleep(0.2)
+    for op in ops:
+        line.sendall(frame(**op))
     return line
 
 
@@ -68,7 +71,9 @@ def test_client_that_reads_nothing_costs_little() -> None:
                     await client.result(await client.goal(FOLLOW, trajectory((1.0, goal))))
                 before = memory(server.front)
                 # Only the end of each message is written after the buffers of the kernel are full.
-                lines = [await subscribe_and_read_nothing(server.url) for _ in range(4)]
+                subscriptions = [{"op": "subscribe", "topic": topic} for topic in TOPICS]
+                lines = [deaf_client(server.url, *subscriptions) for _ in range(4)]
+                await asyncio.sleep(0.5)
                 number = await client.goal(FOLLOW, trajectory((SECONDS, away)))
                 await client.when(lambda state: state["moving"])
                 lost, began = loop(server.url)["lost"], time.monotonic()
@@ -89,5 +94,24 @@ def test_client_that_reads_nothing_costs_little() -> None:
                 assert time.monotonic() - asked < 0.5
                 for line in lines:
                     line.close()
+
+    asyncio.run(act())
+
+
+def test_goal_of_a_client_that_answers_no_ping_ends() -> None:
+    async def act() -> None:
+        with AppServer(SIMULATION_APP) as server:
+            async with ros(server.url) as client:
+                goal = trajectory((8.0, [0.8, -1.1, 1.4, 0.2, 0.3]))
+                op = {"op": "send_action_goal", "id": "g", "action": FOLLOW, "args": goal}
+                line = deaf_client(server.url, op)
+                await client.when(lambda state: state["moving"])
+                began = time.monotonic()
+                state = await client.when(lambda state: not state["moving"])
+                assert time.monotonic() - began < 4.0
+                assert state["program"]["status"] == "stopped"
+                assert "no heartbeats" in state["program"]["why"]
+                assert state["q"][0] < 0.7
+                line.close()
 
     asyncio.run(act())

@@ -6,7 +6,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Coroutine
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from typing import Any, NamedTuple
 
 import msgspec
@@ -167,7 +167,8 @@ class RosChannel(Channel):
         if isinstance(op, ops.CallService) and op.traits.safety:
             self._trigger(op, requests.Stop())
             return
-        with self.budget.charged(driver_key(self.hub, participant), question=False):
+        charged = self.budget.charged(driver_key(self.hub, participant), question=False)
+        with nullcontext() if op.traits.free else charged:
             self._execute(participant, op)
         self.wake()
 

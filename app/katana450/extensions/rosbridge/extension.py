@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from katana450.errors import ConfigurationError
 from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
+    from katana450.extension import ServerFacts
     from katana450.server.web.http_api import RouteContext
 
 
@@ -35,8 +37,6 @@ def _add_options(parser: ArgumentParser) -> None:
 
 
 def _foxglove_port(text: str) -> int:
-    if find_spec("foxglove") is None:
-        raise ArgumentTypeError("Foxglove needs `pip install 'katana450[foxglove]'`")
     if not text.isdecimal() or not 0 < int(text) < 65536:
         raise ArgumentTypeError(f"{text!r} is not a port")
     return int(text)
@@ -47,6 +47,14 @@ def _origin(text: str) -> str:
     if parts.scheme not in ("http", "https") or not parts.netloc or parts.path.strip("/"):
         raise ArgumentTypeError(f"{text!r} is not an origin such as http://localhost:3000")
     return f"{parts.scheme}://{parts.netloc.lower()}"
+
+
+def _check_installed(options: Namespace, _facts: ServerFacts) -> None:
+    """Raise ConfigurationError, before the server starts, if the extra is missing."""
+    if options.foxglove is not None and find_spec("foxglove") is None:
+        raise ConfigurationError(
+            "--foxglove needs a library: pip install 'katana450[foxglove]', or leave it out."
+        )
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
@@ -63,5 +71,7 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
 
 EXTENSION = Extension(
     "rosbridge",
-    serve=ServeExtension(_add_options, routes=_routes, needs=("programs", "export")),
+    serve=ServeExtension(
+        _add_options, routes=_routes, process=_check_installed, needs=("programs", "export")
+    ),
 )

@@ -5,13 +5,19 @@ Source: ROSBRIDGE_PROTOCOL.md of rosbridge_suite.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
 import msgspec
 from msgspec import Meta
 
 from katana450.errors import InputError
-from katana450.extensions.rosbridge.names import STOP_SERVICE, resolved
+from katana450.extensions.rosbridge.names import (
+    CANCEL,
+    CLEAR_SERVICE,
+    HOLD_SERVICE,
+    STOP_SERVICE,
+    resolved,
+)
 from katana450.server.api.fields import COMMAND, RequestTraits, tag_of
 
 MAX_OP_BYTES = 327_680
@@ -29,6 +35,8 @@ Type = Annotated[str, Meta(max_length=200)]
 
 T = TypeVar("T", bound=msgspec.Struct)
 
+FREE, STOP = RequestTraits(free=True), RequestTraits(free=True, safety=True)
+
 NOTHING = msgspec.Raw(b"{}")
 
 
@@ -43,7 +51,7 @@ class Op(msgspec.Struct, frozen=True, kw_only=True, tag_field="op", tag=tag_of):
 
     @property
     def traits(self) -> RequestTraits:
-        """The traits of the operation; the rate limit uses ``safety`` alone."""
+        """The traits of the operation: ``safety`` for the rate limit, ``free`` for the budget."""
         return COMMAND
 
 
@@ -93,12 +101,12 @@ class CallService(Op, frozen=True, kw_only=True):
     service: Name
     args: msgspec.Raw = NOTHING
 
-    STOP: ClassVar[RequestTraits] = RequestTraits(free=True, safety=True)
-
     @property
     def traits(self) -> RequestTraits:
-        """The traits of the service: STOP is exempt from the rate limit."""
-        return self.STOP if resolved(self.service) == STOP_SERVICE else COMMAND
+        """The traits of the service: what ends a motion or a stop costs nothing."""
+        if (name := resolved(self.service)) == STOP_SERVICE:
+            return STOP
+        return FREE if name in (HOLD_SERVICE, CLEAR_SERVICE) or name.endswith(CANCEL) else COMMAND
 
 
 class SendActionGoal(Op, frozen=True, kw_only=True):
@@ -114,6 +122,11 @@ class CancelActionGoal(Op, frozen=True, kw_only=True):
     """Cancel the goal that was sent with this ``id``."""
 
     action: Name
+
+    @property
+    def traits(self) -> RequestTraits:
+        """The traits: a cancel costs nothing."""
+        return FREE
 
 
 class SetLevel(Op, frozen=True, kw_only=True):
