@@ -40,7 +40,7 @@ def frame(**op: Any) -> bytes:
 
 
 def deaf_client(url: str, *ops: dict[str, Any]) -> socket.socket:
-    """Open a websocket by hand, send ``ops``, and return the socket, from which nobody reads."""
+    """Open a websocket by hand, send ``ops``, and return the socket, which is not read then."""
     host, port = url.removeprefix("http://").split(":")
     line = socket.create_connection((host, int(port)))
     line.sendall(
@@ -48,6 +48,10 @@ def deaf_client(url: str, *ops: dict[str, Any]) -> socket.socket:
         "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
         "Sec-WebSocket-Version: 13\r\n\r\n".encode()
     )
+    received = b""
+    while not received.endswith(b"\r\n\r\n"):
+        received += line.recv(1)
+    assert b" 101 " in received
     for op in ops:
         line.sendall(frame(**op))
     return line
