@@ -49,6 +49,11 @@ def test_link_is_required_and_its_role_decides(tmp_path: Path) -> None:
                 assert (await driver.result(number))["status"] == 5
                 state = await driver.when(lambda state: state["stop"] == "confirmed")
                 assert "Onlooker" in state["stopped"]
+            # Neither an accepted nor a refused address is printed.
+            with pytest.raises(InvalidStatus):
+                async with ros(url, f"?token={viewer}", origin=ELSEWHERE):
+                    pass
+            assert viewer not in site.server.output
 
     asyncio.run(act())
 
