@@ -14,6 +14,10 @@ import numpy as np
 
 from benchmarks.kinematics_task import FloatArray, Task
 from katana450 import tolerances
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
+from katana450.extensions.general_arms.links import links_of
+from katana450.extensions.general_arms.numerical import Numerical
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import inverse_batch
@@ -36,8 +40,8 @@ def chain_of(task: Task) -> Chain:
         S=np.column_stack(S),
         lower=task.lower,
         upper=task.upper,
-        speed=np.ones(5),
-        names=tuple(f"joint{number + 1}" for number in range(5)),
+        speed=np.ones(task.n),
+        names=tuple(f"joint{number + 1}" for number in range(task.n)),
     )
 
 
@@ -81,6 +85,66 @@ class Bare:
     def joints(self, found: Any) -> FloatArray:
         """Return the joint angles (k, 5) [rad] of ``found``."""
         return np.array(found)
+
+
+class General:
+    """`kinematics_of`: all branches of an arm of any kind, with limits and residuals on request."""
+
+    package = "katana450"
+
+    def __init__(self, task: Task) -> None:
+        self._kinematics = kinematics_of(chain_of(task))
+
+    def solve(self, T: FloatArray) -> Any:
+        """Return all solutions for the pose ``T`` (4, 4)."""
+        return self._kinematics.inverse(T)
+
+    def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
+        return np.array([each.q for each in found if each.exact]).reshape(-1, len(found[0].q))
+
+
+class GeneralBare:
+    """`ClosedForm.solve`: the same without checks, as a loop over many poses uses it."""
+
+    package = "katana450"
+
+    def __init__(self, task: Task) -> None:
+        self._chain = chain_of(task)
+        kinematics = kinematics_of(self._chain)
+        assert isinstance(kinematics, ClosedForm)
+        self._solve = kinematics.solve
+
+    def solve(self, T: FloatArray) -> Any:
+        """Return the pose ``T`` (4, 4) with all solutions, exact or nearest."""
+        return T, self._solve(T)
+
+    def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
+        T, solutions = found
+        q = np.array(solutions)
+        distance, angle = errors_of(self._chain, q[None], T[None])
+        exact = (distance[0] <= tolerances.SAME_POSITION) & (angle[0] <= tolerances.SAME_ROTATION)
+        return q[exact]
+
+
+class Search:
+    """`Numerical`: one posture inside the limits of an arm of any kind."""
+
+    package = "katana450"
+
+    def __init__(self, task: Task) -> None:
+        chain = chain_of(task)
+        self._search = Numerical(chain, links_of(chain, exact=False))
+        self._search.solve(task.T[0])
+
+    def solve(self, T: FloatArray) -> Any:
+        """Return joint angles (n,) [rad] for the pose ``T`` (4, 4)."""
+        return self._search.solve(T)
+
+    def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (1, n) [rad] of ``found``."""
+        return np.array([found])
 
 
 class Floor:

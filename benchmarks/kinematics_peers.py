@@ -6,6 +6,7 @@ random angles inside the limits. The cost of failed starts is counted.
 
 from __future__ import annotations
 
+import tempfile
 import warnings
 from collections.abc import Iterator
 from importlib import import_module
@@ -26,6 +27,7 @@ class Eaik:
     package = "EAIK"
 
     def __init__(self, task: Task, workers: int = 1) -> None:
+        self._axes = task.n
         self._robot = import_module("eaik.IK_HP").HPRobot(task.axes, task.offsets)
         self._workers = workers
         if not self._robot.hasKnownDecomposition():
@@ -36,17 +38,65 @@ class Eaik:
         return self._robot.IK(T)
 
     def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (k, 5) [rad] of the exact solutions in ``found``."""
+        """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
         exact = [q for q, rough in zip(found.Q, found.is_LS, strict=True) if not rough]
-        return np.array(exact, dtype=np.float64).reshape(-1, 5)
+        return np.array(exact, dtype=np.float64).reshape(-1, self._axes)
 
     def solve_batch(self, T: FloatArray) -> Any:
         """Return all solutions for the poses ``T`` (N, 4, 4)."""
         return self._robot.IK_batched(T, self._workers)
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
-        """Return the joint angles (k, 5) [rad] of each pose in ``found``."""
+        """Return the joint angles (k, n) [rad] of each pose in ``found``."""
         return [self.joints(each) for each in found]
+
+
+class IkGeo:
+    """Subproblem decomposition in Rust; it returns all branches and ignores limits."""
+
+    package = "ik-geo"
+
+    def __init__(self, task: Task) -> None:
+        robot = import_module("ik_geo").Robot
+        if task.n != 6:
+            raise RuntimeError("ik-geo solves six axes")
+        parallel = task.letters[1] == task.letters[2] == task.letters[3]
+        form = robot.three_parallel_two_intersecting if parallel else robot.spherical_two_parallel
+        self._robot = form(task.axes.tolist(), task.offsets.tolist())
+
+    def solve(self, T: FloatArray) -> Any:
+        """Return all solutions for the pose ``T`` (4, 4)."""
+        return self._robot.get_ik(T[:3, :3].tolist(), T[:3, 3].tolist())
+
+    def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, 6) [rad] of the exact solutions in ``found``."""
+        exact = [q for q, rough in found if not rough]
+        return np.array(exact, dtype=np.float64).reshape(-1, 6)
+
+
+class TracIk:
+    """TRAC-IK in C++: Newton steps and sequential quadratic programming side by side."""
+
+    package = "pytracik"
+    _TIMEOUT = 0.005  # s
+
+    def __init__(self, task: Task) -> None:
+        solver = import_module("trac_ik").TracIK
+        with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
+            file.write(_urdf(task))
+            file.flush()
+            self._solver = solver("base", "tool", file.name, self._TIMEOUT, _CLOSE_POSITION)
+        self._start = task.middle
+
+    def solve(self, T: FloatArray) -> Any:
+        """Return joint angles (n,) [rad] for the pose ``T`` (4, 4); None after the timeout."""
+        return self._solver.ik(T[:3, 3], T[:3, :3], self._start)
+
+    def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, n) [rad] of ``found``, k being 0 or 1."""
+        return np.array([] if found is None else [found], dtype=np.float64).reshape(
+            -1, len(self._start)
+        )
 
 
 class RoboticsToolbox:
@@ -85,8 +135,8 @@ class RoboticsToolbox:
         )
 
     def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (1, 5) [rad] of ``found``."""
-        return np.array(found.q, dtype=np.float64).reshape(1, 5)
+        """Return the joint angles (1, n) [rad] of ``found``."""
+        return np.array(found.q, dtype=np.float64).reshape(1, -1)
 
 
 class Pinocchio:
@@ -111,7 +161,7 @@ class Pinocchio:
         self._starts = task.starts(self._STARTS)
 
     def solve(self, T: FloatArray) -> Any:
-        """Return joint angles (5,) [rad] for the pose ``T`` (4, 4)."""
+        """Return joint angles (n,) [rad] for the pose ``T`` (4, 4)."""
         pin, model, data, tool = self._pin, self._model, self._data, self._tool
         goal = pin.SE3(T)
         q = self._starts[0]
@@ -131,8 +181,8 @@ class Pinocchio:
         return q
 
     def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (1, 5) [rad] of ``found``."""
-        return np.array(found, dtype=np.float64).reshape(1, 5)
+        """Return the joint angles (1, n) [rad] of ``found``."""
+        return np.array(found, dtype=np.float64).reshape(1, -1)
 
 
 class Mink:
@@ -151,7 +201,7 @@ class Mink:
         self._starts = task.starts(self._STARTS)
 
     def solve(self, T: FloatArray) -> Any:
-        """Return joint angles (5,) [rad] for the pose ``T`` (4, 4)."""
+        """Return joint angles (n,) [rad] for the pose ``T`` (4, 4)."""
         mink, arm = self._mink, self._arm
         self._task.set_target(mink.SE3.from_matrix(T))
         for start in self._starts:
@@ -169,8 +219,8 @@ class Mink:
         return arm.q.copy()
 
     def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (1, 5) [rad] of ``found``."""
-        return np.array(found, dtype=np.float64).reshape(1, 5)
+        """Return the joint angles (1, n) [rad] of ``found``."""
+        return np.array(found, dtype=np.float64).reshape(1, -1)
 
 
 class Ikpy:
@@ -220,8 +270,8 @@ class Ikpy:
         return q
 
     def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (1, 5) [rad] of ``found``."""
-        return np.array(found[1:-1], dtype=np.float64).reshape(1, 5)
+        """Return the joint angles (1, n) [rad] of ``found``."""
+        return np.array(found[1:-1], dtype=np.float64).reshape(1, -1)
 
 
 def _is_close(error: FloatArray) -> bool:
@@ -247,4 +297,26 @@ def _mjcf(task: Task) -> str:
     return (
         '<mujoco><compiler angle="radian"/><worldbody>'
         f"{bodies}{tool}{'</body>' * len(task.axes)}</worldbody></mujoco>"
+    )
+
+
+def _urdf(task: Task) -> str:
+    """Return the arm as URDF."""
+
+    def text(values: FloatArray) -> str:
+        return " ".join(repr(float(value)) for value in values)
+
+    names = ["base", *(f"link{number + 1}" for number in range(task.n)), "tool"]
+    joints = "".join(
+        f'<joint name="joint{number + 1}" type="revolute"><parent link="{names[number]}"/>'
+        f'<child link="{names[number + 1]}"/><origin xyz="{text(task.offsets[number])}"/>'
+        f'<axis xyz="{text(task.axes[number])}"/><limit lower="{float(task.lower[number])!r}" '
+        f'upper="{float(task.upper[number])!r}" velocity="1" effort="1"/></joint>'
+        for number in range(task.n)
+    )
+    links = "".join(f'<link name="{name}"/>' for name in names)
+    return (
+        f'<robot name="arm">{links}{joints}<joint name="end" type="fixed">'
+        f'<parent link="{names[-2]}"/><child link="tool"/>'
+        f'<origin xyz="{text(task.offsets[-1])}"/></joint></robot>'
     )

@@ -120,23 +120,31 @@ def _table(
             yield f"| {' | '.join([row.title, row.version, *cells(row)])} |"
 
 
-def markdown(tables: Tables) -> str:
-    """Return both tables with the conditions of the measurement."""
-    machine = tables.machine
+def conditions(poses: int, blocks: int, seed: int, machine: Machine) -> str:
+    """Return a sentence on the poses and the machine."""
     before, after = machine.load
-    conditions = (
-        f"{tables.poses} poses of seed {tables.seed} in {tables.blocks} blocks; "
+    return (
+        f"{poses} poses of seed {seed} in {blocks} blocks; "
         f"{machine.processor}, {machine.cores} cores, {platform.system()}, Python "
         f"{machine.python}, numpy {machine.numpy}; load average {before:.1f} before and "
         f"{after:.1f} after, the benchmark's own process in it."
     )
+
+
+def single_table(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the lines of the table of one pose a call."""
+    return _table(SINGLE_HEAD, rows, _single_cells)
+
+
+def markdown(tables: Tables) -> str:
+    """Return both tables with the conditions of the measurement."""
     return "\n".join(
         [
-            conditions,
+            conditions(tables.poses, tables.blocks, tables.seed, tables.machine),
             "",
             "One pose a call:",
             "",
-            *_table(SINGLE_HEAD, tables.one_by_one, _single_cells),
+            *single_table(tables.one_by_one),
             "",
             f"All {tables.poses} poses in one call, µs a pose:",
             "",
@@ -202,12 +210,17 @@ def record(tables: Tables) -> dict[str, Any]:
 
 def write_into(path: Path, tables: Tables) -> None:
     """Write the tables between the marks in a document. Raises ValueError if it has no marks."""
+    write_between(path, BEGIN, END, markdown(tables))
+
+
+def write_between(path: Path, begin: str, end: str, text: str) -> None:
+    """Write ``text`` between two lines of a document. Raises ValueError if it has them not."""
     document = path.read_text(encoding="utf-8")
-    if document.count(BEGIN) != 1 or document.count(END) != 1:
-        raise ValueError(f"{path} must hold the lines {BEGIN} and {END} once each")
-    head, rest = document.split(BEGIN)
-    _, tail = rest.split(END)
-    path.write_text(f"{head}{BEGIN}\n{markdown(tables)}\n{END}{tail}", encoding="utf-8")
+    if document.count(begin) != 1 or document.count(end) != 1:
+        raise ValueError(f"{path} must hold the lines {begin} and {end} once each")
+    head, rest = document.split(begin)
+    _, tail = rest.split(end)
+    path.write_text(f"{head}{begin}\n{text}\n{end}{tail}", encoding="utf-8")
 
 
 def processor() -> str:

@@ -23,10 +23,10 @@ class Task:
     """The arm, and the poses to solve for.
 
     Attributes:
-        axes: (5, 3) unit joint directions at q = 0.
-        offsets: (6, 3) from the frame's origin to axis 1, from each axis to the next, from axis 5
-            to the tool point [m].
-        lower, upper: (5,) limits [rad].
+        axes: (n, 3) unit joint directions at q = 0.
+        offsets: (n + 1, 3) from the frame's origin to axis 1, from each axis to the next, from the
+            last to the tool point [m].
+        lower, upper: (n,) limits [rad].
         T: (N, 4, 4) poses of the tool, which is parallel to the frame at q = 0 [m].
     """
 
@@ -47,8 +47,13 @@ class Task:
             return Task(**{name: arrays[name] for name in arrays.files})
 
     @property
+    def n(self) -> int:
+        """The number of axes."""
+        return len(self.axes)
+
+    @property
     def middle(self) -> FloatArray:
-        """(5,) middle of the joints' range [rad], where iterative solvers start."""
+        """(n,) middle of the joints' range [rad], where iterative solvers start."""
         return 0.5 * (self.lower + self.upper)
 
     @property
@@ -67,7 +72,7 @@ class Task:
     def starts(self, count: int, seed: int = 0) -> list[FloatArray]:
         """Return the starts of an iterative solver: the middle, then `count` at random."""
         rng = np.random.default_rng(seed)
-        return [self.middle, *rng.uniform(self.lower, self.upper, (count, 5))]
+        return [self.middle, *rng.uniform(self.lower, self.upper, (count, self.n))]
 
 
 class Solver(Protocol):
@@ -80,5 +85,5 @@ class Solver(Protocol):
         ...
 
     def joints(self, found: Any) -> FloatArray:
-        """Return every exact answer (k, 5) [rad] in the result of `solve`; k may be 0."""
+        """Return every exact answer (k, n) [rad] in the result of `solve`; k may be 0."""
         ...

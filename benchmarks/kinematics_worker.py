@@ -43,9 +43,14 @@ def _peer(name: str, **options: Any) -> Callable[[Task], Any]:
 SOLVERS: dict[str, Callable[[], Callable[[Task], Any]]] = {
     "katana450": lambda: _own("Katana450"),
     "katana450-bare": lambda: _own("Bare"),
+    "katana450-general": lambda: _own("General"),
+    "katana450-general-bare": lambda: _own("GeneralBare"),
+    "katana450-numerical": lambda: _own("Search"),
     "floor": lambda: _own("Floor"),
     "eaik": lambda: _peer("Eaik"),
     "eaik-threads": lambda: _peer("Eaik", workers=os.cpu_count() or 1),
+    "ik-geo": lambda: _peer("IkGeo"),
+    "trac-ik": lambda: _peer("TracIk"),
     "roboticstoolbox": lambda: _peer("RoboticsToolbox", limits=True),
     "roboticstoolbox-free": lambda: _peer("RoboticsToolbox", limits=False),
     "pinocchio": lambda: _peer("Pinocchio"),
@@ -63,7 +68,7 @@ class Bench:
         # Each pose is a contiguous array, as a caller would have it.
         self._poses = [np.ascontiguousarray(T) for T in task.T]
         self._batch = np.ascontiguousarray(task.T)
-        self._answers: list[FloatArray] = [np.empty((0, 5))] * len(self._poses)
+        self._answers: list[FloatArray] = [np.empty((0, task.n))] * len(self._poses)
 
     def solve(self, first: int, last: int) -> float:
         """Return the seconds of the quickest pass over the poses from `first` to before `last`."""
@@ -79,7 +84,7 @@ class Bench:
         return quickest
 
     def save(self, path: Path) -> None:
-        """Write all answers as one array q (K, 5), with the number of answers of each pose."""
+        """Write all answers as one array q (K, n), with the number of answers of each pose."""
         counts = np.array([len(q) for q in self._answers])
         np.savez(path, q=np.concatenate(self._answers), counts=counts)
 

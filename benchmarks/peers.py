@@ -7,7 +7,10 @@ import sys
 from pathlib import Path
 
 PINS = Path(__file__).with_name("peers.lock")
-PEERS = ("EAIK", "roboticstoolbox-python", "pin", "mink", "ikpy", "vtk")
+PEERS = (
+    *("EAIK", "ik-geo", "pytracik", "roboticstoolbox-python", "pin", "mink", "ikpy"),
+    "vtk",
+)
 _LINES_OF_REASON = 3
 
 
@@ -20,7 +23,11 @@ def prepare(folder: Path, peer: str) -> Path | str:
     python = home / "bin" / "python"
     uv = [sys.executable, "-m", "uv"]
     commands = [
-        [*uv, "pip", "install", "--quiet", "--python", str(python), "--constraint", str(PINS), peer]
+        [
+            *(*uv, "pip", "install", "--quiet", "--python", str(python)),
+            # Some peers leave numpy, which the benchmarks need, to their users.
+            *("--constraint", str(PINS), peer, "numpy"),
+        ]
     ]
     if not python.exists():
         commands.insert(0, [*uv, "venv", "--quiet", "--python", sys.executable, str(home)])

@@ -12,6 +12,7 @@ import pytest
 
 from benchmarks import kinematics_report as report
 from benchmarks.kinematics import BATCH, ONE_BY_ONE, ROOT, main, measure, seeded_task
+from benchmarks.kinematics_arms import SEVEN, SIX
 from benchmarks.kinematics_own import Floor, chain_of
 from benchmarks.kinematics_process import SolverError, SolverProcess
 from benchmarks.kinematics_quality import quality
@@ -162,4 +163,5 @@ def test_the_command_prints_both_tables_and_writes_json(
 
 
 def test_every_solver_has_a_table_and_a_maker() -> None:
-    assert {entry.name for entry in (*ONE_BY_ONE, *BATCH)} == set(SOLVERS)
+    entries = (*ONE_BY_ONE, *BATCH, *SIX, *SEVEN)
+    assert {entry.name for entry in entries} == set(SOLVERS)

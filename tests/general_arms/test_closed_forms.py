@@ -150,6 +150,23 @@ def test_many_poses_are_solved_as_one(name: str) -> None:
     assert (np.abs(errors_of(chain, several, T)[0] - distance) < 1e-6).all()
 
 
+def test_many_poses_with_a_wrist_in_line_are_solved_as_one() -> None:
+    q = singular.aligned_wrist(UR5E, np.random.default_rng(9), 60, 4, (0.0, math.pi))
+    T = forward_batch(UR5E, q)
+    solver = closed_form(UR5E)
+    for found in (solver.inverse_batch(T), np.array([solver.solve(pose) for pose in T])):
+        distance, angle = errors_of(UR5E, found, T)
+        assert ((distance <= POSITION) & (angle <= ROTATION)).any(axis=1).all()
+
+
+def test_stretched_arm_with_a_wrist_in_line_is_found_again() -> None:
+    rng = np.random.default_rng(10)
+    q = rng.uniform(-3.0, 3.0, (60, 6))
+    q[:, 2] = 10.0 ** rng.uniform(-12.0, -3.0, 60) * rng.choice((0.0, 1.0), 60)
+    q[:, 4] = 10.0 ** rng.uniform(-12.0, -3.0, 60) * rng.choice((0.0, 1.0), 60)
+    check(UR5E, q)
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_pose_out_of_reach_gets_finite_angles_that_say_so(name: str) -> None:
     chain = ARMS[name]

@@ -15,6 +15,7 @@ from katana450.errors import InputError
 from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.parallel_axes import (
+    LOOSE,
     four_axes,
     pointed,
     six_axes,
@@ -243,6 +244,12 @@ class ClosedForm:
             found = self._solve_arrays(self.form.columns(poses), self.form.links.shift)
         zeros = np.zeros(len(poses))
         alpha = np.array([[each + zeros for each in angles] for angles in found])
+        if self.form.build is six_axes:
+            # Where axes 4 and 6 are in line, case distinctions keep axis 4 in reach.
+            in_line = (np.abs(np.sin(alpha[:, 4])) < LOOSE).any(axis=0)
+            for number in np.flatnonzero(in_line).tolist():
+                rows = self.form.rows(poses[number])
+                alpha[:, :, number] = self._solve(rows, self.form.links.shift)
         q = alpha.transpose(2, 0, 1) - self.form.links.shift
         return in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
 

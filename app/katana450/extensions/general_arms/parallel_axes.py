@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -43,6 +44,11 @@ from katana450.extensions.general_arms.links import DHLinks, sine_and_cosine
 from katana450.extensions.general_arms.spherical_wrist import Angles, Solve
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import frozen
+from katana450.maths.kinematics.turns import wrapped
+
+LOOSE = 1e-5
+"""[1] Sine of the angle between axes 4 and 6 below which rounding may put axis 4 out of reach.
+psi is then turned back, as far as that turns the tool by less than FREE."""
 
 AGREES = 1e-13
 """[m] Distance of the tool point from the arm's plane up to which pose and plane agree."""
@@ -58,6 +64,7 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
     ex, ey = links.a[3], -flip * s4 * d5
     turns, bent = facing(f), two_links(f, links.a[1], links.a[2])
     split = three_turns(f, links.t[3] + (0.0 if flip > 0.0 else math.pi), links.t[4])
+    loosened = _loosened(links.a[1], links.a[2], ex, ey)
     atan2 = f.atan2
 
     def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
@@ -72,22 +79,54 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
             m31, m32, m33 = c * r21 - s * r11, c * r22 - s * r12, c * r23 - s * r13
             m21, m22, m23 = c1 * m31 + s1 * r31, c1 * m32 + s1 * r32, c1 * m33 + s1 * r33
             m31, m33 = c1 * r31 - s1 * m31, c1 * r33 - s1 * m33
-            entries = ((m11, m12, m13), (m21, m22, m23), m31, m33)
-            first, second, radius = split(*entries, 0.0)
-            if f is FLOATS and radius <= FREE:
-                # Axes 4 and 6 are in line, or opposite: put alpha6 where it is wanted.
-                turn = first[2] - free[5]
-                first, second, _ = split(*entries, turn if m33 >= 0.0 else -turn)
+            first, second, radius = split((m11, m12, m13), (m21, m22, m23), m31, m33, 0.0)
+            u, v = ahead - a1, up
             for psi, five, six, cp, sp in (first, second):
-                towards, opening, bend = bent(
-                    ahead - a1 - ex * cp + ey * sp, up - ex * sp - ey * cp
-                )
+                if f is FLOATS and radius <= LOOSE:
+                    psi, six = loosened(u, v, psi, six, free[5], radius, m33)  # noqa: PLW2901
+                    cp, sp = f.cos(psi), f.sin(psi)  # noqa: PLW2901
+                towards, opening, bend = bent(u - ex * cp + ey * sp, v - ex * sp - ey * cp)
                 for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
                     four = flip * (psi - two - bend_)
                     found.append((one, two, flip2 * bend_, four, five, six))
         return found
 
     return solve
+
+
+def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple[float, float]]:
+    """Return a function for psi and alpha6 [rad] where axes 4 and 6 are nearly in line.
+
+    Of all turns that keep their sum, or difference, and displace the tool by less than FREE, it
+    takes the one with alpha6 at the wanted angle, else the given one, and of these the nearest that
+    keeps axis 4 in reach. Axis 4 lies at (u, v) less (ex, ey) turned by psi, and must be l1 - l2 to
+    l1 + l2 away: the law of cosines bounds the angle between the two vectors, subproblem 3.
+    """
+    e, start = math.hypot(ex, ey), math.atan2(ey, ex)
+    far, near = (l1 + l2) ** 2, (l1 - l2) ** 2
+
+    def loosened(
+        u: float, v: float, psi: float, six: float, free: float, radius: float, aligned: float
+    ) -> tuple[float, float]:
+        side = 1.0 if aligned >= 0.0 else -1.0
+        for wanted in (psi + side * (six - free), psi):
+            turn = wrapped(nearest(u, v, wanted) - psi)
+            if radius <= FREE or radius * abs(turn) <= FREE:
+                return psi + turn, six - side * turn
+        return psi, six
+
+    def nearest(u: float, v: float, wanted: float) -> float:
+        g = math.hypot(u, v)
+        if e * g <= FREE:
+            return wanted
+        middle = math.atan2(v, u) - start
+        away = wrapped(wanted - middle)
+        square, scale = g * g + e * e, 0.5 / (e * g)
+        least = math.acos(max(min((square - near) * scale, 1.0), -1.0))
+        most = math.acos(max(min((square - far) * scale, 1.0), -1.0))
+        return middle + math.copysign(min(max(abs(away), least), most), away)
+
+    return loosened
 
 
 def four_axes(links: DHLinks, f: Operations) -> Solve:
