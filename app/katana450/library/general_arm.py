@@ -55,7 +55,7 @@ class GeneralArm(Arm):
 
     @property
     def method(self) -> str:
-        """How poses are solved, in words: a closed form, or numerically and why."""
+        """The method by which poses are solved, in words: a closed form, or numerical and why."""
         return self.described.kinematics.method
 
     @property
