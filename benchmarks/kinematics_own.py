@@ -122,10 +122,11 @@ class GeneralBare:
     def joints(self, found: Any) -> FloatArray:
         """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
         T, solutions = found
-        q = np.array(solutions)
+        q: FloatArray = np.array(solutions)
         distance, angle = errors_of(self._chain, q[None], T[None])
         exact = (distance[0] <= tolerances.SAME_POSITION) & (angle[0] <= tolerances.SAME_ROTATION)
-        return q[exact]
+        right: FloatArray = q[exact]
+        return right
 
 
 class Search:

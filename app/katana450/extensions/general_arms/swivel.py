@@ -222,7 +222,7 @@ class SevenAxes:
 
 
 def _after_first(links: DHLinks, rows: FloatArray, alpha: FloatArray) -> list[list[FloatArray]]:
-    """Return L_1^-1 Rz(-alpha)^ (N,) applied to `rows`: the pose in the frame of axis 2."""
+    """Return the pose `rows` in the frame of axis 2, after axis 1 turned by `alpha` (N,) [rad]."""
     c, s = np.cos(alpha), np.sin(alpha)
     turned = [
         [c * x + s * y for x, y in zip(rows[0], rows[1], strict=True)],

@@ -13,7 +13,6 @@ from katana450.extensions.general_arms.nearest import nearest_posture
 from katana450.extensions.general_arms.posture import singular_axes
 from katana450.extensions.kinematics.numbers import numbers, shown
 from katana450.extensions.kinematics.pose_requests import KEYS, requested_pose
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
@@ -73,7 +72,7 @@ class GeneralLines:
                 "q": best.q.tolist(),
                 "branch": best.branch,
                 "position_mm": 1e3 * best.position_error,
-                "rotation_rad": so3.angle(best.T[:3, :3], T[:3, :3]),
+                "rotation_rad": best.rotation_error,
                 "limits": [axis + 1 for axis in best.limits],
                 "reason": best.reason,
             }
