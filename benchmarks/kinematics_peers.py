@@ -52,7 +52,10 @@ class Eaik:
 
 
 class IkGeo:
-    """Subproblem decomposition in Rust; it returns all branches and ignores limits."""
+    """Subproblem decomposition in Rust; all branches, limits ignored.
+
+    The points of the task on axes 4 to 6 of a spherical wrist must be its centre.
+    """
 
     package = "ik-geo"
 
@@ -66,7 +69,8 @@ class IkGeo:
 
     def solve(self, T: FloatArray) -> Any:
         """Return all solutions for the pose ``T`` (4, 4)."""
-        return self._robot.get_ik(T[:3, :3].tolist(), T[:3, 3].tolist())
+        # It reads the rotation by columns.
+        return self._robot.get_ik(T[:3, :3].T.tolist(), T[:3, 3].tolist())
 
     def joints(self, found: Any) -> FloatArray:
         """Return the joint angles (k, 6) [rad] of the exact solutions in ``found``."""
