@@ -33,6 +33,7 @@ from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.channel import Channel, GoneError, JsonChannel, WebSocketJsonChannel
 from katana450.server.web.program_socket import BURST, FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, RATE
 from katana450.server.web.token_bucket import TokenBucket
@@ -272,17 +273,17 @@ class RosChannel(Channel):
                 self._respond(op, str(error), result=False)
                 raise
         try:
-            done = self._ask(request)
+            answer = self._handle(request)
         except KatanaError as error:
             self._respond(op, TriggerResponse(success=False, message=str(error)))
             return
-        if self._dispatcher.is_pending(done):
-            self._later(self._conclude_trigger(op, done))
+        if isinstance(answer, PendingAnswer):
+            self._later(self._conclude_trigger(op, answer))
         else:
-            self._respond(op, _triggered(done))
+            self._respond(op, _triggered(answer))
 
-    async def _conclude_trigger(self, op: ops.CallService, pending: answers.Answer) -> None:
-        self._respond(op, _triggered(await self._dispatcher.concluded(pending)))
+    async def _conclude_trigger(self, op: ops.CallService, pending: PendingAnswer) -> None:
+        self._respond(op, _triggered(await pending.answer()))
 
     def _later(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.ensure_future(work)
@@ -375,7 +376,11 @@ class RosChannel(Channel):
         self._goals = [goal for goal in self._goals if not goal.ended]
 
     def _ask(self, request: requests.Request) -> answers.Answer:
-        """Execute ``request`` of the client. Raises KatanaError if it is refused."""
+        """Execute ``request`` and return its answer so far. Raises KatanaError if it is refused."""
+        answer = self._handle(request)
+        return answer.done if isinstance(answer, PendingAnswer) else answer
+
+    def _handle(self, request: requests.Request) -> answers.Answer | PendingAnswer:
         assert self.participant is not None
         return self._dispatcher.handle(self.participant, request, self.budget)
 

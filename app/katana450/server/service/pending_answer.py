@@ -53,6 +53,9 @@ class PendingAnswer:
     While a request waits for the end of its motion, the open connection of its participant counts
     as heartbeats. At the end nothing moves any more, and a lease that the request has acquired is
     released.
+
+    Attributes:
+        done: the answer so far, without the outcome of the command and the end of the motion.
     """
 
     def __init__(
@@ -69,7 +72,7 @@ class PendingAnswer:
         ``wait``: maximum duration of the motion [s]; None to answer with the outcome. ``fingers``:
         whether the fingers move, and not the arm.
         """
-        self._hub, self._participant, self._done, self._wait = hub, participant, done, wait
+        self._hub, self._participant, self.done, self._wait = hub, participant, done, wait
         self._motions, self._revocations = hub.gate.motions, hub.gate.revocations
         self._began, self._fingers = hub.clock(), fingers
         self._programmed = hub.runner.runs_for(participant)
@@ -101,15 +104,15 @@ class PendingAnswer:
 
     async def _concluded(self) -> answers.Answer:
         """Return the answer with the outcome of the command, as the arm's process reports it."""
-        ticket = self._done.ticket
-        if ticket is None or self._done.outcome is not None:
-            return self._done
+        ticket = self.done.ticket
+        if ticket is None or self.done.outcome is not None:
+            return self.done
         try:
             async with asyncio.timeout(OUTCOME_SECONDS):
                 outcome = await asyncio.wrap_future(self._hub.present().outcome(ticket))
         except TimeoutError:
-            return msgspec.structs.replace(self._done, outcome=UNKNOWN)
-        return serialize.concluded(self._done, outcome)
+            return msgspec.structs.replace(self.done, outcome=UNKNOWN)
+        return serialize.concluded(self.done, outcome)
 
     async def _ended(self, wait: float) -> answers.MotionEnd:
         """Return the end of the motion, once the arm is at rest."""
