@@ -27,6 +27,14 @@ from tests.recording.sessions import drag, record_session
 
 PRINTED_URL = "http://127.0.0.1:8080"
 SECONDS = 120
+SCENE = """\
+scene: 1
+objects:
+- name: box
+  shape: box
+  size: [40, 40, 40]
+  pose: [-250, 250, 0, 0, 0, 0]
+"""
 
 # Languages that a test below runs or reads; tests/exchange/test_c_kinematics.py compiles C.
 CHECKED = {"c", "console", "csv", "json", "python", "sh", "toml", "yaml"}
@@ -105,6 +113,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recording: Path) -> 
     script = code_block("docs/programs.md", "name: Square").text
     for name in ("square.yaml", "my_script.yaml"):
         (tmp_path / name).write_text(script, encoding="utf-8")
+    (tmp_path / "scene.yaml").write_text(SCENE, encoding="utf-8")
     (tmp_path / "run.mcap").symlink_to(recording)
     (tmp_path / "my_arm.urdf").write_bytes((ROOT / "examples" / "my_own_arm.urdf").read_bytes())
     return tmp_path

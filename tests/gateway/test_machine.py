@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yourdfpy
 
+from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
@@ -171,7 +172,7 @@ def test_slider_moves_a_joint_in_its_own_unit(server: AppServer, robot: Robot) -
         async with opened(server.url) as (peer, control):
             name = robot.joint_group.names[robot.joint_group.slides.index(True)]
             index = robot.joint_group.names.index(name)
-            label = f"{index + 1}. {name}"
+            label = joint_labels(robot)[index]
             props = peer.controls[label]["props"]
             assert props["max"] == pytest.approx(1e3 * robot.joint_group.upper[index], abs=0.01)
             assert "mm" in props["hint"]
