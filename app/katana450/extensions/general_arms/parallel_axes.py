@@ -48,7 +48,10 @@ from katana450.maths.kinematics.turns import wrapped
 
 LOOSE = 1e-5
 """[1] Sine of the angle between axes 4 and 6 below which rounding may put axis 4 out of reach.
-psi is then turned back, as far as that turns the tool by less than FREE."""
+psi is then turned back, as far as that turns the tool by less than HELD."""
+
+HELD = 9e-13
+"""[rad] Turn of the tool that counts as rounding where two singularities are near."""
 
 AGREES = 1e-13
 """[m] Distance of the tool point from the arm's plane up to which pose and plane agree."""
@@ -97,7 +100,7 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
 def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple[float, float]]:
     """Return a function for psi and alpha6 [rad] where axes 4 and 6 are nearly in line.
 
-    Of all turns that keep their sum, or difference, and displace the tool by less than FREE, it
+    Of all turns that keep their sum, or difference, and turn the tool by less than HELD, it
     takes the one with alpha6 at the wanted angle, else the given one, and of these the nearest that
     keeps axis 4 in reach. Axis 4 lies at (u, v) less (ex, ey) turned by psi, and must be l1 - l2 to
     l1 + l2 away: the law of cosines bounds the angle between the two vectors, subproblem 3.
@@ -111,7 +114,7 @@ def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple
         side = 1.0 if aligned >= 0.0 else -1.0
         for wanted in (psi + side * (six - free), psi):
             turn = wrapped(nearest(u, v, wanted) - psi)
-            if radius <= FREE or radius * abs(turn) <= FREE:
+            if radius <= FREE or radius * abs(turn) <= HELD:
                 return psi + turn, six - side * turn
         return psi, six
 
