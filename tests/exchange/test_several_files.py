@@ -91,6 +91,25 @@ def test_one_of_several_shapes_is_chosen() -> None:
         read_shape(data, Format.ZIP, "pair.zip", main="up.wrl")
 
 
+def bomb(method: int) -> bytes:
+    """Return a .zip of some hundred bytes with 40 MB, which zipfile would unpack at once."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", method) as file:
+        file.writestr("a.wrl", bytes(40_000_000))
+        file.writestr("scene.yaml", bytes(40_000_000))
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_only_deflated_files_are_unpacked(method: int) -> None:
+    data = bomb(method)
+    assert len(data) < 20_000
+    with pytest.raises(InputError, match="another method than Deflate"):
+        read_scene_zip(data, None)
+    with pytest.raises(InputError, match="another method than Deflate"):
+        archive.unpacked(data.replace(b"scene.yaml", b"other.obj0"), "a.zip", ("wrl", "obj"))
+
+
 def flooded() -> bytes:
     return zipped({f"{number}.wrl": "" for number in range(archive.MAX_FILES + 1)})
 

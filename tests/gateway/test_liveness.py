@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 import sys
 import time
 from collections.abc import Iterator
@@ -11,8 +12,9 @@ import pytest
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.stop_cause import StopCause
+from katana450.arm.runtime.readiness import LAST_ACK_RECEIVED, ack_age, data_age
 from katana450.server.service import status
-from katana450.server.service.heartbeats import Arrival, LastHeartbeat
+from katana450.server.service.heartbeats import MAX_ACK_AGE, Arrival, LastHeartbeat, keep_alive
 from katana450.server.service.hub import TICK
 from katana450.server.service.stop_state import StopRecord
 from katana450.settings import Settings
@@ -144,6 +146,49 @@ def line() -> Iterator[tuple[socket.socket, socket.socket]]:
         far, _ = listening.accept()
         with near, far:
             yield near, far
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs the kernel's times")
+def test_open_connection_counts_as_long_as_the_other_host_answers() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        keep_alive(listening)
+        with socket.create_connection(listening.getsockname()):
+            far, _ = listening.accept()
+            with far:
+                arrival = Arrival(far)
+                arrival.open = 1
+                time.sleep(MAX_ACK_AGE + 1.0)
+                # The probes of the kernel were answered.
+                assert ack_age(far) < 2.0 < data_age(far)
+                assert arrival.newest == pytest.approx(time.monotonic(), abs=0.1)
+                arrival.open = 0
+                assert time.monotonic() - arrival.newest > MAX_ACK_AGE
+
+
+class LostLine:
+    """A connection whose other host has answered nothing for ``seconds`` [s]."""
+
+    def __init__(self, far: socket.socket, seconds: float) -> None:
+        self._far, self._seconds = far, seconds
+
+    def fileno(self) -> int:
+        return self._far.fileno()
+
+    def getsockopt(self, level: int, name: int, size: int, /) -> bytes:
+        info = bytearray(self._far.getsockopt(level, name, size))
+        struct.pack_into("=I", info, LAST_ACK_RECEIVED, round(1e3 * self._seconds))
+        return bytes(info)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs the kernel's times")
+@pytest.mark.parametrize(("seconds", "counts"), [(2.5, True), (3.5, False)])
+def test_open_connection_to_a_lost_host_is_no_heartbeat(
+    line: tuple[socket.socket, socket.socket], *, seconds: float, counts: bool
+) -> None:
+    arrival = Arrival(LostLine(line[1], seconds))
+    time.sleep(0.3)
+    arrival.open = 1
+    assert (time.monotonic() - arrival.newest < 0.2) is counts
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs the kernel's time of arrival")

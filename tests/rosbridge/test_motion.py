@@ -425,3 +425,23 @@ def test_contact_refuses_a_goal_before_anything_moves(server: AppServer) -> None
             assert (await client.state())["q"] == pytest.approx(home["q"])
 
     asyncio.run(act())
+
+
+@pytest.mark.long
+def test_nothing_moves_after_the_result(server: AppServer) -> None:
+    """The fingers move while the trajectory is planned, so that the plan does not fit any more."""
+
+    async def act() -> None:
+        async with ros(server.url) as client:
+            await client.home()
+            number = await client.goal(FOLLOW, trajectory((1.5, AWAY)))
+            fingers = await client.goal(GRIPPER, {"command": {"position": -0.2, "max_effort": 0.0}})
+            await client.result(fingers)
+            result = await client.result(number)
+            state = await client.state()
+            assert (result["status"] == 4) == (state["q"] == pytest.approx(AWAY, abs=1e-3)), result
+            assert not state["moving"]
+            await asyncio.sleep(1.0)
+            assert (await client.state())["q"] == pytest.approx(state["q"], abs=1e-6)
+
+    asyncio.run(act())

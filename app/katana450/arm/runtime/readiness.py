@@ -7,8 +7,9 @@ import socket
 import struct
 from typing import Protocol
 
-LAST_DATA_RECEIVED = 52
-"""Bytes before ``tcpi_last_data_recv`` [ms] in Linux's ``struct tcp_info``."""
+LAST_DATA_RECEIVED, LAST_ACK_RECEIVED = 52, 56
+"""Bytes before ``tcpi_last_data_recv`` and ``tcpi_last_ack_recv`` [ms] in Linux's ``struct
+tcp_info``."""
 
 
 class SocketChannel(Protocol):
@@ -38,16 +39,28 @@ def data_age(channel: SocketChannel) -> float:
 
     Returns 0 if the system does not report it: data that is being read then counts as new.
     """
+    return _age(channel, LAST_DATA_RECEIVED)
+
+
+def ack_age(channel: SocketChannel) -> float:
+    """Return the time since the other host acknowledged anything, probes included [s].
+
+    Returns 0 if the system does not report it.
+    """
+    return _age(channel, LAST_ACK_RECEIVED)
+
+
+def _age(channel: SocketChannel, offset: int) -> float:
     option = getattr(socket, "TCP_INFO", None)
     if option is None or channel.fileno() < 0:
         return 0.0
     try:
-        info = channel.getsockopt(socket.IPPROTO_TCP, option, LAST_DATA_RECEIVED + 4)
+        info = channel.getsockopt(socket.IPPROTO_TCP, option, offset + 4)
     except OSError:
         return 0.0
-    if len(info) < LAST_DATA_RECEIVED + 4:
+    if len(info) < offset + 4:
         return 0.0
-    milliseconds: int = struct.unpack_from("=I", info, LAST_DATA_RECEIVED)[0]
+    milliseconds: int = struct.unpack_from("=I", info, offset)[0]
     return 1e-3 * milliseconds
 
 

@@ -47,6 +47,18 @@ class ChoiceError(InputError):
         self.choices = tuple(choices)
 
 
+def check_packing(entry: zipfile.ZipInfo) -> None:
+    """Raise InputError unless ``entry`` of a .zip is stored or deflated.
+
+    zipfile unpacks other methods without a bound: 300 bytes can become gigabytes.
+    """
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise InputError(
+            f"{entry.filename[:80]} in the .zip is packed by another method than Deflate. Pack it "
+            "as a plain .zip."
+        )
+
+
 def unpacked(
     data: bytes, name: str, suffixes: Iterable[str], main: str = ""
 ) -> tuple[str, dict[str, bytes]]:
@@ -82,6 +94,8 @@ def unpacked(
                 and not posixpath.basename(path).startswith(".")
                 and not path.startswith("__MACOSX/")
             }
+            for entry in chosen.values():
+                check_packing(entry)
             # zipfile never unpacks more than the size that is declared here.
             if sum(entry.file_size for entry in chosen.values()) > MAX_ARCHIVE_BYTES:
                 raise InputError(

@@ -70,7 +70,8 @@ def read_shape_guarded(
     own = Path(name.replace("\\", "/")).name or f"shape.{format.value}"
     companions: dict[str, bytes] = {}
     found = _parsed(data, [format.value, file, *words, main], file)
-    for _ in range(MAX_PASSES):
+    # What a .zip names is in it.
+    for _ in range(0 if format is Format.ZIP else MAX_PASSES):
         more = _companions(found, beside, companions.keys() | {own}, file)
         if not more:
             break

@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
-from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES
+from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, check_packing
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
 from katana450.extensions.programs.attached_files import attached
@@ -87,6 +87,7 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
                 nonlocal left
                 if path not in names:
                     raise InputError(f"There is no file {path} in the .zip.")
+                check_packing(archive.getinfo(path))
                 # The sizes that a .zip declares can be false.
                 with archive.open(path) as file:
                     content = file.read(min(maximum, left) + 1)

@@ -95,6 +95,8 @@ class Uploads:
         async def keep() -> answers.Answer:
             if max(len(name), len(main) // 4) > 4 * LONGEST_NAME:
                 raise InputError("The name of the file is too long.")
+            if not main.isprintable():
+                raise InputError("`main` is not a path in the .zip.")
             is_archive = Format.of(name) is Format.ZIP
             maximum = MAX_ARCHIVE_BYTES if is_archive else MAX_FILE_BYTES
             data = await body_of(request, maximum, UPLOAD_TIMEOUT, MIN_RATE)

@@ -340,6 +340,9 @@ class RosChannel(Channel):
         raise InputError(f"There is no goal {op.id!r} of {op.action}. It may have ended.")
 
     def _show_newest(self, key: str, op: dict[str, Any]) -> None:
+        if key not in self._newest and len(self._newest) >= MAX_GOALS:
+            # Of a goal that has ended, for a client that reads slowly.
+            del self._newest[next(iter(self._newest))]
         self._newest[key] = op
         self.wake()
 

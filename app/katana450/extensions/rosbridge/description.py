@@ -8,7 +8,6 @@ headers. A client that has received the description can load them.
 from __future__ import annotations
 
 import io
-import secrets
 import zipfile
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
@@ -47,7 +46,7 @@ class RobotPackage(NamedTuple):
     key: str
 
     @classmethod
-    def read(cls, urdf: Path) -> RobotPackage:
+    def read(cls, urdf: Path, key: str) -> RobotPackage:
         """Return the description of the file ``urdf``. Raises RobotDescriptionError."""
         ((name, content),) = package_files(urdf).items()
         package = PurePosixPath(name).stem
@@ -57,7 +56,7 @@ class RobotPackage(NamedTuple):
             }
         text = next(files[each] for each in files if each.endswith(".urdf")).decode()
         meshes = {each: data for each, data in files.items() if each.startswith("meshes/")}
-        return cls(text, f"package://{package}/", meshes, secrets.token_urlsafe(16))
+        return cls(text, f"package://{package}/", meshes, key)
 
     def at(self, origin: str) -> str:
         """Return the text whose meshes are at ``origin``, such as http://127.0.0.1:8080."""

@@ -24,8 +24,8 @@ def _add_options(parser: ArgumentParser) -> None:
         type=_origin,
         default=[],
         metavar="ORIGIN",
-        help="let pages of this site, such as http://localhost:3000, connect to /rosbridge; may be "
-        "repeated",
+        help="let pages of this site, such as http://localhost:3000, drive the arm by "
+        "/rosbridge and the API; may be repeated",
     )
     parser.add_argument(
         "--foxglove",

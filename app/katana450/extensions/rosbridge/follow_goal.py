@@ -32,6 +32,7 @@ from katana450.extensions.rosbridge.trajectory import (
 )
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers
+from katana450.server.service.runner import Runner
 
 PLACE = re.compile(r"^line \d+, (column \d+|[^:]*): ", re.IGNORECASE)
 """Place in the script with which a reason begins. The client has not written the script."""
@@ -77,11 +78,14 @@ class FollowGoal(Goal):
         if now is None:
             return self._canceled("Another program was sent.")
         match now.status:
-            case "planning" if not self._runs:
+            case "planning":
                 # Raises if the arm was stopped, or the driver changed, while it was planned.
                 self.host.hub.gate.check_current(self._actor)
             case "ready" if not self._runs:
                 self._run(now)
+            case "ready" if self._runner.runs_for(self.host.participant):
+                # It was planned again because the scene has changed, and begins with the next tick.
+                return None
             case "ready" | "cancelled":
                 return self._canceled(now.why)
             case "refused":
@@ -99,12 +103,12 @@ class FollowGoal(Goal):
 
     def end(self, why: str) -> Result:
         """End the program, which brakes the arm."""
-        self._end_program()
+        self._end_program(why)
         return self._canceled(why)
 
     def failure(self, error: KatanaError) -> Result:
         """Return the result with the error code, after ending the program."""
-        self._end_program()
+        self._end_program(str(error))
         if isinstance(error, GoalError):
             return _result(GoalStatus.ABORTED, error.code, str(error))
         if self._checked is not None and not self.host.hub.gate.is_current(self._actor):
@@ -162,17 +166,23 @@ class FollowGoal(Goal):
 
     def _progress(self) -> answers.Progress | None:
         """Return the progress of the program; None if it is not the present one any more."""
-        now = self.host.hub.runner.progress()
+        now = self._runner.progress()
         # A script has no name until its thread has read it.
         mine = now is not None and now.name in (self._name, "")
         return now if mine else None
 
-    def _end_program(self) -> None:
-        """End the program, or its planning, if there is one."""
+    @property
+    def _runner(self) -> Runner:
+        return self.host.hub.runner
+
+    def _end_program(self, why: str) -> None:
+        """End the program, its planning, or the run that waits for the planning, because of why."""
         now = self._progress()
         if now is not None and now.status in ("planning", "running", "paused", "blocked"):
             with suppress(KatanaError):
                 self.host.ask(Steer(order=ProgramOrder.END))
+        if now is not None:
+            self._runner.end(self.host.participant, why.rstrip("."))
 
     def _succeeded(self, why: str) -> Result:
         return _result(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, why)

@@ -102,6 +102,9 @@ class FoxgloveServer:
 
     def _stop(self, _request: ServiceRequest) -> bytes:
         """Stop the arm. Called in a thread of the SDK; the gate may be used in any."""
+        # A stop that is in force is not renewed: pages of any site on this machine can call this.
+        if self._hub.gate.stopped is not None:
+            return b'{"success": true, "message": "stopped"}'
         self._hub.gate.submit(cmd.Stop(pressed(ACTOR.name, ACTOR.key, None, 0.0)), ACTOR)
         return b'{"success": true, "message": "requested"}'
 

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 
 from katana450.arm.control.state import Outcome
-from katana450.errors import InputError, KatanaError, LeaseError
+from katana450.errors import InputError, KatanaError
 from katana450.extensions.rosbridge.goals import Goal, GoalHost, GoalStatus, Result, refusal_of
 from katana450.extensions.rosbridge.messages import GripperCommand, GripperCommandResult, RosMessage
 from katana450.extensions.rosbridge.ops import SendActionGoal, read
@@ -80,7 +80,7 @@ class GripperGoal(Goal):
     def end(self, why: str) -> Result:  # noqa: ARG002 - the result has no place for words
         """Stop the fingers where they are."""
         # Refused if the arm was stopped or another client drives: the fingers are not ours then.
-        with suppress(LeaseError):
+        with suppress(KatanaError):
             self.host.ask(requests.Hold(revocations=self._revocations))
         return Result(GoalStatus.CANCELED, self._now())
 

@@ -39,12 +39,17 @@ UNITS = "command_in_type"
 
 
 class LateDescription:
-    """The robot's description, read in a thread when the first client wants it."""
+    """The robot's description, read in a thread when the first client wants it.
+
+    Attributes:
+        key: secret in the addresses of the files.
+    """
 
     def __init__(self, urdf: Path) -> None:
+        self.key = secrets.token_urlsafe(16)
         self._urdf = urdf
         self._lock = threading.Lock()
-        self._found: RobotPackage | None = None
+        self._found: RobotPackage | RobotDescriptionError | None = None
 
     def read(self) -> RobotPackage:
         """Return the description; the first call takes seconds. For any other thread.
@@ -53,7 +58,12 @@ class LateDescription:
         """
         with self._lock:
             if self._found is None:
-                self._found = RobotPackage.read(self._urdf)
+                try:
+                    self._found = RobotPackage.read(self._urdf, self.key)
+                except RobotDescriptionError as error:
+                    self._found = error
+            if isinstance(self._found, RobotDescriptionError):
+                raise self._found
             return self._found
 
 
@@ -92,7 +102,8 @@ class RosRoutes:
                 units = Units(socket.query_params.get(UNITS, Units.UNITLESS.value))
                 scheme = "https" if authenticator.address.cookies_are_secure else "http"
                 origin = f"{scheme}://{socket.headers['host']}"
-                text = (await asyncio.to_thread(self._description.read)).at(origin)
+                # Without an identity the websocket is refused below.
+                text = "" if who is None else await self._text(origin)
             except ValueError:
                 known = " or ".join(each.value for each in Units)
                 await _refuse(socket, BAD_REQUEST_CLOSE_CODE, f"`{UNITS}` must be {known}.")
@@ -104,12 +115,20 @@ class RosRoutes:
             make = partial(RosChannel, endpoint=endpoint)
             await serve_socket(hub, authenticator, context.budgets, socket, make, RosLine)
 
+    async def _text(self, origin: str) -> str:
+        return (await asyncio.to_thread(self._description.read)).at(origin)
+
     async def _mesh(self, request: Request) -> Response:
         """Answer with a file of the description, to everybody who knows its address."""
-        found = await asyncio.to_thread(self._description.read)
+        key = request.path_params["key"].encode()
+        if not secrets.compare_digest(key, self._description.key.encode()):
+            raise HTTPException(404)
+        try:
+            found = await asyncio.to_thread(self._description.read)
+        except RobotDescriptionError as error:
+            raise HTTPException(404, str(error)) from error
         content = found.files.get(request.path_params["path"])
-        known = secrets.compare_digest(request.path_params["key"].encode(), found.key.encode())
-        if not known or content is None:
+        if content is None:
             raise HTTPException(404)
         suffix = PurePosixPath(request.path_params["path"]).suffix.lower()
         headers = {

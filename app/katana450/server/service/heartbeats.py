@@ -6,10 +6,14 @@ import socket
 import time
 from collections.abc import Callable
 
-from katana450.arm.runtime.readiness import SocketChannel, data_age, readable
+from katana450.arm.runtime.readiness import SocketChannel, ack_age, data_age, readable
 
 KEEPALIVE = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 2}
 """Keepalive of TCP [s, s, probes]. A host that disappears is detected within 3 s."""
+
+MAX_ACK_AGE = 3.0
+"""[s] Age of the newest acknowledgement from which on an open connection counts as lost. The kernel
+sends no probes while data waits for its acknowledgement, so keepalive does not see such a loss."""
 
 
 class LastHeartbeat:
@@ -33,11 +37,15 @@ class LastHeartbeat:
     @property
     def newest(self) -> float:
         """Time of the newest heartbeat [s], on the clock."""
-        return self._clock() if self.open else self._newest
+        return self._clock() if self.open and self._is_connected() else self._newest
 
     def _age(self) -> float:
         """Return the age of the newest message [s]."""
         return 0.0
+
+    def _is_connected(self) -> bool:
+        """Return whether the other host answers."""
+        return True
 
 
 class Arrival(LastHeartbeat):
@@ -63,6 +71,9 @@ class Arrival(LastHeartbeat):
 
     def _age(self) -> float:
         return 0.0 if self._line is None else data_age(self._line)
+
+    def _is_connected(self) -> bool:
+        return self._line is None or ack_age(self._line) < MAX_ACK_AGE
 
 
 def keep_alive(listening: socket.socket) -> None:

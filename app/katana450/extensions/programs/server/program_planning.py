@@ -98,6 +98,8 @@ class Planning:
         """Cancel the planning. The thread ends at its next checkpoint, some milliseconds later."""
         if self.busy:
             self.cancelled = why
+        else:
+            self.note = f"Not run: {why}"
 
     def fits(self, text: str, speed: float, state: State) -> bool:
         """Return whether planning ``text`` at ``speed`` from ``state`` would give this program."""

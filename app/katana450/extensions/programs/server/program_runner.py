@@ -151,7 +151,7 @@ class ProgramRunner(Runner):
             raise LeaseError("Only `run` and `step` begin at a step.")
         self._owner.check_unattended(unattended=unattended)
         planning = self._planner.planning
-        if planning is not None and planning.busy:
+        if planning is not None and (planning.busy or self._planner.will_run):
             self._owner.check_may_steer(participant.person)
             if at is not None:
                 planning.cancel(f"{participant.person.name} runs it from step {at}.")
