@@ -1,4 +1,4 @@
-"""An arm that is no five-axis arm of the family: its kinematics, without plans."""
+"""An arm outside the five-axis family: its kinematics, without plans."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class GeneralArm(Arm):
     """An arm of any number of turning axes, made by `katana450.load`.
 
     `fk`, `ik`, `nearest` and `jacobian` are those of an `Arm`, with n axes in place of five, and
-    with the branches that `method` names. Whatever needs the five-axis family (plans, maps of
-    reachability, scenes) raises RobotDescriptionError, which says so.
+    with the branches that `method` names. Functions that need the five-axis family (plans, maps of
+    reachability, scenes) raise RobotDescriptionError.
 
     Attributes:
         described: the arm in its file.
@@ -170,7 +170,7 @@ def general_arm(urdf: Path, tool: str | None, frame: str) -> GeneralArm | None:
 
 
 def refuse(what: str) -> NoReturn:
-    """Raise InputError: an argument of `load` needs plans, which this arm has not."""
+    """Raise InputError: an argument of `load` needs plans, which this arm does not have."""
     raise InputError(
         f"{what} is for plans, which need a five-axis arm of the family. Load this arm without it."
     )

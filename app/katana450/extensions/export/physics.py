@@ -31,7 +31,7 @@ MAX_FREQUENCY = 400.0
 """[rad/s] Maximum natural frequency of a joint on its drive, so that simulations stay stable."""
 
 MIN_LOAD = 0.01
-"""[N m, N] Least weight for which a drive is made, for joints that carry no mass."""
+"""[N m, N] Minimum weight for which a drive is made, for joints that carry no mass."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ TOOL = "Tool"
 """Name of the viewpoint of the links behind the last axis of an arm."""
 
 MARGIN = 1.06
-"""Ratio of the picture to what fills it."""
+"""Ratio of the picture's size to that of the robot in it."""
 
 
 def views(robot: Robot, values: Mapping[str, float]) -> dict[str, InitialCamera]:

@@ -18,7 +18,7 @@ from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 
 
 class ExactArm(NamedTuple):
-    """A chain without the rounding of its file, and sentences for people on what was changed."""
+    """A chain without the rounding of its file, and notes on what was changed."""
 
     chain: Chain
     notes: tuple[str, ...]
@@ -64,7 +64,7 @@ def exact_arm(described: Chain) -> ExactArm:
     if max(angle, length) <= tolerances.FAMILY_EXACT:
         return ExactArm(chain, ())
     note = (
-        f"Its axes miss right angles, parallels or meeting points by {math.degrees(angle):.2g} deg "
-        f"and {1e3 * length:.2g} mm at most; the nearest exact arm is used."
+        "Its axes deviate from right angles, parallels or meeting points by at most "
+        f"{math.degrees(angle):.2g} deg and {1e3 * length:.2g} mm; the nearest exact arm is used."
     )
     return ExactArm(chain, (note,))

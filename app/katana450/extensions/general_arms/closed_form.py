@@ -255,7 +255,7 @@ class ClosedForm:
 
 
 def validated_poses(T: npt.ArrayLike) -> FloatArray:
-    """Return poses (N, 4, 4) as `se3.validated` each. Raises InputError for the first bad."""
+    """Return poses (N, 4, 4), each as `se3.validated`. Raises InputError for an invalid one."""
     try:
         poses = np.asarray(T, dtype=np.float64)
     except (TypeError, ValueError) as error:

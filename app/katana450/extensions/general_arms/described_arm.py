@@ -31,7 +31,7 @@ class DescribedArm:
         tools: home configuration M, (4, 4) in {S}, of each tool link.
         default_tool: a key of ``tools``.
         T_base_shoulder: (4, 4) frame {S} in the root link [m].
-        notes: sentences for a person on assumptions about the file.
+        notes: sentences about assumptions on the file.
     """
 
     chain: Chain

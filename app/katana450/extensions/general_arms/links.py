@@ -230,7 +230,7 @@ def _normal(
 
     The values are its distance along the axis from `here` [m], its length [m], the twist [rad] and
     its direction (3,). `x` is used where the axes are one line. ``within`` is the angle [rad] and
-    the length [m] that count as none.
+    the length [m] that count as 0.
     """
     across = np.cross(z, z2)
     sine, cosine = float(np.linalg.norm(across)), float(z @ z2)

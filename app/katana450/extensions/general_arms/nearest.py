@@ -21,7 +21,7 @@ from katana450.maths.kinematics.kinematics import Kinematics, SolvedPosture
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 
 POSITION_FIRST = 100.0
-"""Weight of the position beside the orientation where a pose cannot be taken."""
+"""Weight of the position relative to the orientation if a pose cannot be reached."""
 
 AT_LIMIT = 1e-6
 """[rad] Distance from a limit within which a joint counts as held by it."""

@@ -9,8 +9,8 @@ Seeds: the given posture; then those of a fixed table of postures inside the lim
 nearest to the target. A target that no seed reaches gets the posture with the least error.
 
 `follow` moves a posture along with its target. It stays on its branch: it stops before a posture in
-which the arm loses a freedom, where the determinant of the Jacobian changes its sign, and before a
-joint that would have to jump.
+which the arm loses a degree of freedom, where the determinant of the Jacobian changes its sign, and
+before a joint that would have to jump.
 
 Speed: one target at a time is computed on plain floats; numpy solves the 6 equations.
 """
@@ -79,11 +79,11 @@ class SearchState(NamedTuple):
 
 
 class FollowStatus(Enum):
-    """Outcome of `Numerical.follow`, with a sentence for people."""
+    """Outcome of `Numerical.follow`, with its description."""
 
     REACHED = "the target is reached"
-    NEAREST = "the arm comes no nearer; a limit or its reach keeps it"
-    SINGULAR = "the arm is stopped before a posture in which it loses a freedom"
+    NEAREST = "the arm cannot come nearer, because of a limit or its reach"
+    SINGULAR = "the arm is stopped before a posture in which it loses a degree of freedom"
     JUMP = "the arm is stopped because a joint would have to jump"
 
 

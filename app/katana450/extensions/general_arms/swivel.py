@@ -1,4 +1,4 @@
-"""The closed form of seven axes: one joint is locked, the other six are solved, and it is chosen.
+"""The closed form of seven axes: one joint is locked at chosen angles, the other six are solved.
 
 Seven axes take a pose in a curve of postures for each branch. The locked joint is its parameter,
 the swivel. The formulas are those of spherical_wrist.py, on arrays of swivels:
@@ -107,8 +107,8 @@ class SevenAxes:
                 if can_lock(each):
                     return SevenAxes(chain, each, locked, is_reversed)
         return (
-            "with no joint locked do the other six have three axes at one end that meet in one "
-            "point, and beside the rest two that meet or are parallel"
+            "whichever joint is locked, the other six do not have three axes at one end that meet "
+            "in one point, and beside these two that meet or are parallel"
         )
 
     @cached_property

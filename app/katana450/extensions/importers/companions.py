@@ -16,8 +16,8 @@ class Companions:
 
     Attributes:
         used: paths of the files that were read.
-        missing: names of the files that are not there, in the order in which they are named. Those
-            of a path inside the folder are that path.
+        missing: names of the files that are not there, in the order in which they are named. A name
+            that leads to a place inside the folder is its path there.
     """
 
     def __init__(self, files: Mapping[str, bytes] | None = None, main: str = "") -> None:

@@ -100,13 +100,13 @@ class Buffers:
         assert sparse is not None
         kind = COMPONENTS.get(sparse.indices.component_type, "")
         if kind not in ("u1", "<u2", "<u4"):
-            raise self.broken(f"{what} has places of a wrong type")
+            raise self.broken(f"{what} has sparse indices of a wrong type")
         view, offset = sparse.indices.buffer_view, sparse.indices.byte_offset
         places = self._part(view, offset, sparse.count, 1, kind, what).ravel()
         view, offset = sparse.values.buffer_view, sparse.values.byte_offset
         values = self._part(view, offset, sparse.count, rows.shape[1], rows.dtype.str, what)
         if len(places) and int(places.max()) >= len(rows):
-            raise self.broken(f"{what} has a place beyond its end")
+            raise self.broken(f"{what} has a sparse index beyond its end")
         rows = rows.copy()
         rows[places] = values
         return rows
@@ -143,7 +143,7 @@ class Buffers:
         if view.count * view.byte_stride > MAX_VIEW_BYTES:
             raise InputError(
                 f"{self._name} has over {MAX_VIEW_BYTES // 1_000_000} MB in one part when "
-                "unpacked. Save it coarser."
+                "unpacked. Save it with fewer triangles."
             )
         with failures_in_words(self._name):
             import meshopt

@@ -33,7 +33,7 @@ from katana450.maths.geometry.arrays import frozen
 from katana450.maths.planning.checkpoint import checkpoint
 
 CHECK_EVERY = 0.1
-"""[s] Interval of the checks whether the reading was cancelled."""
+"""[s] Interval at which a cancellation is checked."""
 
 MAX_PASSES = 8
 """Maximum number of readings of a file whose companions name further files."""

@@ -11,7 +11,7 @@ Material = tuple[float, float, float, float]
 """Diffuse colour and opacity 0..1."""
 
 PLAIN: Material = (0.8, 0.8, 0.8, 1.0)
-"""A material that says nothing of its colour."""
+"""A material without a colour."""
 
 
 def read_mtl(text: str) -> tuple[dict[str, Material], bool]:

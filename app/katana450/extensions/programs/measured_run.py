@@ -1,4 +1,4 @@
-"""A run of an arm that its driver measures: where it was, beside where it was sent."""
+"""A run of a measured arm: its measurements compared with its setpoints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from katana450.maths.planning.path import point_derivatives
 from katana450.maths.planning.tool_path import ToolPath
 
 MAX_LAG = 1.0
-"""[s] Maximum lag that is looked for."""
+"""[s] Maximum lag in the search."""
 
 COARSE, FINE = 0.01, 0.001
 """[s] Steps of the search for the lag."""
@@ -30,7 +30,7 @@ SMALLEST_MOTION = 1e-3
 """[rad] Motion of the setpoints below which no lag can be found."""
 
 PLACES = 500
-"""Number of intervals of a path among which the nearest place of a measured point is looked for."""
+"""Number of intervals of a path in which the place nearest to a measured point is searched."""
 
 REFINEMENTS = 4
 """Number of Gauss-Newton steps from there. Each reduces the error along the path to a fraction: the
@@ -134,7 +134,7 @@ class MeasuredRun:
     def lag(self) -> float | None:
         """The time [s] by which the measured joints are behind the setpoints, by least squares.
 
-        A constant angle beside them is no lag. None without a motion.
+        A constant offset is not a lag. None without a motion.
         """
         t, q = self.setpoints
         if float(np.ptp(q, axis=0).max()) < SMALLEST_MOTION:

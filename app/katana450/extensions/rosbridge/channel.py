@@ -41,26 +41,26 @@ from katana450.server.web.token_bucket import TokenBucket
 log = logging.getLogger(__name__)
 
 TICK = 0.02
-"""[s] Interval at which goals and streams are continued."""
+"""[s] Interval at which goals and streams are advanced."""
 
 MAX_GOALS = 4
 """Maximum number of goals of one client at a time."""
 
 LEVELS = ("info", "warning", "error", "none")
-"""Levels of status messages, the most talkative first."""
+"""Levels of status messages, from the most to the least verbose."""
 
 REPEAT_SECONDS = 1.0
-"""[s] Time in which the same refusal of the messages of a topic is sent once."""
+"""[s] Time during which an equal refusal of messages of a topic is not repeated."""
 
 
 def status(why: str, op_id: ops.OpId = None, level: str = "error") -> dict[str, Any]:
-    """Return the operation that tells a client ``why``."""
+    """Return the status operation that gives a client the reason ``why``."""
     named = {} if op_id is None else {"id": op_id}
     return {"op": "status", **named, "level": level, "msg": why}
 
 
 class RosLine(WebSocketJsonChannel):
-    """Operations on an accepted websocket. Its end is preceded by a status with the reason."""
+    """Operations on an accepted websocket. A status with the reason is sent before it is closed."""
 
     async def close(self, code: int, why: str) -> None:
         """Send the reason ``why``, and close the websocket."""
@@ -268,7 +268,7 @@ class RosChannel(Channel):
         try:
             ops.read(op.args, NoArguments, "a call of std_srvs/Trigger")
         except InputError as error:
-            # STOP counts all the same.
+            # A stop is executed even if its arguments are invalid.
             if not isinstance(request, requests.Stop):
                 self._respond(op, str(error), result=False)
                 raise
@@ -323,7 +323,7 @@ class RosChannel(Channel):
             self._acting.set()
 
     def _check_goals(self, op: ops.SendActionGoal) -> None:
-        """Raise InputError if another goal is in the way of ``op``; fingers take the newest."""
+        """Raise InputError if another goal conflicts with ``op``; a finger goal never does."""
         if any(goal.id == op.id for goal in self._goals):
             raise InputError(f"There is a goal with the id {op.id!r} already.")
         if len(self._goals) >= MAX_GOALS:
@@ -375,7 +375,7 @@ class RosChannel(Channel):
                 goal.tick()
             except Exception:
                 log.exception("Error in a goal.")
-                goal.cancel("The server met an internal error; see its log.")
+                goal.cancel("The server had an internal error; see its log.")
         self._goals = [goal for goal in self._goals if not goal.ended]
 
     def _ask(self, request: requests.Request) -> answers.Answer:

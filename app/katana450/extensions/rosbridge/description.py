@@ -1,8 +1,8 @@
 """The robot's description as its text in /robot_description, and the meshes that it names.
 
 The meshes are those of the exported package for ROS 2: OBJ files, one for each colour. Their
-addresses hold a secret of this server, because programs that draw load meshes without cookies and
-headers. A client that has received the description can load them.
+addresses hold a secret of this server, because viewers load meshes without cookies and headers. A
+client that has received the description can load them.
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ def _add_options(parser: ArgumentParser) -> None:
         "--foxglove",
         type=_foxglove_port,
         metavar="PORT",
-        help="let Foxglove watch and stop the arm by this port, of this machine alone, without an "
-        "access link; needs the extra `foxglove`",
+        help="let Foxglove watch and stop the arm at this port, from this machine only and without "
+        "an access link; needs the extra `foxglove`",
     )
 
 

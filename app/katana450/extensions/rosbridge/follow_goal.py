@@ -35,7 +35,7 @@ from katana450.server.api import answers
 from katana450.server.service.runner import Runner
 
 PLACE = re.compile(r"^line \d+, (column \d+|[^:]*): ", re.IGNORECASE)
-"""Place in the script with which a reason begins. The client has not written the script."""
+"""Line and column with which a reason begins; removed, because the client has no script."""
 
 _numbers = itertools.count(1)
 
@@ -67,13 +67,13 @@ class FollowGoal(Goal):
             self._goal, chain.names, arm.state.setpoint, time.time()
         )
         if not checked.moves:
-            return self._succeeded("The arm stands there already.")
+            return self._succeeded("The arm is there already.")
         script = checked.script(self._name)
         self.host.ask(Program(text=script, revocations=self._revocations))
         return None
 
     def follow(self) -> Result | None:
-        """Look at the program of the trajectory."""
+        """Continue with the progress of the program; see `Goal.follow`."""
         now = self._progress()
         if now is None:
             return self._canceled("Another program was sent.")
@@ -116,7 +116,7 @@ class FollowGoal(Goal):
         return _result(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, str(error))
 
     def feedback(self) -> RosMessage:
-        """Return where the joints are, and where they should be."""
+        """Return the actual and the desired posture."""
         state = self.host.arm.state
         passed = time_of(self.host.hub.clock() - self._began if self._runs else 0.0)
 

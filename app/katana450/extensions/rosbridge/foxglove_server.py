@@ -1,7 +1,7 @@
 """A live connection of Foxglove: frames, joints and status of the arm, and STOP.
 
 The SDK of Foxglove listens on a port of its own and authenticates nobody, so the port is open to
-this machine alone, and its clients can only watch and stop the arm.
+this machine only, and its clients can only watch and stop the arm.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ INTERVAL = 1.0 / 30.0
 """[s] Interval of the messages."""
 
 MAX_WAITING_MESSAGES = 8
-"""Messages that wait for a slow client; beyond it the oldest are dropped."""
+"""Maximum number of messages that wait for a slow client; the oldest are dropped."""
 
 STATUS = "/katana450/status"
 
 ACTOR = Actor(Person("foxglove", "Foxglove", Role.VIEWER), CommandChannel.WEBSOCKET)
-"""The clients together, as the presser of STOP."""
+"""The actor in whose name the clients press STOP."""
 
 
 class FoxgloveServer:

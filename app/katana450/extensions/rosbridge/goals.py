@@ -66,7 +66,7 @@ class GoalHost:
         return self.hub.present()
 
     def outcome(self, answer: answers.Answer) -> Future[Outcome] | None:
-        """Return the outcome of the command with the ``answer``; None if none is to come."""
+        """Return the outcome of the command with the ``answer``; None if it has none."""
         if not isinstance(answer, answers.Done) or answer.ticket is None:
             return None
         return self.arm.outcome(answer.ticket) if answer.outcome is None else None

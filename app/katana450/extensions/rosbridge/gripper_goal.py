@@ -1,4 +1,4 @@
-"""A goal of GripperCommand: the fingers move to a position, or stop at an object before."""
+"""A goal of GripperCommand: the fingers move to a position, or stop at an object before it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ REACHED = 2e-3
 """[rad or m] Distance from the goal at which it is reached."""
 
 STALL_SECONDS = 0.4
-"""[s] Time without a motion of the fingers after which they stand at something."""
+"""[s] Time without motion after which the fingers count as stopped by an object."""
 
 STILL = 1e-5
-"""[rad or m] ServoMotion that does not count."""
+"""[rad or m] Motion of the fingers up to which they count as at rest."""
 
 
 class GripperGoal(Goal):
@@ -56,7 +56,7 @@ class GripperGoal(Goal):
         return None
 
     def follow(self) -> Result | None:
-        """Look at the fingers. Raises KatanaError if the command is refused."""
+        """Check the fingers; see `Goal.follow`. Raises KatanaError if the command is refused."""
         if why := refusal_of(self._answer, self._outcome):
             raise InputError(why)
         hub, arm = self.host.hub, self.host.arm
@@ -65,7 +65,7 @@ class GripperGoal(Goal):
         state, ticket = arm.state, getattr(self._answer, "ticket", None)
         if ticket is not None and arm.snapshot.ticket < ticket:
             return None
-        # At an object the goal is inside it, by the squeeze.
+        # At an object the goal lies inside it, by the squeeze.
         if abs(state.gripper_goal - state.squeeze - self._command.position) > REACHED:
             return Result(GoalStatus.CANCELED, self._now())
         if abs(state.gripper - self._command.position) <= REACHED:

@@ -35,7 +35,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.interfaces import ArmInterface
 
 SILENT_AFTER = 0.3
-"""[s] Age of the state from which on it is unknown, and the topics of the arm fall silent."""
+"""[s] Age at which the state counts as unknown, and topics of the arm are no longer sent."""
 
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
 """Levels of a diagnostic_msgs/DiagnosticStatus."""

@@ -58,7 +58,7 @@ def call(service: str, raw: msgspec.Raw, description: Callable[[], str]) -> dict
             return {"time": time_of(time.time())}
         case "get_param":
             return {"value": _parameter(given, description)}
-    raise AssertionError(f"{service} is listed and not answered.")
+    raise AssertionError(f"{service} is listed but not implemented.")
 
 
 def _of_type(known: Mapping[str, str], kind: str) -> list[str]:

@@ -22,7 +22,7 @@ from katana450.maths.kinematics.freedoms import pitched_frame
 from katana450.server.api.fields import MAX_ANGULAR_RATE, MAX_LINEAR_RATE
 
 COMMAND_TIMEOUT = 0.1
-"""[s] Time for which a command counts, as ``incoming_command_timeout`` of MoveIt Servo."""
+"""[s] Time for which a command is valid, as ``incoming_command_timeout`` of MoveIt Servo."""
 
 STREAM_GAP = 0.5
 """[s] Pause between two commands from which on the second one begins another motion."""
@@ -43,7 +43,7 @@ class Units(Enum):
 
 @dataclass(frozen=True)
 class Scale:
-    """Speeds of a command without unit at 1.
+    """Speeds that the value 1 of a command without unit stands for.
 
     Attributes:
         linear: of the tool point [m/s].
@@ -68,8 +68,8 @@ def check_fresh(header: GivenHeader, now: float) -> None:
     stamp = header.stamp.seconds
     if stamp and now - stamp > COMMAND_TIMEOUT:
         raise InputError(
-            f"This command was stamped {now - stamp:.2f} s ago and counts for {COMMAND_TIMEOUT:g} "
-            "s. If the clocks differ, leave its stamp zero."
+            f"The stamp of this command is {now - stamp:.2f} s old; the maximum is "
+            f"{COMMAND_TIMEOUT:g} s. If the clocks differ, leave its stamp zero."
         )
 
 
@@ -103,7 +103,7 @@ def tool_rates(
         # Without a minus sign in front of a zero.
         x, y, z = (np.round(R_shoulder_frame.T @ other, 3) + 0.0).tolist()
         raise InputError(
-            f"The arm has five axes and none for {abs(impossible):.3g} rad/s of this rotation, "
+            f"The five axes of the arm cannot make {abs(impossible):.3g} rad/s of this rotation, "
             f"about ({x:.3f}, {y:.3f}, {z:.3f}) in the frame of the command. It can turn the tool "
             "about the tool's own axis (roll) and about the horizontal axis across the arm "
             "(pitch). Set this part of `angular` to 0."

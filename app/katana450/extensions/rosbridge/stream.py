@@ -1,4 +1,4 @@
-"""The stream of one client's twists or rates of joints, which ends when the commands do."""
+"""The stream of one client's twists or joint rates, which ends when its commands end."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class ServoStream:
         state, t = self._hub.present().state, self._hub.clock()
         lead = LEAD * np.abs(self._rates)
         q = self._q + self._rates * (t - self._t)
-        # An arm that is slower, or cannot go on, is not led further and further.
+        # The lead stays bounded if the arm is slower or cannot continue.
         self._q, self._t = np.clip(q, state.setpoint - lead, state.setpoint + lead), t
         request = requests.Servo(
             q=self._q.tolist(), qd=self._rates.tolist(), revocations=self._revocations

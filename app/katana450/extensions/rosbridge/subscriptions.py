@@ -14,7 +14,7 @@ MAX_SUBSCRIPTIONS = 16
 """Maximum number of subscriptions of one client to one topic."""
 
 RETRY_SECONDS = 0.1
-"""[s] Time after which a message that there is not yet is looked for again."""
+"""[s] Time after which a topic that had no message is tried again."""
 
 URGENT = (names.STATE, names.DIAGNOSTICS)
 """Topics that are due at once when a stop begins, is confirmed or is cleared."""
@@ -86,7 +86,7 @@ class Subscriptions:
             del self._due[topic]
             return
         t, interval = self._clock(), min(self._intervals[topic].values())
-        # Late messages are not made up for.
+        # Late messages are not sent twice to catch up.
         self._due[topic] = max(self._due[topic] + interval, t)
 
     def missed(self, topic: str) -> None:

@@ -24,7 +24,7 @@ from katana450.extensions.rosbridge.messages import (
 from katana450.maths.geometry.arrays import FloatArray
 
 MAX_POINTS = 700
-"""Maximum number of points, of which a script of 64 KB has room."""
+"""Maximum number of points, which fit in a script of 64 KB."""
 
 MAX_SECONDS = 3600.0
 """[s] Maximum duration."""
@@ -33,10 +33,10 @@ START_TOLERANCE = 0.02
 """[rad] Distance of a first point at time 0 from the posture of the arm."""
 
 CLOCK_TOLERANCE = 1.0
-"""[s] Difference of a start time from now that counts as difference of the clocks."""
+"""[s] Maximum difference between a start time and now that counts as clock difference."""
 
 STANDS = 1e-6
-"""[rad] ServoMotion that is none."""
+"""[rad] Motion of a joint up to which it counts as at rest."""
 
 MAX_END_RATE = 1e-3
 """[rad/s] Rate of a joint at the end that counts as rest."""

@@ -123,7 +123,7 @@ class Mesh(Answer, frozen=True, kw_only=True):
         text: Summary of the file's content in words.
         size: Size along x, y, z [m].
         triangles: Number of triangles.
-        scale: Scale for ``place``, with which its size is allowed; 1 if it is as it is.
+        scale: Scale for ``place`` that gives an allowed size; 1 if its size is allowed already.
     """
 
     key: str

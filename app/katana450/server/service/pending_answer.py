@@ -44,7 +44,7 @@ ENDS = {
 """The end of a motion by the status of the arm at rest."""
 
 ARRIVED = (REACHED, LIMITED)
-"""Ends of a motion that went as far as the arm can."""
+"""Ends of a motion that came as near to its target as the arm can."""
 
 
 class PendingAnswer:
@@ -67,7 +67,7 @@ class PendingAnswer:
         *,
         fingers: bool = False,
     ) -> None:
-        """Begin to wait for what ``done`` lacks.
+        """Begin to wait for the parts that ``done`` lacks.
 
         ``wait``: maximum duration of the motion [s]; None to answer with the outcome. ``fingers``:
         whether the fingers move, and not the arm.
@@ -98,7 +98,7 @@ class PendingAnswer:
             self._participant.heartbeat.open -= 1
         # Not after a cancellation: the participant then leaves, which stops a moving arm.
         give_back(self._hub, self._participant)
-        # The arm holds where the lease is released: what is asked next includes that.
+        # Releasing the lease makes the arm hold; later queries include that.
         await self._until(lambda: self._hub.present().caught_up, OUTCOME_SECONDS)
         return done
 

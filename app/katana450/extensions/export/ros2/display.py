@@ -152,7 +152,7 @@ def control_launch(package: str, xacro: str, controllers: Sequence[str]) -> str:
 
 
 def rviz_text(robot: Robot) -> str:
-    """Return the configuration of RViz: grid, robot and frames, seen from outside of its bounds."""
+    """Return the configuration of RViz: grid, robot and frames, seen from outside its bounds."""
     low, high = robot.bounds
     x, y, z = (0.5 * (low + high)).tolist()
     return _RVIZ.format(
