@@ -44,7 +44,7 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **HTTP** `POST /api/v{version}/scripts`, `scripts/NAME` | The problems of the text in the body, line by line, and its poses if it has only [these](programs.md#teaching); saves a valid text in the folder. |
 | **HTTP** `POST /api/v{version}/stop?press=NAME` | `stop`, on the main port and on the [port of STOP](access.md#the-port-of-stop), which answers with the stage. `press` makes copies on both count once. |
 | **HTTP** `GET`, `POST /api/v{version}/episodes`, `GET episodes/NUMBER` | The list of [episodes](recording.md#episodes); starts, ends and judges them; the file of one. |
-| **HTTP** `GET /api/v{version}/openapi.json`, `asyncapi.json` | This API as documents for programs: OpenAPI 3.1 of HTTP, AsyncAPI 3.0 of the websocket and the TCP port. Both describe each message with its units, also those of extensions. |
+| **HTTP** `GET /api/v{version}/openapi.json`, `asyncapi.json` | Descriptions of this API for programs: OpenAPI 3.1 for HTTP, AsyncAPI 3.0 for the websocket and the TCP port. Both describe each message with its units, including those of extensions. |
 
 Every request is a heartbeat. If the server requires an access link ([access](access.md)), send the
 token behind its `#` as `Authorization: Bearer TOKEN` or in the `hello`. The server stops a moving arm
@@ -120,7 +120,7 @@ and Simulink connect in the same manner: [simulink](simulink.md).
 ## One line, one motion
 
 A motion request with `wait`, the maximum duration of its motion in seconds (0.1 to 600), is answered when
-the motion has ended. So one line of curl makes one whole motion:
+the motion has ended. So one curl command makes one complete motion:
 
 ```sh
 KEY=$(openssl rand -hex 16)  # a secret that identifies this program
@@ -137,26 +137,26 @@ The field `end` of the answer says how the motion ended, and where the arm is th
 
 | `how` | the motion | HTTP status |
 |---|---|---|
-| `reached` | has reached its target; `steer`: the program is done | 200 |
+| `reached` | reached its target; of `steer`: the program is done | 200 |
 | `limited` | ended as near to the target as the arm can go; `why` and the findings say what limits it | 200 |
 | `contact` | ended before a contact; the target is dropped | 409 |
-| `paused` | waits on its path. A step of `steer` with `step` ends so too | 409 |
-| `stopped` | was ended by STOP, of anybody or of the server itself | 409 |
+| `paused` | waits on its path. So does `steer` with `step` after its step | 409 |
+| `stopped` | was ended by a stop, of any client or of the server itself | 409 |
 | `superseded` | was replaced by another command of the same program | 409 |
 | `lease lost` | ended because another client drives now | 409 |
-| `timeout` | did not end within `wait`; the arm has come to rest and dropped the target, a program is ended | 409 |
+| `timeout` | did not end within `wait`. The arm is at rest and has no target any more; a program is ended | 409 |
 | `failed` | was not possible: no path was found, or the program failed | 409 |
 
-With `curl --fail-with-body` a status of 409 becomes the exit status 22, so lines joined by `&&` end there.
+With `curl --fail-with-body` a status of 409 becomes the exit status 22, so a sequence of commands joined by `&&` ends there.
 
 - While the request is open, its connection counts as the heartbeat. If it closes before the end, for
   example by Ctrl-C, the arm stops and the stop is latched, as when any driver disconnects. A client whose
   machine vanishes without closing is noticed within 3 s. A suspended client is not noticed; `wait` bounds that time.
 - A lease that the request has acquired is released at the end, and nothing moves later. A lease that the
   client held before is kept.
-- The WebSocket and the TCP port take `wait` too, without heartbeats meanwhile. A request with `wait` is
-  answered even without an `id`. At most 8 such requests of a client can be open.
-- Streams (`servo`, `jog`), questions and requests about the lease have no `wait`; with it they are refused.
+- `wait` works on the WebSocket and the TCP port too, and needs no heartbeats until the answer. A request with
+  `wait` is answered even without an `id`. At most 8 such requests of a client can be open.
+- Streams (`servo`, `jog`), queries and requests about the lease have no `wait`; with it they are refused.
 
 Without `wait` the answer comes at once. Then a moving arm stops, or pauses if it is simulated, 0.25 s
 (`--silence`) after the last message of its program, because the driver fell silent.
