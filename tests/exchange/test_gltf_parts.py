@@ -79,7 +79,7 @@ def test_sparse_numbers_replace_others() -> None:
     # Without a buffer all others are 0.
     with pytest.raises(InputError, match="2 degenerate triangles"):
         read(sparse(None, [1, 3]), **files)
-    with pytest.raises(InputError, match="a place beyond its end"):
+    with pytest.raises(InputError, match="a sparse index beyond its end"):
         read(sparse(0, [4]), **files)
     with pytest.raises(InputError, match="beyond its buffer"):
         read(sparse(0, [2], count=3), **files)

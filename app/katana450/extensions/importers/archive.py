@@ -54,8 +54,8 @@ def check_packing(entry: zipfile.ZipInfo) -> None:
     """
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise InputError(
-            f"{entry.filename[:80]} in the .zip is packed by another method than Deflate. Pack it "
-            "as a plain .zip."
+            f"{entry.filename[:80]} in the .zip is compressed by a method other than Deflate. "
+            "Pack it as a plain .zip."
         )
 
 

@@ -232,7 +232,7 @@ def object_name(name: str) -> str:
 
 
 def check_file(data: bytes, file: str, unit: float | None, format: Format) -> None:
-    """Raise InputError for a file that is too large, or a unit that is no length."""
+    """Raise InputError for a file that is too large, or a unit that is not a length."""
     maximum = MAX_ARCHIVE_BYTES if format is Format.ZIP else MAX_FILE_BYTES
     if len(data) > maximum:
         raise InputError(

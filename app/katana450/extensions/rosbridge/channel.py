@@ -341,7 +341,7 @@ class RosChannel(Channel):
 
     def _show_newest(self, key: str, op: dict[str, Any]) -> None:
         if key not in self._newest and len(self._newest) >= MAX_GOALS:
-            # Of a goal that has ended, for a client that reads slowly.
+            # The oldest is of a goal that has ended; the client reads slowly.
             del self._newest[next(iter(self._newest))]
         self._newest[key] = op
         self.wake()

@@ -133,8 +133,8 @@ class KatanaDriver:
         self._was_stopped = stopped
         answer, report = self._answer, self._answer.report
         assert report is not None
-        # Judged here and not by the thread, which a busy machine may delay: no tick of the control
-        # loop takes an arm for connected that has been silent for longer.
+        # Checked in the tick, not in the driver's thread, which a busy machine may delay. So no
+        # tick reports an arm as connected that has been silent for longer.
         connected = report.mode not in (ArmMode.DISCONNECTED, ArmMode.LOST)
         if connected and (silence := self._silence(t)) > MAX_SILENCE:
             note = f"The driver has not heard from the arm for {silence:.1f} s."
