@@ -251,8 +251,8 @@ def test_twist_moves_the_tool_point_until_the_commands_end(server: AppServer) ->
             # 0.25 of 0.4 m/s for a second and the way to rest; pitch and roll are kept.
             assert 0.05 < moved[2] < 0.25
             assert np.abs(moved[:2]).max() < 0.15 * moved[2]
-            # A busy machine delays commands, and the joints brake and start in between.
-            assert after[:3, :3] == pytest.approx(before[:3, :3], abs=0.06)
+            # The joints start and brake one by one, which turns the tool by some degrees.
+            assert after[:3, :3] == pytest.approx(before[:3, :3], abs=0.1)
             state = await client.state()
             assert state["stopped"] is None
             assert state["status"] == "ok"
