@@ -1,0 +1,76 @@
+"""A goal that is followed ends only when its program can no longer run."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from katana450.extensions.rosbridge.follow_goal import FollowGoal
+from katana450.extensions.rosbridge.goals import GoalHost, GoalStatus
+from katana450.extensions.rosbridge.ops import SendActionGoal
+from katana450.server.api import answers
+from katana450.server.service.participants import Participant
+from katana450.server.service.runner import Runner
+from tests.rosbridge.ros_client import FOLLOW, JOINTS, trajectory
+
+AWAY = [0.4, -1.1, 1.4, 0.2, 0.3]
+
+
+class WaitingRunner(Runner):
+    """A runner whose planned program runs in the next tick, if ``waits``."""
+
+    def __init__(self) -> None:
+        self.waits = True
+        self.status = "ready"
+        self.ended: list[str] = []
+        self.name = ""
+
+    def progress(self) -> answers.Progress:
+        # A script has no name until its thread has read it.
+        return answers.Progress(name=self.name, by="A client", status=self.status)
+
+    def runs_for(self, participant: Participant) -> bool:  # noqa: ARG002
+        return self.waits
+
+    def end(self, participant: Participant, why: str) -> None:  # noqa: ARG002
+        self.ended.append(why)
+
+
+@pytest.fixture
+def runner() -> WaitingRunner:
+    return WaitingRunner()
+
+
+@pytest.fixture
+def goal(runner: WaitingRunner) -> FollowGoal:
+    """A goal whose program was told to run, and was planned again because the scene changed."""
+    state = SimpleNamespace(setpoint=np.zeros(5), q=np.zeros(5))
+    arm = SimpleNamespace(state=state, arm=SimpleNamespace(chain=SimpleNamespace(names=JOINTS)))
+    hub: Any = SimpleNamespace(runner=runner, present=lambda: arm)
+    participant: Any = SimpleNamespace()
+    host = GoalHost(hub, participant, lambda _: answers.Done(), lambda _: None, lambda *_: None)
+    args = msgspec.json.encode(trajectory((1.0, AWAY)))
+    op = SendActionGoal(action=FOLLOW, args=msgspec.Raw(args), id="goal 1")
+    found = FollowGoal(host, op)
+    checked: Any = SimpleNamespace(check_path=lambda *_: None)
+    found._checked, found._runs = checked, True
+    return found
+
+
+def test_program_that_runs_with_the_next_tick_is_not_reported_as_cancelled(
+    goal: FollowGoal, runner: WaitingRunner
+) -> None:
+    assert goal.follow() is None
+    runner.waits = False
+    result = goal.follow()
+    assert result is not None
+    assert result.status is GoalStatus.CANCELED
+
+
+def test_cancel_voids_the_run_that_waits(goal: FollowGoal, runner: WaitingRunner) -> None:
+    assert goal.end("The client cancelled it.").status is GoalStatus.CANCELED
+    assert runner.ended == ["The client cancelled it"]
