@@ -160,7 +160,7 @@ const Objects = (() => {
     if (!found.length) {
       // One file of another kind is refused by the server, which lists the kinds it can read.
       if (list.length === 1 && list[0].size) return read(list[0]);
-      return tell("There is no file of an object among these.", true);
+      return tell("None of these files can be read as an object.", true);
     }
     const why = excess(found);
     if (why) return tell(why, true);
