@@ -47,7 +47,7 @@ def runner() -> WaitingRunner:
 
 @pytest.fixture
 def goal(runner: WaitingRunner) -> FollowGoal:
-    """A goal whose program was told to run, and was planned again because the scene changed."""
+    """A goal whose program was started, and was planned again because the scene changed."""
     state = SimpleNamespace(setpoint=np.zeros(5), q=np.zeros(5))
     arm = SimpleNamespace(state=state, arm=SimpleNamespace(chain=SimpleNamespace(names=JOINTS)))
     hub: Any = SimpleNamespace(runner=runner, present=lambda: arm)
