@@ -41,6 +41,17 @@ COUNT_IMAGES = """
 """
 """Script that counts decoded images; the light of the room is one of them."""
 
+GRIPPER = f"{PAN}/upper_arm_link/forearm_link/wrist_link/roll_link/gripper_link"
+
+IN_PICTURE = """(name) => {
+  const { camera, canvas, nodeRefFromName } = window.__viserMutable;
+  const node = nodeRefFromName[name];
+  if (!node) return false;
+  const { x, y } = node.getWorldPosition(camera.position.clone()).project(camera);
+  return Math.abs(x) < 0.85 && Math.abs(y) < 0.85;
+}"""
+"""Script that returns whether the origin of a node is in the picture, away from its edge."""
+
 NOW = "() => Number(document.querySelector('[role=slider]').getAttribute('aria-valuenow'))"
 
 
@@ -125,6 +136,19 @@ def test_page_of_one_pose_has_no_slider(browser: Browser, tmp_path: Path) -> Non
         page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
         assert page.locator("#caption").inner_text() == "katana450: one pose"
         assert not page.locator(TRACK).is_visible()
+    finally:
+        page.close()
+
+
+def test_narrow_picture_shows_the_whole_arm(browser: Browser, tmp_path: Path) -> None:
+    path = tmp_path / "pose.html"
+    zero = ["--pose", "0,0,0,0,0"]
+    assert main(["export", "html", "--out", str(path), *zero]) == 0
+    page = browser.new_page(viewport={"width": 390, "height": 844})
+    try:
+        page.goto(f"{path.as_uri()}?fixedDpr=0.5")
+        page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
+        page.wait_for_function(IN_PICTURE, arg=GRIPPER)
     finally:
         page.close()
 

@@ -41,6 +41,21 @@ PLAYER = """<script>{
 3. The button that plays and pauses has no name for screen readers.
 """
 
+NARROW = """<script>{
+  const FITS = 1.2;
+  const timer = setInterval(() => {
+    const { camera, cameraControl, canvas, nodeRefFromName } = window.__viserMutable ?? {};
+    if (!cameraControl || !canvas.clientHeight || !nodeRefFromName['/arm']) return;
+    clearInterval(timer);
+    const aspect = canvas.clientWidth / canvas.clientHeight;
+    if (aspect < FITS) cameraControl.dollyTo((cameraControl.distance * FITS) / aspect, false);
+  }, 50);
+}</script>"""
+"""Script that looks from farther away in a picture that is narrower than FITS times its height.
+
+The field of view is a vertical angle, so such a picture would cut the robot off at its sides.
+"""
+
 CAPTION = """<style>#caption {{ position: fixed; left: 1em; bottom: 4em; z-index: 2; margin: 0;
   padding: 0.3em 0.7em; border-radius: 0.4em; font: 14px system-ui, sans-serif; color: #1e293b;
   background: rgb(255 255 255 / 80%); pointer-events: none }}</style>
@@ -63,4 +78,4 @@ def titled(page: str, title: str, caption: str) -> str:
             f"viser's page must contain {TITLE} once: install the pinned version of viser."
         )
     shown = CAPTION.format(text=json.dumps(caption).replace("<", "\\u003c"))
-    return page.replace(TITLE, f"<title>{html.escape(title)}</title>{CLEAR}{PLAYER}{shown}")
+    return page.replace(TITLE, f"<title>{html.escape(title)}</title>{CLEAR}{PLAYER}{NARROW}{shown}")
