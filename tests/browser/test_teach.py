@@ -162,6 +162,41 @@ def test_step_and_go_move_to_one_pose_and_never_past_a_stop(sheet: ViserPage, tr
 
 
 @pytest.mark.long
+def test_loop_passes_the_poses_again_and_stop_ends_it(sheet: ViserPage, truth: Truth) -> None:
+    teach(sheet, truth, (20.0, -25.0))
+    box = sheet.page.get_by_role("spinbutton", name="Loop")
+    box.fill("2")
+    box.press("Enter")
+    go_home(sheet, truth)
+    assert _passed(play(sheet, truth)) == [20, -25, 20, -25]
+    box.fill("50")
+    box.press("Enter")
+    press(sheet, "Play")
+
+    def near(turn: float) -> Callable[[], bool]:
+        return lambda: abs(np.degrees(truth.status()["q"][0]) - turn) < 3.0
+
+    for turn in (20.0, -25.0, 20.0):
+        sheet.wait_until(near(turn), f"{turn} degrees", seconds=PLAYED)
+    sheet.page.keyboard.press("Space")
+    truth.wait(mood="stopped")
+    clear_stop(sheet, truth)
+    q = truth.status()["q"]
+    sheet.page.wait_for_timeout(1500)
+    assert truth.status()["q"] == q
+
+
+def _passed(seen: list[tuple[float, int | None]]) -> list[int]:
+    """Return the poses that the arm was at, 20 and -25 degrees, in order."""
+    passed: list[int] = []
+    for turn, _ in seen:
+        for value in (20, -25):
+            if abs(turn - value) < 3.0 and passed[-1:] != [value]:
+                passed.append(value)
+    return passed
+
+
+@pytest.mark.long
 def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> None:
     """A press that waits on its way while the arm is stopped and cleared moves nothing."""
     teach(sheet, truth, (20.0, -25.0))
