@@ -448,9 +448,11 @@ static void read_words(int count, char **words)
 
 int main(int count, char **words)
 {
-    glutInit(&count, words);
+    int name_alone = 1;
     memcpy(start, robot_start, sizeof start);
+    /* Before the screen is opened, so that options are refused without one too. */
     read_words(count, words);
+    glutInit(&name_alone, words);
     memcpy(q, start, sizeof q);
     reset_camera();
     glutInitDisplayMode(GLUT_DOUBLE | GLUT_RGB | GLUT_DEPTH);
