@@ -129,3 +129,14 @@ def test_a_mesh_is_repeated_at_instances() -> None:
 def test_an_unknown_extension_is_reported() -> None:
     shape = read(SQUARE | {"extensionsRequired": ["EXT_smell"]}, **{"a b_bin": DATA})
     assert "Left out: the extension EXT_smell." in shape.text
+
+
+def test_a_node_may_be_shown_at_two_places() -> None:
+    document = json.loads(json.dumps(SQUARE))
+    document["scenes"] = [{"nodes": [1, 2]}]
+    document["nodes"] = [
+        document["nodes"][0],
+        {"children": [0]},
+        {"children": [0], "translation": [0, 0, 1]},
+    ]
+    assert len(read(document, **{"parts__a b_bin": DATA}).faces) == 4

@@ -87,7 +87,7 @@ def test_prototypes_of_prototypes_are_bounded() -> None:
         f"P{i - 1} {{ s IS s }} ] }} }}"
         for i in range(1, 40)
     ]
-    with pytest.raises(InputError, match=r"over 100000 nodes|more than 20000 nodes"):
+    with pytest.raises(InputError, match=r"over 100000 nodes|more than 40000 nodes"):
         read(" ".join(rows) + " P39 { }")
 
 
@@ -96,7 +96,7 @@ def test_prototypes_of_prototypes_are_bounded() -> None:
     [
         ("PROTO P [ field SFBool b ] { } P { ", "ends too early"),
         ("PROTO P [ size 1 ] { }", "'size' is not a part of the interface"),
-        ("PROTO P [ ] { P { } } P { }", "has no triangles. It has P"),
+        ("PROTO P [ ] { P { } } P { }", "has no triangles.* It has P"),
         ("PROTO P [ ] { " * 300, "nested more than 200 deep|nested too deeply"),
         ("PROTO P [ field SFVec3f s a b c ] { }", "expected a number"),
     ],
@@ -130,8 +130,29 @@ def test_prototypes_are_read_from_other_files() -> None:
 def test_missing_worlds_are_named() -> None:
     shape = read('Shape { geometry Box { } } Inline { url "gone.wrl" } Inline { url "http://a/b" }')
     assert "It names files that are not there: gone.wrl, http://a/b. Add them" in shape.text
-    with pytest.raises(InputError, match=r"no triangles. It names files that are not there: a.wrl"):
+    with pytest.raises(InputError, match=r"no triangles.* that are not there: a.wrl"):
         read('Inline { url "a.wrl" }')
+
+
+def test_a_library_shows_its_first_prototype_with_a_surface() -> None:
+    shape = read(f"PROTO Look [ ] {{ Material {{ }} }} {JOINT} PROTO Last [ ] {{ {BOX[16:]} }}")
+    assert sides(shape) == pytest.approx([1.0] * 3)
+    assert "The world is empty and only declares prototypes: this is its 'Joint'" in shape.text
+    # A prototype may also be a geometry.
+    shape = read("PROTO Plate [ field SFVec3f size 3 2 1 ] { Box { size IS size } }")
+    assert sides(shape) == pytest.approx([3.0, 2.0, 1.0])
+    # A world that another one shows stays empty.
+    shape = read(f'{BOX[16:]} Inline {{ url "lib.wrl" }}', lib_wrl=f"{HEADER}\n{JOINT}")
+    assert len(shape.faces) == 12
+    assert "only declares" not in shape.text
+
+
+def test_a_file_of_the_same_name_in_another_folder_is_not_the_file_itself() -> None:
+    shape = read(
+        'Inline { url "a/b.wrl" }',
+        a_b_wrl=f'{HEADER}\nInline {{ url "world.wrl" }} Shape {{ geometry Box {{ }} }}',
+    )
+    assert "not there: a/world.wrl" in shape.text
 
 
 def test_no_file_outside_of_the_upload_is_read() -> None:

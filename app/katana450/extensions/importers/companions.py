@@ -44,7 +44,7 @@ class Companions:
                 posixpath.normpath(posixpath.join(folder, name.replace("\\", "/")))
                 for name in dict.fromkeys((url, unquote(url)))
             ]
-            for path in (*wanted, *(self._alike(path) for path in wanted)):
+            for path in (*wanted, *(self._alike(path, beside) for path in wanted)):
                 if path in self._files:
                     self.used[path] = None
                     return path, self._files[path]
@@ -52,10 +52,14 @@ class Companions:
         self.missing |= dict.fromkeys(names)
         return None
 
-    def _alike(self, path: str) -> str:
-        """Return the only path with the same name in any folder and case; empty without one."""
+    def _alike(self, path: str, beside: str) -> str:
+        """Return the only path with the same name in any folder and case; empty without one.
+
+        Neither the main file nor the one that names it is meant.
+        """
         name = posixpath.basename(path).casefold()
-        found = [each for each in self._files if posixpath.basename(each).casefold() == name]
+        others = self._files.keys() - {self._main, beside}
+        found = [each for each in others if posixpath.basename(each).casefold() == name]
         return found[0] if len(found) == 1 and name else ""
 
 

@@ -1,4 +1,4 @@
-"""The JSON document of a glTF 2.0 file.
+"""The JSON document of a glTF file, in the form of version 2.0.
 
 Source: Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022), and its extensions. Only the
 parts that are read are listed, named as in the specification in snake case.
@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 
 from katana450.errors import InputError
+from katana450.extensions.importers.gltf1_document import chunks1, upgraded
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -193,13 +194,13 @@ class Material(msgspec.Struct, rename="camel"):
 class Asset(msgspec.Struct, rename="camel"):
     """The metadata of the file."""
 
-    version: str
+    version: str | float
 
 
 class Document(msgspec.Struct, rename="camel"):
     """The parts of the JSON document that are read, named as in the specification in snake case."""
 
-    asset: Asset
+    asset: Asset = msgspec.field(default_factory=lambda: Asset("2.0"))
     extensions_required: list[str] = []
     buffers: list[Buffer] = []
     buffer_views: list[BufferView] = []
@@ -212,6 +213,21 @@ class Document(msgspec.Struct, rename="camel"):
     animations: list[Any] = []
 
 
+class Outline(msgspec.Struct):
+    """The parts of a document from which its version is seen."""
+
+    asset: Asset = msgspec.field(default_factory=lambda: Asset(""))
+    nodes: msgspec.Raw = msgspec.Raw(b"[]")
+    scenes: msgspec.Raw = msgspec.Raw(b"[]")
+    meshes: msgspec.Raw = msgspec.Raw(b"[]")
+
+    def version(self) -> str:
+        """Return the version that is given, or the one whose parts have names, or lists."""
+        parts = (self.nodes, self.scenes, self.meshes)
+        named = any(bytes(each).lstrip().startswith(b"{") for each in parts)
+        return str(self.asset.version)[:20] or ("1.0" if named else "2.0")
+
+
 def decoded(data: bytes, name: str) -> tuple[Document, bytes | None]:
     """Return the document of the file ``name``, and the buffer of a .glb; None without one.
 
@@ -219,12 +235,15 @@ def decoded(data: bytes, name: str) -> tuple[Document, bytes | None]:
     """
     content, binary = _chunks(data, name) if data.startswith(b"glTF") else (data, None)
     try:
-        document = msgspec.json.decode(content, type=Document)
+        version = msgspec.json.decode(content, type=Outline).version()
+        if version.startswith("1"):
+            document = msgspec.convert(upgraded(msgspec.json.decode(content), name), Document)
+        elif version.startswith("2"):
+            document = msgspec.json.decode(content, type=Document)
+        else:
+            raise InputError(f"{name} is glTF {version}; glTF 1.0 and 2.0 are read.")
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{name} is corrupt or not glTF 2.0: {error}.") from error
-    if not document.asset.version.startswith("2."):
-        version = document.asset.version[:20]
-        raise InputError(f"{name} is glTF {version}; only glTF 2.0 is supported.")
+        raise InputError(f"{name} is corrupt or not glTF: {error}.") from error
     return document, binary
 
 
@@ -233,8 +252,10 @@ def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
     found: dict[bytes, bytes] = {}
     at = 12
     version, length = struct.unpack_from("<II", data, 4) if len(data) >= at else (2, at)
+    if version == 1:
+        return chunks1(data, name)
     if version != 2:
-        raise InputError(f"{name} is glTF {version}; only glTF 2.0 is supported.")
+        raise InputError(f"{name} is glTF {version}; glTF 1.0 and 2.0 are read.")
     if length > len(data):
         raise InputError(f"{name} is corrupt or not GLB 2.0: it is shorter than its header says.")
     data = data[:length]

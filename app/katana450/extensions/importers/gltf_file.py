@@ -1,4 +1,4 @@
-"""glTF 2.0, as .glb, or as .gltf with buffers in itself or in other files.
+"""glTF, as .glb, or as .gltf with buffers in itself or in other files.
 
 Source: Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022).
 """
@@ -68,14 +68,15 @@ class _File:
         """Return the surface of the default scene."""
         builder = MeshBuilder(self._name)
         waiting = [(root, np.eye(4)) for root in self._roots()]
-        seen: set[int] = set()
+        visits = 0
         while waiting:
             number, T_parent = waiting.pop()
-            if number in seen or len(seen) > MAX_COPIES:
+            visits += 1
+            # A node may be shown at several places, though the standard forbids it.
+            if visits > MAX_COPIES:
                 raise self._buffers.broken(
-                    f"node {number} is used twice, or there are over {MAX_COPIES} nodes"
+                    f"it shows more than {MAX_COPIES} nodes, each counted as often as it is used"
                 )
-            seen.add(number)
             node = self._document.nodes[number]
             with np.errstate(over="ignore", invalid="ignore"):
                 T = T_parent @ node.pose()

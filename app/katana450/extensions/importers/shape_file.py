@@ -178,7 +178,10 @@ def read_shape(
     left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
     if not len(surface.faces):
         without = f" It has {_listed(left_out)}." if left_out else ""
-        raise InputError(f"{file} has no triangles.{without}{_not_there(companions)}")
+        raise InputError(
+            f"{file} has no triangles, and an object needs a surface.{without}"
+            f"{_not_there(companions)}"
+        )
     sides = np.ptp(surface.vertices, axis=0)
     longest = float(sides.max())
     metres, why = _unit(format, longest, unit, reading.unit)
@@ -190,6 +193,7 @@ def read_shape(
     if axis is Up.Y:
         vertices = vertices[:, (0, 2, 1)] * (1.0, -1.0, 1.0)
     text = f"{_size(vertices, surface)}; {why}; {_turned(axis, up)}."
+    text += f" {reading.note}" if reading.note else ""
     if left_out:
         text += f" Left out: {_listed(left_out)}."
     text += _not_there(companions) + _scaled(longest, metres, scale)

@@ -20,7 +20,7 @@ GREY = (204, 204, 204, 255)
 MAX_TRIANGLES = 200_000
 """Maximum number of triangles of a file."""
 
-MAX_COPIES = 20_000
+MAX_COPIES = 40_000
 """Maximum number of nodes of a scene, each counted as often as it is used."""
 
 
@@ -86,12 +86,14 @@ class MeshReading:
         left_out: names of the parts that were not read.
         unit: unit [m], if the file gives it.
         up: axis that points up, y or z, if the file gives it.
+        note: a sentence on a choice that the reader made; empty without one.
     """
 
     surface: MeshSurface
     left_out: tuple[str, ...] = ()
     unit: float | None = None
     up: str | None = None
+    note: str = ""
 
 
 class MeshBuilder:

@@ -71,9 +71,7 @@ class _Reader1(Reader):
             raise self._error(f"nodes are nested more than {MAX_DEPTH} deep")
         if token == "USE":
             used = self._take()
-            if used not in self._nodes:
-                raise self._error(f"{used!r} is used before it is defined")
-            return self._nodes[used]
+            return self._nodes.get(used) or Node1("a node that is used, but not defined")
         name: str | None = None
         if token == "DEF":
             name, token = self._take(), self._take()
@@ -91,6 +89,9 @@ class _Reader1(Reader):
                 raise self._error(f"expected a field or node, not {word!r}")
             else:
                 node.fields[word] = self._values()
+                if self._ahead == "{":
+                    # The value was the kind of a node, which no standard field has.
+                    self._node1(str(node.fields.pop(word)[-1]), depth + 1)
         self._take()
         return node
 

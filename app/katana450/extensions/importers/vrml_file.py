@@ -21,7 +21,7 @@ from katana450.extensions.importers.vrml1_reader import parsed_vrml1
 from katana450.extensions.importers.vrml1_traversal import Traversal
 from katana450.extensions.importers.vrml_flattening import Flattening
 from katana450.extensions.importers.vrml_foreign import ForeignReader, parsed
-from katana450.extensions.importers.vrml_prototypes import Prototype, PrototypeExpansion
+from katana450.extensions.importers.vrml_prototypes import Instance, Prototype, PrototypeExpansion
 from katana450.extensions.importers.vrml_standard import STANDARD
 
 GZIP = b"\x1f\x8b"
@@ -41,7 +41,7 @@ def read_wrl(
     """
     worlds = _Worlds(name, maximum, companions or Companions())
     surface = worlds.read(data, "")
-    return MeshReading(surface, tuple(worlds.left_out))
+    return MeshReading(surface, tuple(worlds.left_out), note=worlds.note)
 
 
 class _Worlds:
@@ -50,6 +50,7 @@ class _Worlds:
     def __init__(self, name: str, maximum: int, companions: Companions) -> None:
         self._name, self._maximum, self._companions = name, maximum, companions
         self.left_out: Counter[str] = Counter()
+        self.note = ""
         self._surfaces: dict[str, MeshSurface] = {}
         self._prototypes: dict[str, ForeignReader] = {}
         self._open: list[str] = []
@@ -67,9 +68,33 @@ class _Worlds:
             self.left_out += reader.left_out
             expansion = PrototypeExpansion(name, lambda prototype: self._external(prototype, path))
             world = tuple(map(expansion.expanded, found))
-            return Flattening(name, self.left_out, self._shown).surface(world)
+            surface = Flattening(name, self.left_out, self._shown).surface(world)
+            # A world that another shows stays as empty as it is.
+            if path or len(surface.faces):
+                return surface
+            return self._sample(reader, expansion, name) or surface
         finally:
             self._open.pop()
+
+    def _sample(
+        self, reader: ForeignReader, expansion: PrototypeExpansion, name: str
+    ) -> MeshSurface | None:
+        """Return the first prototype with a surface, with its default values; None without one.
+
+        A library of prototypes shows nothing by itself.
+        """
+        for prototype in reader.prototypes.values():
+            left_out: Counter[str] = Counter()
+            node = expansion.expanded(Instance(prototype.name, (), None, prototype))
+            surface = Flattening(name, left_out, self._shown).surface((node,))
+            if len(surface.faces):
+                self.left_out += left_out
+                self.note = (
+                    "The world is empty and only declares prototypes: this is its "
+                    f"{prototype.name[:40]!r} with default values."
+                )
+                return surface
+        return None
 
     def _shown(self, urls: tuple[str, ...]) -> MeshSurface | None:
         """Return the surface of the first world of ``urls`` that is there; else None."""

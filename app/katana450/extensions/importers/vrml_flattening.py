@@ -77,7 +77,10 @@ class Flattening:
                 return [(child, T) for child in _nodes(node.get("level"))[:1]]
             case "Shape" | "Inline":
                 pass
-            case kind if kind not in IGNORED_NODES and kind not in MAKERS and kind not in TEXTURES:
+            case kind if kind in MAKERS:
+                # A shape without its node Shape, which most programs show.
+                self._shape(Node("Shape", (("geometry", node),)), T)
+            case kind if kind not in IGNORED_NODES and kind not in TEXTURES:
                 self._left_out[kind] += 1
         return []
 

@@ -7,7 +7,7 @@ from collections import Counter
 
 from katana450.extensions.export.vrml_node import Node, Route, Type, Use, Value
 from katana450.extensions.importers.vrml_prototypes import IS, Instance, Prototype
-from katana450.extensions.importers.vrml_reader import Reader
+from katana450.extensions.importers.vrml_reader import VALUES, Reader
 from katana450.extensions.importers.vrml_standard import STANDARD, TEXTURES
 
 CLOSERS = {"{": "}", "[": "]"}
@@ -57,12 +57,42 @@ class ForeignReader(Reader):
             raise self._error(f"{name!r} is not a name")
         return name
 
+    def _kind(self, name: str) -> str:
+        # The name is left out in DEF Transform { }.
+        return name if self._ahead == "{" else self._take()
+
     def _used(self, node: Node, _name: str) -> Node:
         return node
+
+    def _undefined(self, _name: str) -> Node:
+        self.left_out["nodes that are used, but not defined"] += 1
+        return Node("NULL")
 
     def _again(self, kind: str, field: str) -> None:
         # The last value counts.
         self.left_out[f"the first value of {field} in {kind}"] += 1
+
+    def _bool(self) -> bool:
+        if self._ahead.upper() in WORDS[:2]:
+            return self._take().upper() == "TRUE"
+        return super()._bool()
+
+    def _no_node(self, depth: int) -> Node:
+        # Some programs write numbers, others a list of one node.
+        found: list[Node] = []
+        if self._ahead != "[":
+            self._skip_value(depth)
+        else:
+            self._take()
+            while self._ahead != "]":
+                if self._ahead[:1] in VALUES and self._ahead:
+                    self._skip_value(depth)
+                else:
+                    found += [each for each in (self._node(depth + 1),) if isinstance(each, Node)]
+            self._take()
+        if not found:
+            self.left_out["values in the place of nodes"] += 1
+        return next(iter(found), Node("NULL"))
 
     def _float(self) -> float:
         # Normals are often no numbers; vertices that are used are checked later.
@@ -173,8 +203,14 @@ class ForeignReader(Reader):
                 name = self._new_name()
                 self._named[name] = Node(self._ahead, (), name)
 
-    def _stray(self, kind: str, field: str, depth: int) -> None:
-        if field in ("PROTO", "EXTERNPROTO"):
+    def _stray(self, kind: str, field: str, depth: int) -> list[Node]:
+        if field in ("DEF", "USE") or (self._ahead == "{" and field in STANDARD):
+            node = self._node(depth + 1, field)
+            # A group without the word children.
+            if "children" in self.fields.get(kind, {}) and isinstance(node, Node):
+                return [node]
+            self.left_out[f"a node in {kind}"] += 1
+        elif field in ("PROTO", "EXTERNPROTO"):
             self._prototype(field, depth)
         elif field == "ROUTE":
             self._ends()
@@ -185,9 +221,10 @@ class ForeignReader(Reader):
             self._skip_braces()
             self.left_out[f"{field} in {kind}"] += 1
         elif field[0] in '"[]{}' or not self._skip_value(depth):
-            super()._stray(kind, field, depth)
+            return super()._stray(kind, field, depth)
         else:
             self.left_out[f"{field} of {kind}"] += 1
+        return []
 
     def _skip_value(self, depth: int) -> bool:
         """Skip the value of a field of unknown type; return whether there is one."""
@@ -198,7 +235,7 @@ class ForeignReader(Reader):
             self._take()
             return True
         plain = 0
-        while self._ahead[:1] in '"+-.0123456789' and self._ahead:
+        while self._ahead[:1] in VALUES[1:] and self._ahead:
             self._take()
             plain += 1
         if not plain and self._ahead[:1].isupper():

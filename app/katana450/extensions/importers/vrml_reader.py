@@ -33,6 +33,9 @@ MAX_QUOTED_CHARACTERS = 160
 MAX_DEPTH = 200
 """Maximum nesting of nodes, within the limit of Python's stack."""
 
+VALUES = '["+-.0123456789'
+"""Beginnings of values that are no nodes."""
+
 # Possessive quantifiers, so that a mismatch in an untrusted file fails without backtracking.
 _TOKEN = re.compile(
     r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
@@ -115,21 +118,20 @@ class Reader:
             raise self._error(f"{name!r} is not a name")
         return name
 
-    def _node(self, depth: int) -> Node | Use:
+    def _node(self, depth: int, token: str = "") -> Node | Use:
+        """Return the next node, after its first ``token`` if that is taken already."""
         if depth > MAX_DEPTH:
             raise self._error(f"nodes are nested more than {MAX_DEPTH} deep")
         name: str | None = None
-        token = self._take()
+        token = token or self._take()
         if token == "USE":
             used = self._new_name()
             node = self._named.get(used)
-            if node is None:
-                raise self._error(f"{used!r} is used before it is defined")
-            return self._used(node, used)
+            return self._undefined(used) if node is None else self._used(node, used)
         if token == "DEF":
             name = self._new_name()
             self._define(name)
-            token = self._take()
+            token = self._kind(name)
         kinds = self.fields.get(token)
         if kinds is None:
             node = self._unknown(token, name, depth)
@@ -138,15 +140,18 @@ class Reader:
             return node
         self._expect("{")
         fields: dict[str, Value] = {}
+        strays: list[Node] = []
         while self._ahead != "}":
             field = self._take()
             if field not in kinds:
-                self._stray(token, field, depth)
+                strays += self._stray(token, field, depth)
                 continue
             if field in fields:
                 self._again(token, field)
             fields[field] = self._value(kinds[field], depth)
         self._take()
+        if strays:
+            fields["children"] = (*_nodes(fields.get("children")), *strays)
         node = Node(token, tuple(fields.items()), name)
         if name is not None:
             self._named[name] = node
@@ -157,12 +162,24 @@ class Reader:
             raise self._error(f"{name!r} is defined twice")
         self._named[name] = None
 
+    def _kind(self, _name: str) -> str:
+        """Take the kind of the node with the name ``_name``."""
+        return self._take()
+
     def _used(self, _node: Node, name: str) -> Node | Use:
         return Use(name)
+
+    def _undefined(self, name: str) -> Node:
+        """Return what stands for a node that is used but not defined."""
+        raise self._error(f"{name!r} is used before it is defined")
 
     def _placeholder(self, _kind: Type) -> Value:
         """Parse what stands for a field of a prototype."""
         raise self._error("IS is not supported")
+
+    def _no_node(self, _depth: int) -> Node:
+        """Parse a value in the place of a node."""
+        raise self._error(f"expected a node, not {self._ahead!r}")
 
     def _again(self, kind: str, field: str) -> None:
         """Decide about a field that is given a second time."""
@@ -172,8 +189,8 @@ class Reader:
         """Parse a node that is not in the table."""
         raise self._error(f"the node {kind!r} is not supported")
 
-    def _stray(self, kind: str, field: str, _depth: int) -> None:
-        """Parse a token in the place of a field of a node ``kind``."""
+    def _stray(self, kind: str, field: str, _depth: int) -> list[Node]:
+        """Parse a token in the place of a field of a node ``kind``; return children in it."""
         raise self._error(f"{kind} has no field {field!r}")
 
     def _value(self, kind: Type, depth: int) -> Value:
@@ -181,14 +198,13 @@ class Reader:
             return self._placeholder(kind)
         match kind:
             case Type.NODE:
+                if self._ahead[:1] in VALUES and self._ahead:
+                    return self._no_node(depth)
                 return self._node(depth + 1)
             case Type.NODE_LIST:
                 return tuple(self._items(lambda: self._node(depth + 1)))
             case Type.BOOL:
-                token = self._take()
-                if token not in ("TRUE", "FALSE"):
-                    raise self._error(f"expected TRUE or FALSE, not {token!r}")
-                return token == "TRUE"
+                return self._bool()
             case Type.STRING:
                 return self._string()
             case Type.STRING_LIST:
@@ -241,7 +257,14 @@ class Reader:
         token = self._take()
         if not token.startswith('"'):
             raise self._error(f"expected a text in quotes, not {token!r}")
-        return re.sub(r"\\(.)", r"\1", token[1:-1], flags=re.DOTALL)
+        # Other backslashes are in paths of Windows.
+        return re.sub(r"\\([\"\\])", r"\1", token[1:-1])
+
+    def _bool(self) -> bool:
+        token = self._take()
+        if token not in ("TRUE", "FALSE"):
+            raise self._error(f"expected TRUE or FALSE, not {token!r}")
+        return token == "TRUE"
 
     def _float(self) -> float:
         token = self._take()
@@ -275,3 +298,9 @@ class Reader:
         if node is None or (node.kind, event) not in events:
             raise self._error(f"a route cannot go {which} {token!r}")
         return name, event
+
+
+def _nodes(value: Value | None) -> list[Node | Use]:
+    """Return the nodes in a field."""
+    items = value if isinstance(value, tuple) else (value,)
+    return [each for each in items if isinstance(each, Node | Use)]

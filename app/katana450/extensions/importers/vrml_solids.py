@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node
 from katana450.extensions.importers.surface import MeshSurface, check_triangles, of_polygons
 from katana450.maths.geometry import so3
@@ -24,8 +23,7 @@ ROUND = 32
 def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | None:
     """Return the surface of a geometry node; None for a kind without one, such as lines.
 
-    ``name`` is the name of the file; ``left_out`` counts colours and faces that contradict the
-    rest. Raises InputError for a node that contradicts itself as a whole.
+    ``name`` is the name of the file; ``left_out`` counts what contradicts the rest.
     """
     make = MAKERS.get(node.kind)
     if make is not None and _is_empty(node):
@@ -35,9 +33,12 @@ def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | N
 
 
 def _is_empty(node: Node) -> bool:
-    """Return whether a solid has a side that is not positive."""
-    lengths = [numbers(node, name, (1.0,)) for name in LENGTHS.get(node.kind, ())]
-    return any(bool((each <= 0.0).any()) for each in lengths)
+    """Return whether a solid has no surface: one side may be 0, as of a plate."""
+    if node.kind not in LENGTHS:
+        return False
+    lengths = np.concatenate([numbers(node, name, (1.0,))[:, 0] for name in LENGTHS[node.kind]])
+    radius = node.kind != "Box" and not float(lengths[0]) > 0.0
+    return radius or bool((lengths < 0.0).any()) or int((lengths == 0.0).sum()) > 1
 
 
 def numbers(node: Node, field: str, default: Sequence[float], width: int = 1) -> FloatArray:
@@ -185,9 +186,10 @@ def _grid(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     columns, rows = (int(number(node, f"{axis}Dimension", 0.0)) for axis in "xz")
     height = numbers(node, "height", ())[:, 0]
     if min(columns, rows) < 0 or columns * rows != len(height):
-        raise InputError(
-            f"{name} has an ElevationGrid with another number of heights than declared."
-        )
+        left_out["heights that do not match their grid"] += 1
+        # Heights beyond the grid are of no use, and a grid without all of its heights neither.
+        columns, rows = (columns, rows) if 0 < columns * rows < len(height) else (0, 0)
+        height = height[: columns * rows]
     if min(columns, rows) < 2:
         return of_polygons(np.zeros((0, 3)), np.arange(0), np.arange(0), name)
     x = np.arange(columns) * number(node, "xSpacing", 1.0)
@@ -208,7 +210,7 @@ def _grid(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     return _facing(surface, not flag(node, "ccw"))
 
 
-def _extrusion(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
+def _extrusion(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     square = (1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
     section = numbers(node, "crossSection", square, 2)
     spine = numbers(node, "spine", (0.0, 0.0, 0.0, 0.0, 1.0, 0.0), 3)
@@ -216,7 +218,8 @@ def _extrusion(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     turns = numbers(node, "orientation", (0.0, 0.0, 1.0, 0.0), 4)
     count, rows = len(section), len(spine)
     if count < 2 or rows < 2 or not len(scale) or not len(turns):
-        raise InputError(f"{name} has an Extrusion with too few points.")
+        left_out["Extrusion with too few points"] += 1
+        return MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     check_triangles(2 * (count - 1) * (rows - 1), name)
     frames = _frames(spine)
     points = np.empty((rows, count, 3))
@@ -300,7 +303,7 @@ LENGTHS = {
     "Cylinder": ("radius", "height"),
     "Sphere": ("radius",),
 }
-"""Fields of a solid that must be positive."""
+"""Lengths of a solid, the radius first."""
 
 MAKERS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
     "Box": _box,
