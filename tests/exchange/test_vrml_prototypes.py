@@ -134,6 +134,12 @@ def test_missing_worlds_are_named() -> None:
         read('Inline { url "a.wrl" }')
 
 
+def test_a_shown_file_of_another_format_is_left_out() -> None:
+    shape = read(f'{BOX[16:]} Inline {{ url "b.gltf" }}', **{"b.gltf": "{}"})
+    assert len(shape.faces) == 12
+    assert "Left out: b.gltf, which is not VRML." in shape.text
+
+
 def test_a_library_shows_its_first_prototype_with_a_surface() -> None:
     shape = read(f"PROTO Look [ ] {{ Material {{ }} }} {JOINT} PROTO Last [ ] {{ {BOX[16:]} }}")
     assert sides(shape) == pytest.approx([1.0] * 3)

@@ -7,6 +7,7 @@ left out and reported. A world shows other files of the same upload, and no scri
 
 from __future__ import annotations
 
+import posixpath
 import re
 import zlib
 from collections import Counter
@@ -26,6 +27,9 @@ from katana450.extensions.importers.vrml_standard import STANDARD
 
 GZIP = b"\x1f\x8b"
 """First bytes of a gzip file."""
+
+SUFFIXES = (".wrl", ".wrz")
+"""Suffixes of worlds."""
 
 BUILT_IN = "urn:"
 """Beginning of an address of a prototype that a program has built in."""
@@ -104,6 +108,9 @@ class _Worlds:
         path, data = found
         if path in self._open:
             self.left_out["worlds that show themselves"] += 1
+            return None
+        if not path.lower().endswith(SUFFIXES):
+            self.left_out[f"{posixpath.basename(path)}, which is not VRML"] += 1
             return None
         if path not in self._surfaces:
             self._surfaces[path] = self.read(data, path)
