@@ -143,14 +143,25 @@ def test_a_shown_file_of_another_format_is_left_out() -> None:
 def test_a_library_shows_its_first_prototype_with_a_surface() -> None:
     shape = read(f"PROTO Look [ ] {{ Material {{ }} }} {JOINT} PROTO Last [ ] {{ {BOX[16:]} }}")
     assert sides(shape) == pytest.approx([1.0] * 3)
-    assert "The world is empty and only declares prototypes: this is its 'Joint'" in shape.text
+    assert "The world shows nothing at first: this is its prototype 'Joint'." in shape.text
     # A prototype may also be a geometry.
     shape = read("PROTO Plate [ field SFVec3f size 3 2 1 ] { Box { size IS size } }")
     assert sides(shape) == pytest.approx([3.0, 2.0, 1.0])
     # A world that another one shows stays empty.
     shape = read(f'{BOX[16:]} Inline {{ url "lib.wrl" }}', lib_wrl=f"{HEADER}\n{JOINT}")
     assert len(shape.faces) == 12
-    assert "only declares" not in shape.text
+    assert "at first" not in shape.text
+
+
+def test_what_a_switch_hides_is_read_if_nothing_else_is_there() -> None:
+    hidden = "Switch { choice [ Shape { geometry Box { } } Shape { geometry Sphere { } } ] }"
+    shape = read(hidden)
+    assert sides(shape) == pytest.approx([2.0] * 3)
+    assert len(shape.faces) == 12
+    assert "The world shows nothing at first: this is what a Switch hides." in shape.text
+    assert len(read(f"{hidden} {BOX[16:]}").faces) == 12
+    shape = read(f"PROTO P [ field SFInt32 n -1 ] {{ {hidden} }}")
+    assert "this is its prototype 'P' with what a Switch hides." in shape.text
 
 
 def test_a_file_of_the_same_name_in_another_folder_is_not_the_file_itself() -> None:

@@ -76,28 +76,37 @@ class _Worlds:
             # A world that another shows stays as empty as it is.
             if path or len(surface.faces):
                 return surface
-            return self._sample(reader, expansion, name) or surface
+            return self._sample(world, reader, expansion, name) or surface
         finally:
             self._open.pop()
 
     def _sample(
-        self, reader: ForeignReader, expansion: PrototypeExpansion, name: str
+        self,
+        world: tuple[Node, ...],
+        reader: ForeignReader,
+        expansion: PrototypeExpansion,
+        name: str,
     ) -> MeshSurface | None:
-        """Return the first prototype with a surface, with its default values; None without one.
+        """Return a surface for a world that shows nothing; None if it has none.
 
-        A library of prototypes shows nothing by itself.
+        This is its first prototype with a surface, with default values, since a library of
+        prototypes shows nothing by itself. Or what a Switch hides at first.
         """
-        for prototype in reader.prototypes.values():
-            left_out: Counter[str] = Counter()
-            node = expansion.expanded(Instance(prototype.name, (), None, prototype))
-            surface = Flattening(name, left_out, self._shown).surface((node,))
-            if len(surface.faces):
-                self.left_out += left_out
-                self.note = (
-                    "The world is empty and only declares prototypes: this is its "
-                    f"{prototype.name[:40]!r} with default values."
-                )
-                return surface
+        samples: dict[str, tuple[Node, ...]] = {"": world}
+        for hidden in (False, True):
+            for each in ("", *reader.prototypes):
+                if each not in samples:
+                    instance = Instance(each, (), None, reader.prototypes[each])
+                    samples[each] = (expansion.expanded(instance),)
+                left_out: Counter[str] = Counter()
+                found = Flattening(name, left_out, self._shown, hidden).surface(samples[each])
+                if len(found.faces):
+                    self.left_out |= left_out
+                    parts = [f"its prototype {each[:40]!r}"] if each else []
+                    parts += ["what a Switch hides"] if hidden else []
+                    shown = " with ".join(parts)
+                    self.note = f"The world shows nothing at first: this is {shown}."
+                    return found
         return None
 
     def _shown(self, urls: tuple[str, ...]) -> MeshSurface | None:

@@ -29,11 +29,15 @@ Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 class Flattening:
     """A traversal of the visible nodes, with the pose of each."""
 
-    def __init__(self, name: str, left_out: Counter[str], shown: Shown) -> None:
+    def __init__(
+        self, name: str, left_out: Counter[str], shown: Shown, hidden: bool = False
+    ) -> None:
         """Prepare the file ``name``. ``left_out`` counts the parts that are not read.
 
-        ``shown`` returns the surface of another world.
+        ``shown`` returns the surface of another world. With ``hidden``, a Switch that shows nothing
+        shows its first choice.
         """
+        self._hidden = hidden
         self._name, self._left_out, self._shown_file = name, left_out, shown
         self._builder = MeshBuilder(name)
         self._surfaces: dict[int, MeshSurface | None] = {}
@@ -71,6 +75,7 @@ class Flattening:
                 return [(child, T_children) for child in _nodes(node.get("children"))]
             case "Switch":
                 chosen = int(number(node, "whichChoice", -1.0))
+                chosen = max(chosen, 0) if self._hidden else chosen
                 choice = _nodes(node.get("choice"))
                 return [(choice[chosen], T)] if 0 <= chosen < len(choice) else []
             case "LOD":
