@@ -47,11 +47,13 @@ def raise_priority() -> None:
 
 
 def reset_priority() -> None:
-    """Give this process the normal priority, whatever the priority of its parent."""
+    """Give this process the normal priority, where the system allows it."""
     if sys.platform == "win32":
         _set_priority_class(NORMAL_CLASS)
     else:
-        os.setpriority(os.PRIO_PROCESS, 0, 0)
+        # A person without rights cannot raise what was started by ``nice``.
+        with suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, 0)
 
 
 def lower_priority() -> None:

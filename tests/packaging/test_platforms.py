@@ -157,6 +157,17 @@ def test_priorities_on_windows(windows: list[tuple[str, tuple[Any, ...]]]) -> No
     ]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has classes of priority")
+def test_process_that_was_started_by_nice_keeps_its_priority() -> None:
+    program = (
+        "import os; from katana450.platform_support import reset_priority; os.nice(5); "
+        "os.geteuid() or os.setuid(65534); reset_priority(); print(os.getpriority(0, 0))"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert int(done.stdout) > 0
+
+
 @pytest.mark.usefixtures("windows")
 def test_windows_has_no_limits() -> None:
     platform_support.limit_resources(1, 1)
