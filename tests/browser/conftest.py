@@ -17,6 +17,7 @@ from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, prepare
+from tests.browser.shared_server import SharedServer
 
 THREAD_SECONDS = 5.0
 ARTEFACTS = Path(__file__).resolve().parents[2] / "test-artefacts"
@@ -95,10 +96,17 @@ def open_page(windows: Windows) -> Iterator[OpenPage]:
         yield open_page
 
 
+@pytest.fixture(scope="package")
+def shared_server() -> Iterator[SharedServer]:
+    """Return the server of the modules of this folder."""
+    with SharedServer() as shared_server:
+        yield shared_server
+
+
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
+def server(shared_server: SharedServer) -> AppServer:
+    """Return the server in the state of a new one."""
+    return shared_server.as_new()
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +46,6 @@ VIOLATIONS = """async () => {
         .map(({ id, nodes }) => [id, nodes.map((each) => [each.html, each.failureSummary])]);
 }"""
 """Script that returns the critical and serious findings of axe-core."""
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 def controls(page: ViserPage, tab: str) -> dict[str, Any]:

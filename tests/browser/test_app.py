@@ -105,12 +105,6 @@ class Robot:
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture(scope="module")
 def window(server: AppServer, windows: Windows) -> Iterator[Robot]:
     with windows.open(server.url, nodes=("/arm", MOVE)) as page:
         yield Robot(page)

@@ -30,12 +30,6 @@ ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture(scope="module")
 def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
     """Return a window with the open folder of the branches."""
     with windows.open(server.url, nodes=("/arm", MOVE)) as page:

@@ -15,12 +15,6 @@ from tests.browser.server import AppServer
 MOVE = "/target/move"
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
 @pytest.fixture
 def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
     with windows.open(server.url, nodes=("/arm", MOVE)) as page:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -57,12 +56,6 @@ NO_STORAGE = """for (const each of ["localStorage", "sessionStorage"])
     Object.defineProperty(window, each, {get() {
         throw new DOMException("No storage in this window.", "SecurityError");
     }});"""
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 @pytest.fixture

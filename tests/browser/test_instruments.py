@@ -39,12 +39,6 @@ SIZES = {"phone": (390, 844), "tablet": (820, 1180), "desk": (1440, 900)}
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture(scope="module")
 def truth(server: AppServer) -> Truth:
     return Truth(server)
 

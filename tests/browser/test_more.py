@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
@@ -13,12 +12,6 @@ import pytest
 from tests.browser.conftest import OpenPage
 from tests.browser.server import AppServer
 from tests.browser.session import Truth, bar
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 @pytest.mark.long

@@ -24,12 +24,6 @@ PLANNED = 60.0
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture(scope="module")
 def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
     with windows.open(server.url, nodes=("/arm", "/target/move")) as page:
         page.open_tab("Programs")

@@ -25,12 +25,6 @@ ABOVE = 120.0
 """Height above the full sheet for the buttons that lie over the scene [px]."""
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
 @pytest.fixture
 def phone(server: AppServer, open_page: OpenPage) -> Iterator[ViserPage]:
     """Return a phone in portrait, whose person drives."""

@@ -83,12 +83,6 @@ NIGHT = "rgb(20, 24, 29)"
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture(scope="module")
 def desk(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
     """Return a window with a mouse, which has the light theme first."""
     with windows.open(server.url, nodes=("/arm", MOVE), window=WIDE, own_camera=True) as page:

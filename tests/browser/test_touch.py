@@ -38,12 +38,6 @@ INK = """(map) => {
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
-@pytest.fixture(scope="module")
 def arm(server: AppServer) -> Iterator[Client]:
     """Return a program that drives, with a rod that stands between the open fingers."""
     x, y = ROD_AT

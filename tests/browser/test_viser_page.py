@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.resources import STATIC
 from tests.browser.camera import Camera
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import COARSE, ViserPage
 from tests.browser.server import AppServer
+from tests.browser.tapped_page import script
 from tests.browser.viser_parts_app import EYE
 from tests.viser_bridge.parts import part
 
@@ -22,41 +22,6 @@ APP = (sys.executable, str(Path(__file__).with_name("viser_parts_app.py")), "--p
 NODES = ("/box", "/floor")
 CAMERA = Camera((1.5, -0.5, 0.75), (0.0, 0.0, 0.25))
 PORTRAIT = (390, 844)
-
-TAPPED = """
-    Viser.forgoCode();
-    const style = new CSSStyleSheet();
-    style.replaceSync(Viser.STEADY);
-    document.adoptedStyleSheets.push(style);
-    window.tapped = { sends: [], views: [], choices: [], sets: [], connected: 0, replayed: 0,
-                      painted: new Map(), controls: new Map(), withheld: null };
-    Viser.tap({
-        server(address, line) {
-            Object.assign(tapped, { address, line });
-            return address;
-        },
-        sends(message) {
-            tapped.sends.push(message.type);
-            if (Viser.viewOf(message)) tapped.views.push(Viser.viewOf(message));
-            if (Viser.choiceOf(message)) tapped.choices.push(Viser.choiceOf(message));
-            return message.type !== tapped.withheld;
-        },
-        connected: () => (tapped.connected += 1),
-        hears(messages) {
-            Viser.keepControls(tapped.controls, messages);
-            tapped.replayed += Viser.replayed(messages);
-            const [position, target] = Viser.viewsIn(messages);
-            if (position && target) tapped.sets.push([position, target]);
-            for (const each of Viser.paint(structuredClone(messages), { sky: "", dark: false }))
-                tapped.painted.set(each.type, messages.find(({ type }) => type === each.type));
-        },
-    });
-    window.Viser = Viser;
-"""
-
-
-def script(more: str = "") -> str:
-    return f"{(STATIC / 'viser.js').read_text(encoding='utf-8')}\n{TAPPED}\n{more}"
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Fixtures: the server of a test module, and a program that drives its arm."""
+"""Fixtures: the server of the test modules, and a program that drives its arm."""
 
 from __future__ import annotations
 
@@ -9,13 +9,20 @@ import pytest
 from katana450.client import Client, connect
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
+from tests.browser.shared_server import SharedServer
+
+
+@pytest.fixture(scope="package")
+def shared_server() -> Iterator[SharedServer]:
+    """Return the server of the modules of this folder, which also accepts JSON lines."""
+    with SharedServer((*APP, "--lines", "0")) as shared_server:
+        yield shared_server
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    """Start a server that also accepts JSON lines."""
-    with AppServer((*APP, "--lines", "0")) as server:
-        yield server
+def server(shared_server: SharedServer) -> AppServer:
+    """Return the server in the state of a new one."""
+    return shared_server.as_new()
 
 
 @pytest.fixture

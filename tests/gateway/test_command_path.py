@@ -7,10 +7,7 @@ an unchanged ticket proves that none got through.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
 from typing import Any
-
-import pytest
 
 from katana450.client import aconnect
 from katana450.client.asynchronous import AsyncClient
@@ -24,12 +21,6 @@ FAR = [1.2, 0.0, 0.5]
 
 SETTLED = 0.3
 """Time [s] in which the server has handled all messages and shown their effects."""
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 async def start(peer: Peer, name: str = HANDLE) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -19,12 +18,6 @@ steps:
   - joints: [100, -60, 85, 8, 0]
   - joints: [-100, -60, 85, 8, 0]
 """
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 def state_of(server: AppServer) -> dict[str, Any]:

@@ -17,15 +17,19 @@ from katana450.maths.kinematics.tool import ToolTarget
 from tests.browser.server import ROOT, AppServer
 from tests.gateway import octave
 
-OCTAVE = octave.find()
+
+@pytest.fixture(scope="module")
+def octave_path() -> str:
+    """Return the path of Octave; skip the tests where it is missing."""
+    # Found here and not when this file is read, as it is by each process of `make test`.
+    return octave.find() or pytest.skip(octave.MISSING)
 
 
-def output_of(server: AppServer, script: str) -> dict[str, Any]:
+def output_of(octave_path: str, server: AppServer, script: str) -> dict[str, Any]:
     """Return the output of a script of examples/octave."""
-    assert OCTAVE is not None
     found = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
     assert found is not None
-    command = [OCTAVE, "--quiet", "--path", str(ROOT / "examples" / "octave")]
+    command = [octave_path, "--quiet", "--path", str(ROOT / "examples" / "octave")]
     done = subprocess.run(
         [*command, "--eval", f"port = {found[1]}; {script}"],
         capture_output=True,
@@ -49,9 +53,10 @@ def check_kinematics(arm: MountedArm, angles: list[float], asked: list[list[floa
 
 
 @pytest.mark.long
-@pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
-def test_octave_follows_the_circle_of_the_paper(arm: MountedArm, server: AppServer) -> None:
-    output = output_of(server, "circle")
+def test_octave_follows_the_circle_of_the_paper(
+    arm: MountedArm, server: AppServer, octave_path: str
+) -> None:
+    output = output_of(octave_path, server, "circle")
     # Both compute the tip at the start, each by its own kinematics.
     assert output["start_error_mm"] < 1e-11
     check_kinematics(arm, output["angles"], output["asked"])
@@ -60,11 +65,10 @@ def test_octave_follows_the_circle_of_the_paper(arm: MountedArm, server: AppServ
     assert output["largest_error_mm"] < 100.0
 
 
-@pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
 def test_octave_turns_the_vrml_world_by_name_and_reads_it_back(
-    arm: MountedArm, server: AppServer
+    arm: MountedArm, server: AppServer, octave_path: str
 ) -> None:
-    output = output_of(server, "places = 6; circle_by_name")
+    output = output_of(octave_path, server, "places = 6; circle_by_name")
     assert len(output["angles"]) == 6
     check_kinematics(arm, output["angles"], output["asked"])
     np.testing.assert_allclose(output["heard"], output["asked"], rtol=0, atol=1e-9)

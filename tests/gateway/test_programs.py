@@ -32,12 +32,6 @@ steps:
 """
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
 @pytest.fixture
 def arm(server: AppServer) -> Iterator[Client]:
     with connect(server.url, "Test") as arm:

@@ -25,12 +25,6 @@ steps:
 END = np.deg2rad((12.0, -68.0, 85.0, 8.0, 0.0))
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
 @pytest.fixture
 def arm(server: AppServer) -> Iterator[Client]:
     with connect(server.url, "Test") as arm:

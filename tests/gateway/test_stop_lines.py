@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import socket
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,12 +21,6 @@ from tests.gateway.test_isolation import under_way
 
 HELLO = b'{"do": "hello", "name": "Cell"}\n'
 STOP = b'{"do": "stop"}\n'
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 def answer(server: AppServer, *parts: bytes) -> dict[str, str]:

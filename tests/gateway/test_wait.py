@@ -7,8 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -20,9 +19,14 @@ from tests.browser.server import ATTENTIVE_APP, SIMULATION_APP, AppServer
 from tests.gateway.client import ask
 from tests.gateway.lines import post, speaking
 from tests.gateway.postures import READY, THERE
-
-# Fraction of full speed, at which motions last longer than the timeout for heartbeats.
-SLOW = 0.2
+from tests.gateway.waiting import (
+    check_nothing_moves_later,
+    moving,
+    slow,
+    under_way,
+    wait_for,
+    wall,
+)
 
 
 @pytest.fixture(scope="module")
@@ -41,57 +45,6 @@ def watcher(server: AppServer) -> Iterator[Client]:
         watcher.go(requests.Home())
         watcher.ask(requests.ReleaseLease())
         yield watcher
-
-
-def slow(watcher: Client) -> None:
-    """Make motions slow."""
-    watcher.ask(requests.Speed(value=SLOW))
-    watcher.ask(requests.ReleaseLease())
-
-
-@contextmanager
-def moving(server: AppServer, watcher: Client, **request: Any) -> Iterator[Future[tuple[int, Any]]]:
-    """Send a request with `wait` over HTTP; enter the block once the arm moves."""
-    slow(watcher)
-    with ThreadPoolExecutor(1) as pool:
-        asked = {"do": "joints", "q": THERE.tolist(), "wait": 30} | request
-        answer = pool.submit(lambda: post(server, **asked))
-        wait_for(watcher, under_way)
-        yield answer
-
-
-def wait_for(watcher: Client, true: Any, seconds: float = 5.0) -> answers.State:
-    end = time.monotonic() + seconds
-    while not true(now := watcher.query(answers.State)):
-        assert time.monotonic() < end, now
-        time.sleep(0.02)
-    return now
-
-
-@contextmanager
-def wall(watcher: Client, place: tuple[float, float, float], size: list[float]) -> Iterator[None]:
-    """Place a box in the base frame [m] inside the block."""
-    x, y, z = place
-    T = ((1.0, 0.0, 0.0, x), (0.0, 1.0, 0.0, y), (0.0, 0.0, 1.0, z), (0.0, 0.0, 0.0, 1.0))
-    watcher.ask(requests.Place(name="wall", T=T, shape=requests.Shape.BOX, size=size))
-    watcher.ask(requests.ReleaseLease())
-    yield
-    watcher.ask(requests.Remove(name="wall"))
-    watcher.ask(requests.ReleaseLease())
-
-
-def under_way(now: answers.State) -> bool:
-    """Return whether the arm moves indeed; ``moving`` includes commands that wait."""
-    return (now.tool_speed or 0.0) > 0.01
-
-
-def check_nothing_moves_later(watcher: Client) -> None:
-    """Check that the arm rests, has dropped its target, and stays where it is."""
-    before = wait_for(watcher, lambda now: not now.moving)
-    time.sleep(0.5)
-    after = watcher.query(answers.State)
-    assert after.q == before.q == after.goal
-    assert after.holder is None
 
 
 @pytest.mark.parametrize(

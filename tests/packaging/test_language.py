@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -43,15 +44,23 @@ def python_files() -> Iterator[Path]:
         yield from sorted((ROOT / folder).rglob("*.py"))
 
 
-def texts_of(source: str) -> Iterator[tuple[int, str]]:
+@cache
+def nodes_of(file: Path) -> tuple[ast.AST, ...]:
+    """Return the texts of a file, and the nodes that can have a docstring."""
+    kinds = ast.Constant | ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+    nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+    return tuple(node for node in nodes if isinstance(node, kinds))
+
+
+def texts_of(file: Path) -> Iterator[tuple[int, str]]:
     """Return docstrings and texts with at least two words, each with its line."""
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes_of(file):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
             yield node.lineno, node.value
 
 
-def docstrings_of(source: str) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(ast.parse(source)):
+def docstrings_of(file: Path) -> Iterator[tuple[int, str]]:
+    for node in nodes_of(file):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             text = ast.get_docstring(node)
             if text:
@@ -71,7 +80,7 @@ def test_docstrings_begin_with_a_verb_or_a_noun() -> None:
     wrong = [
         f"{file.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
         for file in python_files()
-        for line, text in docstrings_of(file.read_text(encoding="utf-8"))
+        for line, text in docstrings_of(file)
         if text.split()[0].strip(",.:") in OPENINGS
     ]
     assert not wrong, f"{len(wrong)} docstrings\n" + "\n".join(wrong)
@@ -82,7 +91,7 @@ def test_texts_in_code_avoid_the_words_on_the_list() -> None:
         f"{file.relative_to(ROOT)}:{line}: {advice}"
         for file in python_files()
         if file != Path(__file__)
-        for line, text in texts_of(file.read_text(encoding="utf-8"))
+        for line, text in texts_of(file)
         for advice in advice_on(text)
     ]
     assert not wrong, f"{len(wrong)} texts\n" + "\n".join(wrong)

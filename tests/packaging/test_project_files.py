@@ -12,6 +12,9 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 
+MAX_LINES = 400
+"""Maximum length of a file, with comments and docstrings."""
+
 SCHEMAS = {
     "github-workflows": ".github/workflows/*.yml",
     "github-issue-forms": ".github/ISSUE_TEMPLATE/[!c]*.yml",
@@ -41,6 +44,14 @@ def test_workflows_call_targets_of_make() -> None:
         steps = [step.get("run", "") for job in jobs.values() for step in job["steps"]]
         called = {step.split()[1] for step in steps if step.startswith("make ")}
         assert called <= targets, file.name
+
+
+def test_python_files_have_at_most_400_lines() -> None:
+    folders = ("app", "benchmarks", "docs", "examples", "robot_description", "tests")
+    files = [file for folder in folders for file in (ROOT / folder).rglob("*.py")]
+    assert len(files) > 1000
+    lines = {file: file.read_bytes().count(b"\n") for file in files}
+    assert not {str(file): count for file, count in lines.items() if count > MAX_LINES}
 
 
 def test_version_has_an_entry_in_the_changelog_with_its_date() -> None:

@@ -15,7 +15,7 @@ from tests.packaging.conftest import BROKEN
 LINE = '{"q": [0, 0, 0, 0, 0]}\n'
 
 
-@pytest.fixture(params=["app.py", "app/__init__.py"])
+@pytest.fixture(params=["app.py", pytest.param("app/__init__.py", marks=pytest.mark.long)])
 def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """Return the folder of a user who works there and has files with our old names."""
     for name in (request.param, "static/__init__.py", "robot_description/__init__.py"):

@@ -38,6 +38,15 @@ def path(request: pytest.FixtureRequest) -> Path:
     return Path(request.param)
 
 
+ONE_AT_FIRST = pytest.mark.parametrize(
+    "path",
+    [PINCHER, pytest.param(YOUBOT, marks=pytest.mark.long)],
+    ids=lambda path: path.stem,
+    indirect=True,
+)
+"""Mark of tests that start processes: `make test` runs them with one arm."""
+
+
 @pytest.fixture
 def other(path: Path) -> MountedArm:
     return load(path).require_arm()
@@ -146,12 +155,14 @@ def test_links_without_shapes_are_drawn_as_rods() -> None:
     assert "tip" in robot.moving
 
 
+@ONE_AT_FIRST
 def test_it_is_served(path: Path) -> None:
     with AppServer((*APP, "--urdf", str(path))) as server:
         assert server.running
         assert "Traceback" not in server.output
 
 
+@ONE_AT_FIRST
 def test_kinematics_are_answered_line_by_line(path: Path, other: MountedArm) -> None:
     def ask(command: str, request: object, *options: str) -> dict[str, object]:
         done = subprocess.run(

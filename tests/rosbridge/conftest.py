@@ -1,4 +1,4 @@
-"""Fixture: the server of a test module."""
+"""Fixture: the server of the test modules."""
 
 from __future__ import annotations
 
@@ -7,10 +7,17 @@ from collections.abc import Iterator
 import pytest
 
 from tests.browser.server import APP, AppServer
+from tests.browser.shared_server import SharedServer
+
+
+@pytest.fixture(scope="package")
+def shared_server() -> Iterator[SharedServer]:
+    """Return the server of the modules, which stops an arm whose driver falls silent."""
+    with SharedServer(APP) as shared_server:
+        yield shared_server
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    """Start a server, which stops an arm whose driver falls silent."""
-    with AppServer(APP) as server:
-        yield server
+def server(shared_server: SharedServer) -> AppServer:
+    """Return the server in the state of a new one."""
+    return shared_server.as_new()

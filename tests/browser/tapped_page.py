@@ -1,0 +1,41 @@
+"""The script that records what static/viser.js sees in a page of viser."""
+
+from __future__ import annotations
+
+from katana450.resources import STATIC
+
+TAPPED = """
+    Viser.forgoCode();
+    const style = new CSSStyleSheet();
+    style.replaceSync(Viser.STEADY);
+    document.adoptedStyleSheets.push(style);
+    window.tapped = { sends: [], views: [], choices: [], sets: [], connected: 0, replayed: 0,
+                      painted: new Map(), controls: new Map(), withheld: null };
+    Viser.tap({
+        server(address, line) {
+            Object.assign(tapped, { address, line });
+            return address;
+        },
+        sends(message) {
+            tapped.sends.push(message.type);
+            if (Viser.viewOf(message)) tapped.views.push(Viser.viewOf(message));
+            if (Viser.choiceOf(message)) tapped.choices.push(Viser.choiceOf(message));
+            return message.type !== tapped.withheld;
+        },
+        connected: () => (tapped.connected += 1),
+        hears(messages) {
+            Viser.keepControls(tapped.controls, messages);
+            tapped.replayed += Viser.replayed(messages);
+            const [position, target] = Viser.viewsIn(messages);
+            if (position && target) tapped.sets.push([position, target]);
+            for (const each of Viser.paint(structuredClone(messages), { sky: "", dark: false }))
+                tapped.painted.set(each.type, messages.find(({ type }) => type === each.type));
+        },
+    });
+    window.Viser = Viser;
+"""
+
+
+def script(more: str = "") -> str:
+    """Return static/viser.js with its tap, and ``more`` after it."""
+    return f"{(STATIC / 'viser.js').read_text(encoding='utf-8')}\n{TAPPED}\n{more}"
