@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,12 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.browser.server import AppServer
 from tests.gateway.client import SUBPROTOCOL, ask, enter, opened, page_name, websocket
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
 
 
 def refusal(opening: connect) -> int:
