@@ -51,9 +51,12 @@ exchange: $(dev_ok)           ## find the programs that read our exports, and Fi
 
 # In four processes, as `tests/schedule.py` says. A test that fails, as it may be starved of time, is tried
 # once more when nothing else runs.
+tests: export PYTHONDONTWRITEBYTECODE =
 tests: $(dev_ok)
-	@# Once, for the hundreds of processes that are started.
+	@# Once, for the hundreds of processes that are started, and the four that read every test.
 	@$(bin)/python -m compileall -q app/katana450 robot_description
+	@$(pytest) --collect-only -qq tests/[a-f]*/ > /dev/null & \
+	  $(pytest) --collect-only -qq tests/[g-z]*/ > /dev/null; wait
 	@rm -rf $(VENV)/again
 	@# A process that crashes is not replaced, which xdist can wait for without end.
 	@$(pytest) --numprocesses 4 --max-worker-restart 0; status=$$?; \

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -28,19 +29,24 @@ def serve(*options: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_it_serves_the_page_on_this_machine_only() -> None:
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
     with AppServer() as server:
-        with urllib.request.urlopen(server.url, timeout=10) as page:
-            assert page.status == 200
-        listening = Path("/proc/net/tcp")
-        if listening.exists():
-            port = f"{server.port:04X}"
-            addresses = {
-                line.split()[1].split(":")[0]
-                for line in listening.read_text(encoding="ascii").splitlines()[1:]
-                if line.split()[1].endswith(":" + port) and line.split()[3] == "0A"
-            }
-            assert addresses == {"0100007F"}  # 127.0.0.1
+        yield server
+
+
+def test_it_serves_the_page_on_this_machine_only(server: AppServer) -> None:
+    with urllib.request.urlopen(server.url, timeout=10) as page:
+        assert page.status == 200
+    listening = Path("/proc/net/tcp")
+    if listening.exists():
+        port = f"{server.port:04X}"
+        addresses = {
+            line.split()[1].split(":")[0]
+            for line in listening.read_text(encoding="ascii").splitlines()[1:]
+            if line.split()[1].endswith(":" + port) and line.split()[3] == "0A"
+        }
+        assert addresses == {"0100007F"}  # 127.0.0.1
 
 
 def test_busy_port_is_reported_with_the_remedy() -> None:
@@ -56,9 +62,9 @@ def test_busy_port_is_reported_with_the_remedy() -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_two_servers_do_not_share_a_port() -> None:
-    with AppServer() as first, pytest.raises(ServerError, match="in use"):
-        AppServer(port=first.port).start()
+def test_two_servers_do_not_share_a_port(server: AppServer) -> None:
+    with pytest.raises(ServerError, match="in use"):
+        AppServer(port=server.port).start()
 
 
 @pytest.mark.parametrize(
@@ -77,7 +83,10 @@ def test_invalid_address_is_reported(options: tuple[str, ...], message: str) -> 
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+# By SIGINT every server of the tests ends.
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
+)
 def test_viewer_stops_on_request(number: signal.Signals) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "katana450", "serve", "--port", str(free_port())],
