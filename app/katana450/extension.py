@@ -67,6 +67,7 @@ BUILT_IN = (
     "touch",
     "leader",
     "rosbridge",
+    "bodies",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 
@@ -201,6 +202,8 @@ class Extension:
         name: Its name in messages.
         commands: Commands of ``katana450``.
         serve: Its part of ``katana450 serve``, if it has one.
+        world: Returns the collision world of a robot, None without shapes, and sentences on what
+            it leaves out. Of the first extension that has it.
         grip_model: Returns the model of the forces in the hand of a robot with its collision world;
             None if the pads of that hand are not known. Called for each session of an arm.
     """
@@ -209,6 +212,7 @@ class Extension:
     commands: tuple[CliCommand, ...] = ()
     serve: ServeExtension | None = None
     grip_model: Callable[[CollisionWorld, Hand], GripModel | None] | None = None
+    world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
 
 
 @cache

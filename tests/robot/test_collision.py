@@ -25,11 +25,21 @@ def with_forearm(tmp_path: Path, shapes: str) -> Robot:
     return load(path)
 
 
-@pytest.mark.parametrize("arm", ["pincherx_150.urdf", "youbot_arm.urdf"])
-def test_an_arm_without_collision_shapes_has_no_world(arm: str) -> None:
-    robot = load(ARMS / arm)
+def test_an_arm_without_shapes_has_no_world() -> None:
+    robot = load(PINCHER)
     assert not robot.collides
     assert world_of(robot) == (None, ())
+
+
+def test_an_arm_without_collision_shapes_is_checked_by_what_is_drawn() -> None:
+    robot = load(ARMS / "youbot_arm.urdf")
+    assert not robot.collides
+    world, notes = world_of(robot)
+    assert world is not None
+    drawn = [link.name for link in robot.links if any(not v.is_rod for v in link.visuals)]
+    assert [part.name for part in world.parts] == drawn
+    assert drawn
+    assert notes == ()
 
 
 def test_world_of_the_katana_has_every_link(robot: Robot) -> None:

@@ -17,6 +17,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.water import water_environment
 from katana450.errors import RobotDescriptionError
 from katana450.extension import extensions
+from katana450.maths.collision.world import CollisionWorld
 from katana450.settings import Settings
 
 
@@ -51,9 +52,11 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
             raise
         robot = replace(robot, arm=None, why=str(error))
     joints = robot.joint_group
-    session = Session(joints, joints.ready, travel=robot.distance)
-    notes = (*robot.notes, *robot.joint_notes, f"Joints only. {robot.why}")
-    return DescribedRobot(robot, session, notes)
+    world, left_out = _world(robot)
+    session = Session(joints, joints.ready, world, travel=robot.distance)
+    unchecked = (UNCHECKED,) if world is None else ()
+    notes = (*robot.notes, *robot.joint_notes, *left_out, *unchecked)
+    return DescribedRobot(robot, session, (*notes, f"Joints only. {robot.why}"))
 
 
 def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
@@ -61,7 +64,7 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
     if settings.bare:
         robot = bare(robot)
     arm = robot.require_arm()
-    world, left_out = world_of(robot)
+    world, left_out = _world(robot)
     notes = [*arm.notes, *robot.notes, *left_out]
     props = load_props()
     hand: Hand | None = None
@@ -83,3 +86,11 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         water_environment=water_environment(props) if objects else None,
     )
     return DescribedRobot(robot, session, tuple(notes))
+
+
+def _world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
+    """Return the world that an extension makes; without one, only arms are checked."""
+    for each in extensions():
+        if each.world is not None:
+            return each.world(robot)
+    return (None, ()) if robot.arm is None else world_of(robot)

@@ -1,12 +1,19 @@
-"""One tick of motion for joints that are driven one by one, without a tool or a collision world."""
+"""One tick of motion for joints that are driven one by one, without a tool."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 
+from katana450.arm.control.contact_rule import (
+    may_go_on,
+    met_before_rest,
+    with_contact,
+    with_distance,
+)
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.state import State
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.motion.limiter import JointMotion, Limiter
 from katana450.maths.motion.pursuit import stream_step
@@ -23,16 +30,37 @@ def no_travel(_q: FloatArray, _to: FloatArray) -> float:
 class JointStepper:
     """Moves the setpoints of joints, tick by tick. Its methods are pure."""
 
-    def __init__(self, joints: JointSet, travel: Travel) -> None:
+    def __init__(
+        self, joints: JointSet, travel: Travel, world: CollisionWorld | None = None
+    ) -> None:
+        """Create the stepper. ``world`` is the collision world; None to check no contacts."""
         self._joints = joints
         self._travel = travel
+        self._world = world
         self._limiter = Limiter(joints.limits)
 
     def step(self, state: State, dt: float) -> State:
-        """Return ``state`` with its setpoints advanced by ``dt`` [s]."""
-        if dt <= 0.0 or not state.under_way:
+        """Return ``state`` with its setpoints advanced by ``dt`` [s].
+
+        A step is taken only if the path of the brake behind it is clear; see ``contact_rule``.
+        """
+        if dt <= 0.0:
             return state
-        return replace(state, motion=self._ahead(state, dt))
+        if not state.under_way:
+            return replace(state, blocked=False) if state.blocked else state
+        if self._world is None:
+            return replace(state, motion=self._ahead(state, dt))
+        if state.blocked and state.motion.at_rest and may_go_on(self._world, state):
+            state = replace(state, blocked=False)
+        # A brake continues to rest: at the edge of the clear path the joints would only quiver.
+        if state.blocked:
+            braked = replace(state, motion=self._limiter.stop(state.motion, dt))
+            return with_distance(self._world, braked)
+        ahead = self._ahead(state, dt)
+        met = met_before_rest(self._world, self._limiter, state.x_setpoint, ahead)
+        if met is not None:
+            ahead = self._limiter.stop(state.motion, dt)
+        return with_contact(replace(state, motion=ahead, blocked=met is not None), met)
 
     def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
         """Return the end of a brake begun now, (n,) [rad or m], the travel [m] and the time [s]."""

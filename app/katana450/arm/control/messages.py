@@ -54,7 +54,7 @@ PARTS = {
 }
 """Names for people of links whose names in the robot description are different."""
 
-UNCHECKED = "No collision checking: the robot description gives the links no collision shapes."
+UNCHECKED = "No collision checking: the robot description gives the links no shapes."
 
 
 def part(name: str) -> str:

@@ -8,19 +8,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.contact_rule import (
+    may_go_on,
+    measured,
+    met_before_rest,
+    with_contact,
+    with_distance,
+)
 from katana450.arm.control.following import Following
 from katana450.arm.control.goals import with_place
 from katana450.arm.control.modes import Jogging, Leaving
 from katana450.arm.control.plan_follower import PlanFollower
-from katana450.arm.control.state import Finding, Reason, State
-from katana450.maths.collision.clearance import MIN_STOP_TIME, STOP, advance, is_surely_clear
+from katana450.arm.control.state import State
+from katana450.maths.collision.clearance import STOP, advance
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
@@ -32,10 +38,6 @@ from katana450.maths.motion.pursuit import stream_step
 
 ELBOW = 2
 """Index of axis 3, which bends the elbow."""
-
-PROBE_LENGTH = 0.02
-"""[rad] Length of path that must be clear before a waiting arm continues. After a shorter probe the
-arm would only come back to where it was."""
 
 PLANNED_SPEED_FRACTION = 0.9
 """[1] Fraction of the maximum tool speed that a step is planned with: the same joint speeds may
@@ -127,11 +129,11 @@ class MotionStepper:
             blocked=braking or contact is not None or pinched,
         )
         if braking:
-            return self._updated(after)
+            return with_distance(self._world, after)
         held_back = None if hand is None else hand.contact
         if held_back is not None and frozenset(held_back.parts) in self._touching:
             held_back = None
-        return _with_contact(after, contact or held_back)
+        return with_contact(after, contact or held_back)
 
     def limiter(self, state: State) -> Limiter:
         """Return the limiter that keeps the elbow on its branch.
@@ -301,49 +303,18 @@ class MotionStepper:
         assert self._world is not None
         if state.following is not None and along is not None:
             met = self._follower.met(state.following, along, fingers)
-            return None if met is None else self._measured(met, np.append(state.setpoint, fingers))
-        limiter, x = self.limiter(state), np.append(state.setpoint, fingers)
-        if is_surely_clear(self._world, x, np.append(limiter.stopping_point(ahead), fingers)):
-            return None
-        path = limiter.stopping_path(ahead, MAX_PATH_LENGTH)
-        for a, b in pairwise([state.setpoint, *path]):
-            step = advance(self._world, np.append(a, fingers), np.append(b, fingers), MIN_STOP_TIME)
-            if step.contact is not None or step.stopped:
-                if step.contact is None:
-                    return self._world.nearest(x)
-                return self._measured(step.contact, x)
-        return None
-
-    def _measured(self, met: Contact, x: FloatArray) -> Contact:
-        """Return ``met`` with the distance of its parts at ``x`` (k,) [rad]."""
-        assert self._world is not None
-        return replace(met, distance=self._world.gap(x, *met.parts))
-
-    def _updated(self, state: State) -> State:
-        """Return ``state`` with the present distance in the contact that the arm brakes for."""
-        assert self._world is not None
-        x = state.x_setpoint
-        findings = tuple(
-            replace(finding, amount=self._world.gap(x, *finding.parts))
-            if finding.reason is Reason.CONTACT and finding.parts is not None
-            else finding
-            for finding in state.findings
-        )
-        return replace(state, findings=findings)
+            if met is None:
+                return None
+            return measured(self._world, met, np.append(state.setpoint, fingers))
+        x = np.append(state.setpoint, fingers)
+        return met_before_rest(self._world, self.limiter(state), x, ahead)
 
     def _may_go_on(self, state: State) -> bool:
         """Return whether the first part of the path of a waiting arm is clear again."""
         assert self._world is not None
         if state.following is not None:
             return self._follower.may_go_on(state.following, state.gripper_setpoint)
-        change = state.goal - state.setpoint
-        if not change.any():
-            return True
-        fraction = min(1.0, PROBE_LENGTH / float(np.abs(change).sum()))
-        x = state.x_setpoint
-        towards = np.append(state.setpoint + fraction * change, state.gripper_setpoint)
-        step = advance(self._world, x, towards, MIN_STOP_TIME)
-        return bool((step.x == towards).all())
+        return may_go_on(self._world, state)
 
 
 def _bent(arm: ArmModel, elbow: str) -> Limits:
@@ -368,12 +339,3 @@ def jog_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
     v = jogging.rates[:3] if jogging.frame is JogFrame.BASE else R @ jogging.rates[:3]
     omega = jogging.rates[3] * pitched[:, 1] + jogging.rates[4] * pitched[:, 0]
     return np.concatenate((omega, v))
-
-
-def _with_contact(state: State, contact: Contact | None) -> State:
-    """Return ``state`` with ``contact`` as its first finding, in place of any earlier contact."""
-    others = tuple(finding for finding in state.findings if finding.reason is not Reason.CONTACT)
-    if contact is None:
-        return state if others == state.findings else replace(state, findings=others)
-    finding = Finding(Reason.CONTACT, contact.distance, parts=contact.parts)
-    return replace(state, findings=(finding, *others))

@@ -129,7 +129,7 @@ class Session:
         self._limits = robot.limits
         self._objects = objects
         self._tool_speed = tool_speed
-        self._joint_stepper = JointStepper(robot, travel) if isinstance(robot, JointSet) else None
+        self._travel = travel
         # Cache for the objects of the newest state.
         self._cache: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
         self.check(cmd.SetJoints(ready))
@@ -161,8 +161,10 @@ class Session:
     def _for(self, state: State) -> tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper]:
         if self._cache is None or self._cache[0] is not state.objects:
             world = self.environment.world(state.objects)
-            stepper: Stepper | None = self._joint_stepper
-            if stepper is None:
+            stepper: Stepper
+            if isinstance(self._robot, JointSet):
+                stepper = JointStepper(self._robot, self._travel, world)
+            else:
                 touch = None if world is None else self.environment.touch(world, state.objects)
                 stepper = MotionStepper(self.require_arm(), world, self._tool_speed, touch)
             self._cache = (state.objects, world, stepper)

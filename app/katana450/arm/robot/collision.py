@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from katana450.arm.control.scene_objects import Hand, SceneObject, Shape
 from katana450.arm.robot.link import Joint, Link
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.visual import Visual
 from katana450.disk_cache import kept
-from katana450.errors import InputError
+from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.collision.engine import engine
 from katana450.maths.collision.linkage import GROUND, Linkage, RigidGroup
 from katana450.maths.collision.pairs import pairs_that_meet
@@ -23,15 +22,33 @@ from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
+Pieces = Callable[[Visual], Sequence[FloatArray]]
+"""The points (n, 3) [m] of each convex body, in the frame of its link, that stand for a shape."""
 
-def world_of(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
-    """Return the arm's own collision bodies, and sentences for a person on what they leave out.
+MakeWorld = Callable[[Linkage, Sequence[Part]], CollisionWorld]
+"""A function that makes a world of the linkage and the parts of a robot."""
 
-    Every shape is replaced by its convex hull. x is the arm's joint angles (n,) followed by the
-    driven finger joint [rad, or m if it slides]. The world is None if no link has a shape. Raises
-    RobotDescriptionError if there is no arm.
+
+def as_modelled(shape: Visual) -> Sequence[FloatArray]:
+    """Return the vertices of ``shape``: one convex body, its hull."""
+    return [shape.kept(lambda: np.asarray(shape.mesh.vertices))]
+
+
+def world_of(
+    robot: Robot, pieces: Pieces = as_modelled, make: MakeWorld | None = None
+) -> tuple[CollisionWorld | None, tuple[str, ...]]:
+    """Return the robot's own collision bodies, and sentences for a person on what they leave out.
+
+    x is the arm's joint angles (n,) followed by the driven finger joint; for a robot without an
+    arm, its driven joints followed by an unused number [rad, or m if it slides]. The world is None
+    if no link has a shape.
+
+    Args:
+        robot: the robot.
+        pieces: divides a shape into convex bodies.
+        make: makes the world; None for the pairs of an arm that meet in sampled postures.
     """
-    arm = robot.require_arm()
+    arm = robot.arm
     groups: list[RigidGroup] = []
     # For each link: the number of its rigid group, and its pose in the frame of that group.
     places: dict[str | None, tuple[int, FloatArray]] = {None: (GROUND, np.eye(4))}
@@ -39,26 +56,29 @@ def world_of(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
     notes: list[str] = []
     for link in robot.links:
         group, T = places[link.parent]
-        T = T @ link.at_rest(arm.resting)
+        T = T @ link.at_rest({} if arm is None else arm.resting)
         joint = link.joint
-        drive = None if joint is None else _drive(arm, joint)
+        drive = None if joint is None else _drive(robot, joint)
         if joint is not None and drive is not None:
             groups.append(RigidGroup(group, T, joint.axis, *drive, slides=joint.slides))
             group, T = len(groups), np.eye(4)
         places[link.name] = group, T
-        shapes, refused = _shapes(link)
+        shapes, refused = _shapes(link, robot.bodies(link), pieces)
         notes += refused
         if shapes:
             parts.append(Part(link.name, group, (frozen(T),) * len(shapes), shapes))
     if not parts:
         return None, tuple(notes)
-    bare = [link.name for link in robot.links if link.visuals and not link.collisions]
+    drawn = [link for link in robot.links if any(not each.is_rod for each in link.visuals)]
+    bare = [link.name for link in drawn if not robot.bodies(link)]
     if bare:
         notes.append(f"Not checked, because they have no collision shapes: {', '.join(bare)}.")
-    linkage = Linkage(groups)
-    chain, gripper = arm.chain, arm.gripper
+    if make is not None:
+        return make(Linkage(groups), parts), tuple(notes)
+    chain, gripper = robot.require_arm().chain, robot.require_arm().gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
-    return CollisionWorld(linkage, parts, _pairs(groups, parts, lower, upper)), tuple(notes)
+    pairs = _pairs(groups, parts, lower, upper)
+    return CollisionWorld(Linkage(groups), parts, pairs), tuple(notes)
 
 
 def _pairs(
@@ -121,8 +141,11 @@ def hand_of(robot: Robot, world: CollisionWorld) -> Hand:
     return Hand(palm, names, frozen(T_palm_tool), slides=arm.gripper.slides)
 
 
-def _drive(arm: MountedArm, joint: Joint) -> tuple[int, float, float] | None:
+def _drive(robot: Robot, joint: Joint) -> tuple[int, float, float] | None:
     """Return index in x, factor and offset that drive ``joint``; None for a joint at rest."""
+    arm = robot.arm
+    if arm is None:
+        return robot.driven.index(joint.leader), joint.factor, joint.offset
     if joint.name in arm.chain.names:
         return arm.chain.names.index(joint.name), 1.0, 0.0
     if joint.name in arm.fingers:
@@ -130,17 +153,14 @@ def _drive(arm: MountedArm, joint: Joint) -> tuple[int, float, float] | None:
     return None
 
 
-def _shapes(link: Link) -> tuple[tuple[CollisionShape, ...], list[str]]:
+def _shapes(
+    link: Link, bodies: Sequence[Visual], pieces: Pieces
+) -> tuple[tuple[CollisionShape, ...], list[str]]:
     shapes: list[CollisionShape] = []
     refused: list[str] = []
-    for collision in link.collisions:
+    for body in bodies:
         try:
-            shapes.append(hull(_vertices(collision)))
-        except InputError as error:
+            shapes += [hull(points) for points in pieces(body)]
+        except (InputError, RobotDescriptionError) as error:
             refused.append(f"A collision shape of link {link.name!r} is left out: {error}")
     return tuple(shapes), refused
-
-
-def _vertices(collision: Visual) -> FloatArray:
-    """Return the vertices (n, 3) of a shape in the frame of its link [m]."""
-    return collision.kept(lambda: np.asarray(collision.mesh.vertices))

@@ -12,6 +12,7 @@ import numpy as np
 from katana450.arm.control.joints import JointSet
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN, Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.visual import Visual
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
@@ -162,10 +163,19 @@ class Robot:
         points = np.concatenate(corners)
         return points.min(axis=0), points.max(axis=0)
 
-    @property
+    @cached_property
     def collides(self) -> bool:
         """True if any link has a collision shape."""
         return any(link.collisions for link in self.links)
+
+    def bodies(self, link: Link) -> tuple[Visual, ...]:
+        """Return the shapes of ``link`` that are checked for contacts.
+
+        These are its collision shapes, or what is drawn if no link of the robot has any.
+        """
+        if self.collides:
+            return link.collisions
+        return tuple(visual for visual in link.visuals if not visual.is_rod)
 
     @cached_property
     def moving(self) -> frozenset[str]:

@@ -33,6 +33,9 @@ ROD_LENGTH = 1e-3
 SINGLE_FILES = (".glb", ".ply", ".stl")
 """Suffixes of mesh files that refer to no other file."""
 
+GEOMETRY_FILES = (*SINGLE_FILES, ".dae", ".obj")
+"""Suffixes of mesh files that contain all their vertices; others of their files are for colours."""
+
 
 @dataclass(frozen=True, eq=False)
 class PrimitiveShape:
@@ -76,6 +79,11 @@ class Visual:
             return None
         return self.source if (self.scale == 1.0).all() else None
 
+    @property
+    def is_rod(self) -> bool:
+        """True if it only connects joints, in the place of a shape that the file lacks."""
+        return isinstance(self.source, PrimitiveShape) and "segment" in self.source.options
+
     @cached_property
     def mesh(self) -> Any:
         """A trimesh of the shape in the body's frame [m].
@@ -96,12 +104,13 @@ class Visual:
         mesh.apply_transform(self.T_body_visual @ np.diag([*self.scale, 1.0]))
         return mesh
 
-    def kept(self, make: Callable[[], T]) -> T:
+    def kept(self, make: Callable[[], T], *inputs: str, files: Sequence[str] = SINGLE_FILES) -> T:
         """Return the value of ``make``, kept on disk where the shape comes from one file.
 
-        The value depends on the shape alone.
+        The value depends on the shape and on ``inputs`` alone. ``files``: suffixes of files that
+        are sufficient for it.
         """
-        if not isinstance(self.source, Path) or self.source.suffix.lower() not in SINGLE_FILES:
+        if not isinstance(self.source, Path) or self.source.suffix.lower() not in files:
             return make()
         try:
             data = self.source.read_bytes()
@@ -109,7 +118,7 @@ class Visual:
             # The reader of the mesh explains why.
             return make()
         own = (self.T_body_visual, self.scale, str(self.colour))
-        return kept(make, self.source.suffix, data, *own)
+        return kept(make, self.source.suffix, data, *own, *inputs)
 
 
 def unreadable_mesh(source: Path) -> RobotDescriptionError:

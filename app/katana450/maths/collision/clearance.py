@@ -71,11 +71,11 @@ def advance(
     reduce the distance; motion away from a contact is always allowed. Bodies must not pass each
     other between the ends of a step either. A distance changes by no more than the bodies travel,
     so a case that the ends leave open is checked in the middle, and again in the halves. ``keep``
-    (p,) [m] is the distance that each pair keeps, in place of STOP.
+    (p,) [m] is the distance that each pair keeps, in place of STOP or that of close pairs.
     """
     if (towards == x).all():
         return Advance(x)
-    minimum = np.full(len(world.first), STOP) if keep is None else keep
+    minimum = world.kept(STOP) if keep is None else keep
     here = world.at(x)
     travel = world.travel(here, x, towards)
     part = min(dt / MIN_STOP_TIME, 1.0)
@@ -113,16 +113,19 @@ def advance(
 
 
 def is_surely_clear(world: CollisionWorld, x: FloatArray, towards: FloatArray) -> bool:
-    """Return True if a bound shows that no path from ``x`` to ``towards`` comes nearer than STOP.
+    """Return True if a bound shows that no path from ``x`` to ``towards`` comes too near.
 
     On the path every joint stays between its two ends. False means only that a full check is
     needed: the joints may be too far apart for the bound, or a part too near.
     """
-    turns = float(np.abs(towards - x).sum())
+    turns = world.linkage.turned(towards - x)
     if turns >= MAX_GLANCE_ANGLE:
         return False
     here = world.at(x)
-    needed = STOP + world.travel(here, x, towards) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
+    needed = (
+        world.kept(STOP)
+        + world.travel(here, x, towards) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
+    )
     pairs, _ = here.nearer_than(needed)
     return all(here.distance(pair) >= needed[pair] for pair in pairs.tolist())
 

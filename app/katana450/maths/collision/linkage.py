@@ -86,6 +86,14 @@ class Linkage:
             T[number] = T[parent] @ T[number]
         return np.array(T)
 
+    def turned(self, change: FloatArray) -> float:
+        """Return the largest sum [rad] of the turns between the ground and a group.
+
+        The joints of other branches do not move a body, so their turns are not added.
+        ``change``: (k,) difference of two places x; sliding joints count with 1 rad per metre.
+        """
+        return float((self.carries @ np.abs(self.factor * change[self.variable])).max())
+
     def variables_between(self, a: int, b: int) -> frozenset[int]:
         """Return the indices of x that change the pose of group ``b`` relative to group ``a``."""
         joints = self.carries[a] ^ self.carries[b]

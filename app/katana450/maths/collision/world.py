@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,6 +18,9 @@ from katana450.maths.collision.shape import CollisionShape
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 IndexArray = npt.NDArray[np.int64]
+
+FEW_PAIRS = 500
+"""Number of pairs up to which their balls are compared in one product of matrices."""
 
 DIRECT_PAIRS = 8
 """Number of pairs that are measured as quickly as the boxes round their bodies are compared."""
@@ -73,16 +76,22 @@ class CollisionWorld:
     Attributes:
         parts: the parts of the arm, then the obstacles.
         first, second: indices (p,) of the bodies of each pair; the second belongs to a later part.
+        close: distance [m] that the parts of a pair keep, if they stand nearer than others at rest.
     """
 
     def __init__(
-        self, linkage: Linkage, parts: Sequence[Part], pairs: Sequence[tuple[int, int]]
+        self,
+        linkage: Linkage,
+        parts: Sequence[Part],
+        pairs: Sequence[tuple[int, int]],
+        close: Mapping[tuple[int, int], float] | None = None,
     ) -> None:
         """Build the world; ``pairs`` are indices of parts that may meet, the smaller one first."""
         self.linkage = linkage
         self.engine = engine()
         self.parts = tuple(parts)
         self.pairs = tuple(pairs)
+        self.close = dict(close or {})
         bodies = [
             (number, part.mover, T, shape)
             for number, part in enumerate(self.parts)
@@ -125,7 +134,9 @@ class CollisionWorld:
             (shapes[a].geometry, frame_of[a], shapes[b].geometry, frame_of[b])
             for a, b in zip(self.first.tolist(), self.second.tolist(), strict=True)
         ]
-        self.apart = self.spread[self.second] - self.spread[self.first]
+        self.apart: FloatArray | None = None
+        if len(self.first) <= FEW_PAIRS:
+            self.apart = self.spread[self.second] - self.spread[self.first]
         self.radii = self.radius[self.first] + self.radius[self.second]
         # Flat indices into (b, m) of a body relative to a group.
         directions = np.zeros((linkage.count, linkage.count, 4))
@@ -135,6 +146,16 @@ class CollisionWorld:
         self._stays = (~linkage.carries).T.astype(np.float64)
         self._second_seen = self.second * linkage.count + self.mover_of[self.first]
         self._first_seen = self.first * linkage.count + self.mover_of[self.second]
+
+    @cached_property
+    def _closest(self) -> FloatArray:
+        """The distance (p,) of ``close`` that each pair keeps, infinite for most [m]."""
+        one, other = self.part_of[self.first].tolist(), self.part_of[self.second].tolist()
+        return np.array([self.close.get(pair, np.inf) for pair in zip(one, other, strict=True)])
+
+    def kept(self, distance: float) -> FloatArray:
+        """Return the distance (p,) [m] that each pair keeps where most keep ``distance``."""
+        return np.minimum(distance, self._closest)
 
     def at(self, x: FloatArray) -> PlacedWorld:
         """Return the world with all bodies placed at ``x`` (k,) [rad or m]."""
@@ -190,7 +211,8 @@ class CollisionWorld:
     @cached_property
     def fingerprint(self) -> Fingerprint:
         """The fingerprint by which an equal world is recognized, also in another process."""
-        hasher = hashlib.sha256(repr(self.pairs).encode())
+        close = repr(sorted(self.close.items())) if self.close else ""
+        hasher = hashlib.sha256(f"{self.pairs!r}{close}".encode())
         for part in self.parts:
             hasher.update(f"{part.name} {part.mover}".encode())
             for shape in part.shapes:
@@ -209,14 +231,15 @@ class CollisionWorld:
             for number, part in enumerate(self.parts)
             if len(self.linkage.variables_between(part.mover, carried.mover)) > 1
         ]
-        return CollisionWorld(self.linkage, (*self.parts, carried), (*self.pairs, *met))
+        return CollisionWorld(self.linkage, (*self.parts, carried), (*self.pairs, *met), self.close)
 
     def with_obstacles(self, obstacles: Sequence[Part]) -> CollisionWorld:
         """Return this world with ``obstacles``, which every part that moves may meet."""
         count = len(self.parts)
         moving = [number for number, part in enumerate(self.parts) if part.mover != GROUND]
         met = [(number, count + k) for number in moving for k in range(len(obstacles))]
-        return CollisionWorld(self.linkage, (*self.parts, *obstacles), (*self.pairs, *met))
+        parts = (*self.parts, *obstacles)
+        return CollisionWorld(self.linkage, parts, (*self.pairs, *met), self.close)
 
 
 class PlacedWorld:
@@ -240,7 +263,12 @@ class PlacedWorld:
     @cached_property
     def _apart(self) -> FloatArray:
         """The distance between the balls round the bodies of each pair, (p,) [m]."""
-        apart = self._world.apart @ self._columns
+        world, centre = self._world, self._centre
+        apart = (
+            centre[world.second] - centre[world.first]
+            if world.apart is None
+            else world.apart @ self._columns
+        )
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)) - self._world.radii)
 
     def reach(self) -> FloatArray:

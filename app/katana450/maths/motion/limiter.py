@@ -202,10 +202,13 @@ class Limiter:
         q, _, _ = self._trajectory.at_time(self._trajectory.duration)
         return np.array(q)
 
-    def stopping_path(self, now: JointMotion, longest: float) -> list[FloatArray]:
+    def stopping_path(
+        self, now: JointMotion, longest: float, length: Callable[[FloatArray], float]
+    ) -> list[FloatArray]:
         """Return places (n,) [rad] on the braking path, the present place first.
 
-        From one place to the next all joints together move at most ``longest`` [rad].
+        From one place to the next the joints move at most ``longest`` [rad]. ``length`` returns how
+        much a change (n,) of all joints counts.
         """
         if now.at_rest:
             return [now.q]
@@ -214,7 +217,7 @@ class Limiter:
         end, _, _ = trajectory.at_time(trajectory.duration)
         # Each joint either continues in its direction or returns to it: twice the distance is
         # enough.
-        pieces = max(1, math.ceil(2.0 * float(np.abs(np.array(end) - now.q).sum()) / longest))
+        pieces = max(1, math.ceil(2.0 * length(np.array(end) - now.q) / longest))
         times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
         return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
 

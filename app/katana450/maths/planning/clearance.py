@@ -65,7 +65,7 @@ class SweptClearance:
         Pairs that are nearer at the start come no nearer, so a path may lead out of a contact.
         Pairs that are nearer at the end may be as near as there, but not below STOP.
         """
-        minimum = np.full(len(world.first), margin)
+        minimum = world.kept(margin)
         for x, lowest in ((start, -np.inf), (end, STOP)):
             if x is None:
                 continue

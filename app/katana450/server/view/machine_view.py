@@ -16,6 +16,7 @@ from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.room import set_up_room
+from katana450.server.view.tint import Tint
 from katana450.server.view.view_updater import ViewUpdater
 
 
@@ -51,6 +52,7 @@ class MachineView(ViewUpdater):
         server.initial_camera.look_at = look.target
         self._nodes = MachineNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
+        self._tint = Tint(server, robot, self._nodes.path)
         self._panel = MachinePanel(server.gui, robot, gestures, state_publisher.snapshot.state)
         self.show(state_publisher.snapshot)
 
@@ -60,6 +62,7 @@ class MachineView(ViewUpdater):
         with self._server.atomic():
             self._nodes.move(self._robot.joint_values(state.q, state.gripper))
             self._paint.follow(state)
+            self._tint.follow(state)
             self._panel.follow(
                 state,
                 time.perf_counter(),

@@ -22,18 +22,21 @@ class Tint:
     OPACITY = 0.55
 
     def __init__(
-        self, server: viser.ViserServer, robot: Robot, path: Mapping[str, str], props: Props
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        path: Mapping[str, str],
+        props: Props | None = None,
     ) -> None:
         """Prepare the coats; ``path``: the scene node of each link. A prop's node is its name."""
         self._server = server
-        self._shapes = {link.name: (path[link.name], link.collisions) for link in robot.links} | {
-            name: (f"/{name}", (Visual(frozen(np.eye(4)), frozen(np.ones(3)), mesh),))
-            for name, mesh in (
-                ("table", props.table.mesh),
-                ("cup", props.cup.mesh),
-                ("basin", props.basin.mesh),
+        self._shapes = {link.name: (path[link.name], robot.bodies(link)) for link in robot.links}
+        for name in () if props is None else ("table", "cup", "basin"):
+            mesh = getattr(props, name).mesh
+            self._shapes[name] = (
+                f"/{name}",
+                (Visual(frozen(np.eye(4)), frozen(np.ones(3)), mesh),),
             )
-        }
         # Made on first use: most runs never come near a contact.
         self._coats: dict[str, list[viser.MeshHandle]] = {}
         self._coated: frozenset[str] = frozenset()

@@ -1,0 +1,1 @@
+"""The collision worlds of robots outside the five-axis family."""

@@ -1,0 +1,217 @@
+"""Robots that are driven joint by joint brake before their own contacts, as an arm does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.joints import JointSet
+from katana450.arm.control.messages import sentence
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.robot.loader import load
+from katana450.extensions.bodies.robot_world import robot_world
+from katana450.maths.collision.clearance import DISTANCE_ROUNDING, STOP
+from katana450.maths.collision.world import CollisionWorld
+from tests.robot.hands import hand, rail
+
+DT = 0.01
+
+
+class Made(NamedTuple):
+    """A robot that is driven joint by joint."""
+
+    session: Session
+    world: CollisionWorld
+    joints: JointSet
+
+    def move(self, **values: float) -> cmd.SetAxes:
+        """Return the command that moves the named joints [rad or m]."""
+        return cmd.SetAxes(tuple((self.joints.names.index(n), q) for n, q in values.items()))
+
+
+Make = Callable[[str], Made]
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    """Return a function that makes the session and the world of a robot from its URDF."""
+
+    def made(text: str) -> Made:
+        path = tmp_path / "robot.urdf"
+        path.write_text(text)
+        robot = load(path)
+        world, _ = robot_world(robot)
+        assert world is not None
+        joints = robot.joint_group
+        session = Session(joints, joints.ready, world, travel=robot.distance)
+        return Made(session, world, joints)
+
+    return made
+
+
+def begun(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+def ticks(session: Session, state: State, seconds: float, *first: cmd.Command) -> Iterator[State]:
+    t, end = state.t, state.t + seconds
+    while t < end - DT / 2:
+        t += DT
+        state = session.step(state, first, t)
+        state = session.observe(state, state.setpoint, 0.0)
+        first = ()
+        yield state
+
+
+def after(session: Session, state: State, seconds: float, *first: cmd.Command) -> State:
+    *_, last = ticks(session, state, seconds, *first)
+    return last
+
+
+def excess(world: CollisionWorld, state: State) -> float:
+    """Return the smallest distance of any pair beyond what it keeps [m]."""
+    placed, kept = world.at(state.x_setpoint), world.kept(STOP)
+    return float(min(placed.distance(pair) - kept[pair] for pair in range(len(kept))))
+
+
+def test_carriages_on_one_rail_stop_before_each_other(make: Make) -> None:
+    made = make(rail())
+    session, world = made.session, made.world
+    state = after(session, begun(session), 4.0, made.move(slide_left=0.4))
+    # 0.2 m apart, 50 mm wide, and 5 mm stay between them.
+    assert state.setpoint[0] == pytest.approx(0.144, abs=1.5e-3)
+    assert world.gap(state.x_setpoint, "left", "right") >= STOP - DISTANCE_ROUNDING
+    assert (state.status, state.moving, state.goal[0]) == (Status.BLOCKED, False, 0.4)
+    (finding,) = state.findings
+    assert (finding.reason, set(finding.parts or ())) == (Reason.CONTACT, {"left", "right"})
+    assert finding.amount == pytest.approx(STOP, abs=3e-3)
+    assert sentence(state).startswith("Left and right are ")
+
+
+def test_both_carriages_brake_and_the_blocked_one_continues_once_free(make: Make) -> None:
+    made = make(rail())
+    session, world = made.session, made.world
+    command = made.move(slide_left=0.4, slide_right=-0.3)
+    seen = list(ticks(session, begun(session), 3.0, command))
+    assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
+    assert seen[-1].blocked
+    state = after(session, seen[-1], 4.0, made.move(slide_right=0.3))
+    np.testing.assert_allclose(state.setpoint, (0.4, 0.3), atol=1e-9)
+    assert (state.status, state.findings) == (Status.OK, ())
+
+
+def test_a_joint_moves_away_from_a_contact_at_once(make: Make) -> None:
+    made = make(rail())
+    session = made.session
+    state = after(session, begun(session), 3.0, made.move(slide_left=0.4))
+    away = after(session, state, 3.0, made.move(slide_left=0.0))
+    assert away.setpoint[0] == 0.0
+    assert not away.findings
+
+
+def test_a_stream_is_followed_up_to_the_contact_and_not_into_it(make: Make) -> None:
+    made = make(rail())
+    session, world = made.session, made.world
+    state = begun(session)
+    for number in range(200):
+        t = state.t + DT
+        sample = cmd.Servo(np.array((min(0.3, 0.004 * number), 0.0)), t=t)
+        state = session.step(state, (sample,), t)
+        state = session.observe(state, state.setpoint, 0.0)
+        assert excess(world, state) >= -DISTANCE_ROUNDING
+    assert state.blocked
+    assert 0.135 < state.setpoint[0] < 0.1451
+
+
+def test_stop_and_pause_work_before_a_contact(make: Make) -> None:
+    made = make(rail())
+    session, world = made.session, made.world
+    state = after(session, begun(session), 0.4, made.move(slide_left=0.4))
+    assert state.moving
+    stopped = after(session, state, 2.0, cmd.Stop())
+    assert stopped.status is Status.STOPPED
+    assert excess(world, stopped) >= 0.0
+    paused = after(session, state, 2.0, cmd.Pause())
+    assert (paused.status, paused.moving) == (Status.PAUSED, False)
+
+
+def test_thumb_and_finger_meet_and_the_following_joint_counts(make: Make) -> None:
+    made = make(hand())
+    session, world = made.session, made.world
+    command = made.move(thumb_bend1=0.0, finger2_bend1=1.5, finger2_bend2=1.2)
+    seen = list(ticks(session, begun(session), 4.0, command))
+    assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
+    state = seen[-1]
+    assert state.blocked
+    assert state.findings[0].parts is not None
+    assert "thumb" in "".join(state.findings[0].parts)
+    assert "finger2" in "".join(state.findings[0].parts)
+
+
+targets = st.lists(
+    st.tuples(st.lists(st.floats(-1.7, 1.7), min_size=16, max_size=16), st.floats(0.05, 0.5)),
+    min_size=1,
+    max_size=3,
+)
+
+
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(targets)
+def test_no_motion_of_a_hand_brings_its_parts_too_near(
+    make: Make, wanted: Sequence[tuple[Sequence[float], float]]
+) -> None:
+    made = make(hand())
+    session, world = made.session, made.world
+    state = begun(session)
+    for q, seconds in wanted:
+        goal = made.joints.clamp(np.array(q))
+        seen = list(ticks(session, state, seconds, cmd.SetJoints(goal)))
+        assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
+        state = seen[-1]
+    stopping = ticks(session, state, 0.5, cmd.Stop())
+    assert min(excess(world, each) for each in stopping) >= -DISTANCE_ROUNDING
+
+
+def test_fingers_that_stand_closer_than_5_mm_keep_half_of_their_distance(make: Make) -> None:
+    # 27 mm apart and 24 mm wide: 3 mm between them at rest.
+    made = make(hand(3, pitch=0.027, thumb=False))
+    session, world = made.session, made.world
+    assert min(world.close.values()) == pytest.approx(1.5e-3, abs=1e-6)
+    command = made.move(finger1_spread=0.3)
+    state = after(session, begun(session), 2.0, command)
+    free = world.gap(state.x_setpoint, "finger1_link1", "finger2_link1")
+    state = after(session, state, 2.0, made.move(finger1_spread=-0.3))
+    near = world.gap(state.x_setpoint, "finger1_link3", "finger2_link3")
+    assert min(free, near) >= 1.5e-3 - DISTANCE_ROUNDING
+    assert state.blocked
+    # Each finger alone bends past its neighbours.
+    bent = after(session, begun(session), 3.0, made.move(finger2_bend1=1.4))
+    assert bent.setpoint[made.joints.names.index("finger2_bend1")] == 1.4
+
+
+def test_without_a_world_joints_pass_each_other(make: Make) -> None:
+    made = make(rail())
+    unchecked = Session(made.joints, made.joints.ready)
+    state = after(unchecked, begun(unchecked), 3.0, made.move(slide_left=0.4))
+    assert state.setpoint[0] == 0.4
+
+
+def test_a_robot_that_begins_in_a_contact_can_leave_it(make: Make) -> None:
+    made = make(rail())
+    session, world = made.session, made.world
+    state = session.begin(np.array((0.149, 0.0)), 0.0, 0.0)
+    assert world.gap(state.x_setpoint, "left", "right") < STOP
+    nearer = after(session, state, 1.0, made.move(slide_left=0.2))
+    assert nearer.setpoint[0] == 0.149
+    assert nearer.blocked
+    away = after(session, replace(state, blocked=False), 2.0, made.move(slide_left=0.0))
+    assert away.setpoint[0] == 0.0
