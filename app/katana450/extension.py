@@ -67,6 +67,7 @@ BUILT_IN = (
     "touch",
     "leader",
     "rosbridge",
+    "gallery",
     "bodies",
 )
 """Built-in extensions, in the order of their commands in the help text."""
@@ -202,6 +203,8 @@ class Extension:
         name: Its name in messages.
         commands: Commands of ``katana450``.
         serve: Its part of ``katana450 serve``, if it has one.
+        prepare: Completes the options of a command before it runs, whichever extension it is of.
+            Raises KatanaError.
         world: Returns the collision world of a robot, None without shapes, and sentences on what
             it leaves out. Of the first extension that has it.
         grip_model: Returns the model of the forces in the hand of a robot with its collision world;
@@ -212,6 +215,7 @@ class Extension:
     commands: tuple[CliCommand, ...] = ()
     serve: ServeExtension | None = None
     grip_model: Callable[[CollisionWorld, Hand], GripModel | None] | None = None
+    prepare: Callable[[Namespace], None] | None = None
     world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
 
 

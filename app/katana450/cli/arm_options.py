@@ -8,8 +8,12 @@ from pathlib import Path
 from katana450.resources import URDF_PATH
 
 
-def add_arm_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--urdf`` and ``--tool`` to ``parser``."""
+def add_arm_options(parser: argparse.ArgumentParser, *, names: bool = True) -> None:
+    """Add ``--urdf`` and ``--tool`` to ``parser``, and with ``names`` also ``--arm``."""
+    if names:
+        parser.add_argument(
+            "--arm", metavar="NAME", help="a robot of the gallery; `katana450 arms` lists them"
+        )
     parser.add_argument(
         "--urdf",
         type=Path,

@@ -22,6 +22,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     command: CliCommand = options.command
     try:
+        for each in extensions():
+            if each.prepare is not None:
+                each.prepare(options)
         return command.run(options)
     except KatanaError as error:
         print(f"katana450: {error}", file=sys.stderr)

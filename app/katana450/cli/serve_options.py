@@ -88,7 +88,8 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     for part in serve_extensions():
         if part.add_options is not None:
             part.add_options(parser)
-    add_arm_options(parser)
+    # The real arm adds an option of that name, which takes an address too.
+    add_arm_options(parser, names="--arm" not in parser.format_usage())
 
 
 def _silence(text: str) -> float:

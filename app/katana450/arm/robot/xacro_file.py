@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from katana450.errors import RobotDescriptionError
@@ -26,8 +27,10 @@ PASSED_ON = (*READABLE, "HOME", "LANG", "LC_", "PATH", "PYTHON", "USERPROFILE")
 """Beginnings of the names of environment variables that the subprocess gets."""
 
 
-def expanded(path: Path) -> bytes:
+def expanded(path: Path, arguments: Mapping[str, str] | None = None) -> bytes:
     """Return the URDF that the xacro file at ``path`` describes.
+
+    ``arguments``: values of arguments of the file; the others have their defaults.
 
     A disposable subprocess with limits of time and, where the system supports it, memory expands
     it, because a file can ask for endless work. Its expressions run no other code.
@@ -41,6 +44,7 @@ def expanded(path: Path) -> bytes:
         if name.startswith(PASSED_ON) or name in system
     }
     command = [sys.executable, "-m", "katana450.arm.robot.xacro_process", str(path.absolute())]
+    command += [f"{name}:={value}" for name, value in (arguments or {}).items()]
     try:
         done = subprocess.run(
             command,

@@ -1,9 +1,9 @@
 """The subprocess that expands one xacro file.
 
-``expanded`` starts it as ``python -m katana450.arm.robot.xacro_process FILE``. Before it reads the
-file, it limits its memory and time and the files that it can open. It writes JSON to standard
-output: {"urdf": text}, or the fault as {"what", "file", "line"}. The file is null if it is FILE,
-and the line if it is unknown.
+``expanded`` starts it as ``python -m katana450.arm.robot.xacro_process FILE NAME:=VALUE...``.
+Before it reads the file, it limits its memory and time and the files that it can open. It writes
+JSON to standard output: {"urdf": text}, or the fault as {"what", "file", "line"}. The file is null
+if it is FILE, and the line if it is unknown.
 """
 
 from __future__ import annotations
@@ -75,11 +75,14 @@ class FileGuard:
 class Expansion:
     """The expansion of the file at ``path``; each package it finds is added to ``folders``.
 
+    ``arguments``: values of arguments of the file.
+
     It replaces the parts of xacro that evaluate expressions and that ask ROS or the environment.
     """
 
-    def __init__(self, path: Path, folders: set[Path]) -> None:
+    def __init__(self, path: Path, folders: set[Path], arguments: Mapping[str, str]) -> None:
         self._path = path
+        self._arguments = dict(arguments)
         self._folders = folders
         self._at_fault = ""
         """Text in the line at fault."""
@@ -98,7 +101,7 @@ class Expansion:
     def run(self) -> dict[str, object]:
         """Return the answer."""
         try:
-            document = xacro.process_file(str(self._path), mappings={}, verbosity=0)
+            document = xacro.process_file(str(self._path), mappings=self._arguments, verbosity=0)
             urdf = document.documentElement.toxml()
             # Text with one half of a surrogate pair cannot be encoded in UTF-8.
             urdf.encode()
@@ -214,8 +217,11 @@ def _line(file: Path, text: str) -> int | None:
     return None
 
 
-def main(path: Path) -> None:
-    """Expand the file at ``path``. The process fails only at the limits of memory and time."""
+def main(path: Path, arguments: Mapping[str, str]) -> None:
+    """Expand the file at ``path`` with ``arguments``.
+
+    The process fails only at the limits of memory and time.
+    """
     limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
     guard = FileGuard(path)
     for name in [each for each in os.environ if not each.startswith(READABLE)]:
@@ -224,11 +230,11 @@ def main(path: Path) -> None:
     with Path(os.devnull).open("w") as null, redirect_stderr(null):
         sys.addaudithook(guard)
         try:
-            answer = json.dumps(Expansion(path, guard.folders).run())
+            answer = json.dumps(Expansion(path, guard.folders, arguments).run())
         except MemoryError as error:
             answer = json.dumps({"what": _reason(error), "file": None, "line": None})
     print(answer)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), dict(each.split(":=", 1) for each in sys.argv[2:]))

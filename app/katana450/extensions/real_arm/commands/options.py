@@ -137,8 +137,9 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     driven = parser.add_mutually_exclusive_group()
     driven.add_argument(
         "--arm",
-        metavar="URL",
-        help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON}",
+        metavar="URL|NAME",
+        help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON} A name "
+        "is a simulated robot of the gallery instead; `katana450 arms` lists them",
     )
     driven.add_argument(
         "--plant",

@@ -1,0 +1,1 @@
+"""Robots by name, from the descriptions that the package robot_descriptions downloads."""

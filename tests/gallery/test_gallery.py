@@ -1,0 +1,162 @@
+"""Robots of the gallery by name, from a stand-in for the package that downloads them."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from katana450.arm.robot.loader import load
+from katana450.cli.main import main
+from katana450.errors import ConfigurationError
+from katana450.extensions.gallery.download import file_of
+from katana450.extensions.gallery.listed_robot import listed_robots, robot_named
+from tests.browser.server import APP, AppServer
+from tests.gallery.stand_in import write_package
+
+
+def _forget(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [each for each in sys.modules if each.partition(".")[0] == "robot_descriptions"]:
+        monkeypatch.delitem(sys.modules, name)
+
+
+@pytest.fixture
+def arms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return the folder of the robots of the stand-in, which is installed for this test."""
+    _forget(monkeypatch)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "cache"))
+    found = write_package(tmp_path)
+    yield found
+    _forget(monkeypatch)
+
+
+def why(name: str) -> str:
+    with pytest.raises(ConfigurationError) as refused:
+        file_of(robot_named(name))
+    return str(refused.value)
+
+
+@pytest.mark.usefixtures("arms")
+@pytest.mark.parametrize(
+    ("typed", "name"),
+    [
+        ("ur5e", "ur5e"),
+        ("UR5e", "ur5e"),
+        ("ur5e_description", "ur5e"),
+        ("SO-101", "so_arm101"),
+        ("so101", "so_arm101"),
+        ("SO-ARM101", "so_arm101"),
+        ("xArm6", "xarm6"),
+        ("panda", "panda"),
+        ("OpenManipulator-X", "open_manipulator_x"),
+        ("allegro", "allegro_hand"),
+        ("iiwa 14", "iiwa14"),
+    ],
+)
+def test_a_robot_is_found_by_any_common_form_of_its_name(typed: str, name: str) -> None:
+    assert robot_named(typed).name == name
+
+
+@pytest.mark.usefixtures("arms")
+def test_an_unknown_name_is_refused_with_the_nearest_names() -> None:
+    message = why("pandda")
+    assert message.startswith("The gallery has no robot 'pandda'. Nearest names: panda")
+    assert "katana450 arms" in message
+    assert "Nearest" not in why("qqqqqqqq")
+    assert "as MJCF only" in why("yam_mj")
+
+
+@pytest.mark.usefixtures("arms")
+def test_the_list_states_maker_and_licence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["arms"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["NAME", "ROBOT", "MAKER", "LICENCE"]
+    rows = {line.split()[0]: line for line in lines[1:10]}
+    assert set(rows) == {each.name for each in listed_robots().values() if each.urdf}
+    assert rows["so_arm101"].endswith("Apache-2.0")
+    assert "Universal Robots" in rows["ur5e"]
+    assert "9 robots" in lines[-1]
+    assert main(["arms", "--find", "kuka"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].startswith("iiwa14")
+    assert main(["arms", "--find", "nobody"]) == 1
+    assert "No robot of the gallery has 'nobody'" in capsys.readouterr().err
+
+
+def test_one_robot_prints_its_file_and_its_licence(
+    arms: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["arms", "allegro"]) == 0
+    printed = capsys.readouterr()
+    # Standard output is for programs: the progress of the package is not there.
+    assert printed.out == f"{arms / 'hand.urdf'}\n"
+    assert "Allegro Hand. Licence of the description: BSD." in printed.err
+    assert main(["arms", "ur5e"]) == 0
+    assert "https://example.org/arms/blob/0123abc/LICENSE" in capsys.readouterr().err
+
+
+def test_xacro_is_expanded_with_its_arguments_and_finds_its_meshes(
+    arms: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = file_of(robot_named("ur5e"))
+    robot = load(file)
+    assert robot.name == "ur5e"
+    (visual,) = robot.links[0].visuals
+    assert visual.source == (arms / "base.stl").resolve()
+    np.testing.assert_allclose(robot.home["tool0"][:3, 3], (0.817, 0.23, 0.06), atol=1e-9)
+    # The same file again, and the command takes it by name.
+    assert file_of(robot_named("ur5e")) == file
+    monkeypatch.setattr(sys, "stdin", io.StringIO('{"q": [0, 0, 0, 0, 0, 0]}\n'))
+    assert main(["fk", "--arm", "UR5e", "--tool", "tool0", "--frame", "base"]) == 0
+    printed = capsys.readouterr()
+    T = np.array(json.loads(printed.out.splitlines()[0])["T"])
+    np.testing.assert_allclose(T, robot.home["tool0"], atol=1e-9)
+    assert "Universal Robots" in printed.err
+
+
+@pytest.mark.usefixtures("arms")
+def test_each_failure_of_a_download_says_what_to_do() -> None:
+    message = why("panda")
+    assert "cannot be downloaded from https://example.org/arms: Unable to access" in message
+    assert "Could not resolve host: example.org" in message
+    assert "Check the connection" in message
+    assert "Install git" in why("iiwa14")
+    assert "is not complete" in why("sawyer")
+    assert "names no URDF file" in why("gen3")
+    assert "module_that_is_not_there" in why("xarm6")
+
+
+@pytest.mark.usefixtures("arms")
+def test_name_and_file_together_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["serve", "--arm", "allegro", "--urdf", "other.urdf"]) == 1
+    assert "name two robots" in capsys.readouterr().err
+
+
+def test_without_the_package_the_command_says_what_to_install(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "robot_descriptions", None)
+    assert main(["serve", "--arm", "ur5e"]) == 1
+    assert "pip install 'katana450[gallery]'" in capsys.readouterr().err
+    assert main(["arms"]) == 1
+    assert "pip install 'katana450[gallery]'" in capsys.readouterr().err
+
+
+def test_the_address_of_a_real_arm_is_no_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["serve", "--port", "0", "--arm", "http://nowhere"]) == 1
+    assert "gallery" not in capsys.readouterr().err
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("arms")
+def test_a_server_drives_a_robot_of_the_gallery() -> None:
+    with AppServer((*APP, "--arm", "allegro")) as server:
+        assert "Licence of the description: BSD." in server.output
+        assert "Joints only." in server.output
