@@ -83,7 +83,7 @@ def test_invalid_stl_is_refused(data: bytes, said: str) -> None:
     ("text", "said"),
     [
         ("", "has no triangles"),
-        ("v 0 0 0\np 1\n", "has no triangles.* It has points"),
+        ("v 0 0 0\np 1\n", "has no triangles. It has points"),
         ("v 1 2", "line 1: a vertex must have three finite coordinates"),
         ("v 1 2 nan", "three finite"),
         ("v 1 2 1e999", "three finite"),

@@ -1,4 +1,4 @@
-"""The table of programs in docs/exchange.md names the versions that the tests use."""
+"""The tables of programs in docs/exchange.md name the versions and the tests that are used."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import pytest
 
 from tests.exchange.tools import PINOCCHIO, PYBULLET, USD
 
-PAGE = (Path(__file__).parents[2] / "docs" / "exchange.md").read_text(encoding="utf-8")
+TESTS = Path(__file__).parents[1]
+
+PAGE = (TESTS.parent / "docs" / "exchange.md").read_text(encoding="utf-8")
 
 USED = {
     "PyBullet": PYBULLET.name.partition("==")[2],
@@ -28,3 +30,35 @@ def test_version_is_the_one_that_is_tested(program: str) -> None:
     named = re.findall(rf"^\| [^|]+ \| {program} ([0-9.]+)", PAGE, re.MULTILINE)
     assert named
     assert set(named) == {USED[program]}
+
+
+NOT_TESTED = ("MATLAB, Simulink, LabVIEW",)
+"""Programs that were not available."""
+
+
+def rows() -> list[dict[str, str]]:
+    """Return the rows of the tables of programs by the names of their columns."""
+    found: list[dict[str, str]] = []
+    head: list[str] | None = None
+    for line in PAGE.splitlines():
+        cells = [cell.strip() for cell in line.split("|")[1:-1]]
+        if cells[:2] == ["format", "program, version"]:
+            head = cells
+        elif not cells:
+            head = None
+        elif head is not None and "---" not in cells:
+            found.append(dict(zip(head, cells, strict=True)))
+    return found
+
+
+def test_every_program_has_a_test() -> None:
+    """Each row names files of tests, which exist and name the program."""
+    table = rows()
+    assert len(table) > 20
+    for row in table:
+        files = re.findall(r"`([^`]+)`", row["test"])
+        assert bool(files) != (row["program, version"] in NOT_TESTED), row
+        texts = [(TESTS / file).read_text(encoding="utf-8").lower() for file in files]
+        assert all("def test_" in text for text in texts), row
+        program = re.findall("[a-z_]+", row["program, version"].lower())[0]
+        assert not texts or any(program in text for text in texts), row

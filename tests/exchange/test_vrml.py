@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
+from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.export.vrml import DIGITS, part_world, vrml_files, world_of
@@ -215,9 +216,9 @@ def test_comments_commas_and_bare_values_are_read() -> None:
 @needs("tovrmlx3d")
 def test_another_program_accepts_the_arm_that_moves(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,0.2\n")
-    motion = load_motion(tmp_path / "m.csv", katana)
-    (tmp_path / "whole.wrl").write_text(world_text(world_of(katana, katana.values(()), motion)))
-    converted = run("tovrmlx3d", "--encoding", "xml", tmp_path / "whole.wrl")
+    options = ["--no-objects", "--out", str(tmp_path), "--trajectory", str(tmp_path / "m.csv")]
+    assert main(["export", "vrml", *options]) == 0
+    converted = run("tovrmlx3d", "--encoding", "xml", tmp_path / "katana450.wrl")
     for joint in katana.joints:
         assert f'<Transform DEF="{joint}"' in converted
     assert converted.count("<ROUTE") == 2 * len(katana.joints)

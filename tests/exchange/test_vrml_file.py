@@ -237,7 +237,7 @@ def test_nodes_that_use_others_can_be_deep() -> None:
         ("", "has no triangles"),
         (
             "Shape { geometry Text { } }",
-            "has no triangles, and an object needs a surface. It has Text",
+            "has no triangles. It has Text. An object needs a surface: save it with faces.",
         ),
         (chain(40, 2), "more than 40000 nodes"),
         (chain(40, 2, "Group { }"), "more than 40000 nodes"),

@@ -96,7 +96,7 @@ def test_prototypes_of_prototypes_are_bounded() -> None:
     [
         ("PROTO P [ field SFBool b ] { } P { ", "ends too early"),
         ("PROTO P [ size 1 ] { }", "'size' is not a part of the interface"),
-        ("PROTO P [ ] { P { } } P { }", "has no triangles.* It has P"),
+        ("PROTO P [ ] { P { } } P { }", "has no triangles. It has P"),
         ("PROTO P [ ] { " * 300, "nested more than 200 deep|nested too deeply"),
         ("PROTO P [ field SFVec3f s a b c ] { }", "expected a number"),
     ],
@@ -130,7 +130,7 @@ def test_prototypes_are_read_from_other_files() -> None:
 def test_missing_worlds_are_named() -> None:
     shape = read('Shape { geometry Box { } } Inline { url "gone.wrl" } Inline { url "http://a/b" }')
     assert "It names files that are not there: gone.wrl, http://a/b. Add them" in shape.text
-    with pytest.raises(InputError, match=r"no triangles.* that are not there: a.wrl"):
+    with pytest.raises(InputError, match=r"no triangles. It names files that are not there: a.wrl"):
         read('Inline { url "a.wrl" }')
 
 

@@ -178,10 +178,8 @@ def read_shape(
     left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
     if not len(surface.faces):
         without = f" It has {_listed(left_out)}." if left_out else ""
-        raise InputError(
-            f"{file} has no triangles, and an object needs a surface.{without}"
-            f"{_not_there(companions)}"
-        )
+        hint = _not_there(companions) or " An object needs a surface: save it with faces."
+        raise InputError(f"{file} has no triangles.{without}{hint}")
     sides = np.ptp(surface.vertices, axis=0)
     longest = float(sides.max())
     metres, why = _unit(format, longest, unit, reading.unit)
