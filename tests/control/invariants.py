@@ -132,7 +132,10 @@ class JointRules(RuleBasedStateMachine):
     def hold(self, ticks: int) -> None:
         self.run([cmd.Hold()], ticks)
         if self.state.stopped is None:
-            assert isinstance(self.state.intent, Idle)
+            # A jog brakes along its twist before it ends.
+            jogging = self.state.jogging
+            assert jogging is None or not jogging.rates.any()
+            assert jogging is not None or isinstance(self.state.intent, Idle)
 
     @rule(ticks=ticks)
     def stop(self, ticks: int) -> None:

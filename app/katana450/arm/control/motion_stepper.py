@@ -32,8 +32,9 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitched_frame
-from katana450.maths.kinematics.velocity import JogFrame, jog, tool_speed, tool_speed_bound
+from katana450.maths.kinematics.velocity import JogFrame, coasted, jog, tool_speed, tool_speed_bound
 from katana450.maths.motion.limiter import LIMIT_TOLERANCE, JointMotion, Limiter, Limits
+from katana450.maths.motion.proportional import STILL, in_proportion
 from katana450.maths.motion.pursuit import stream_step
 
 ELBOW = 2
@@ -213,18 +214,24 @@ class MotionStepper:
         if state.stopped is not None:
             return self._any.stop(motion, dt)
         chain = self._arm.chain_to(state.tool)
-        if state.paused:
+        if state.paused and state.jogging is None:
             pause = limiter.pause(motion, state.goal, dt)
             return self._slow_or_braking(chain, motion, pause, dt)
         fraction = min(state.speed, self._fraction(chain, state))
         rates = None
         if state.jogging is not None:
-            V = jog_twist(chain, motion.q, state.jogging)
-            bounds = self._any.stoppable(motion.q)
-            rates = jog(chain, motion.q, V, JogFrame.BASE, dt, bounds=bounds)
+            q = chain.clamp(motion.q + dt * motion.qd)
+            V = jog_twist(chain, q, state.jogging) * (not state.paused)
+            low, high = self._any.stoppable(q)
+            rates = jog(chain, q, V, JogFrame.BASE, dt, bounds=(low, high))
+            steady = coasted(chain, motion.q, motion.qd, dt)
+            # Joints that their limits slow move one by one.
+            free = (rates > low) & (rates < high) | (np.abs(steady) < STILL)
         for _ in range(MAX_SLOWDOWNS):
             if rates is not None:
-                ahead = self._any.at_rate(motion, fraction * rates, dt)
+                wanted = fraction * rates
+                straight = free.all() and in_proportion(self._any, motion, steady, wanted, dt)
+                ahead = straight or self._any.at_rate(motion, wanted, dt)
             elif state.servo is not None:
                 ahead = stream_step(limiter, motion, state.servo, state.t, dt, fraction)
             else:

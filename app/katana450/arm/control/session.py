@@ -303,6 +303,9 @@ class Session:
             case cmd.Hold(finding=cause):
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 held = self._at_rest_soon(without_finding(held, Reason.CONTACT))
+                if state.jogging is not None:
+                    end = replace(state.jogging, rates=tool_targets.NO_RATES, until=state.t)
+                    held = with_mode(held, end)
                 why = () if cause is None else (Finding(Reason.WAITING), cause)
                 return replace(held, findings=(*why, *held.findings))
             case cmd.AxisCommand():

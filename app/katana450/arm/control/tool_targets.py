@@ -20,7 +20,7 @@ from katana450.arm.control.modes import (
     Tracking,
 )
 from katana450.arm.control.motion_stepper import jog_twist
-from katana450.arm.control.state import GRIPPER_REASONS, Reason, State
+from katana450.arm.control.state import CAUSES, GRIPPER_REASONS, Reason, State
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.forward import forward
@@ -32,7 +32,7 @@ from katana450.maths.kinematics.velocity import JogFrame
 NO_RATES = frozen(np.zeros(5))
 """The rates of a jog that ends."""
 
-KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, *GRIPPER_REASONS)
+KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, Reason.WAITING, *CAUSES, *GRIPPER_REASONS)
 """The reasons that a jog keeps; it computes all others again."""
 
 

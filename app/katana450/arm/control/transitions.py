@@ -69,7 +69,8 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     cmd.Go: _row(Following,             R,   S,   R,   R,   R,   R),
     cmd.Stop: _row(Idle,                S,   S,   S,   S,   S,   S),
     cmd.ClearStop: _row(Idle,           S,   S,   S,   S,   S,   S),
-    cmd.Hold: _row(Idle,                S,   S,   S,   S,   S,   S),
+    # A jog ends along its twist, as without renewal.
+    cmd.Hold: _row(Idle,                S,   S,   S,   C,   S,   S),
     # A target refers to the earlier tool frame, so it ends; the goal stays.
     cmd.SetTool: _row(Positioning,      A,   S,   S,   S,   S,   A),
     # A tool target is projected again.

@@ -165,6 +165,19 @@ def jog(
     return qd / _excess(chain, qd)
 
 
+def coasted(chain: Chain, q: FloatArray, qd: FloatArray, dt: float) -> FloatArray:
+    """Return the joint rates (5,) [rad/s] after `dt` [s] with which the tool keeps its twist.
+
+    The twist is that of the rates `qd` (5,) [rad/s] at `q` (5,) [rad]: the velocity of the tool
+    point in {S}, and the rotation about the axes of pitch and of roll. Near a singularity
+    it is kept as far as the damping allows.
+    """
+    (J, R, _), (J_after, R_after, _) = (_freedoms(chain, each) for each in (q, q + dt * qd))
+    wanted = J @ qd
+    wanted[2:] = R_after.T @ R @ wanted[2:]
+    return qd + _damped(J_after, wanted - J_after @ qd)
+
+
 def limited_jog(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None = None) -> float:
     """Return the fraction, from 0 to 1, of the twist `V` (6,) in {S} that a jog can follow.
 
@@ -233,16 +246,18 @@ def _task(
 
     All components are in the tool frame, at the tool point.
     """
-    R = forward(chain, q)[:3, :3]
+    J, R, axes = _freedoms(chain, q)
     omega, v = (V[:3], V[3:]) if frame is JogFrame.TOOL else (R.T @ V[:3], R.T @ V[3:])
-    frames = joint_frames(chain, q)
+    return J, np.array((*(axes @ omega), *(v / characteristic_length(chain))))
+
+
+def _freedoms(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the Jacobian (5, n) of a task, R (3, 3) of the tool, and its two axes (2, 3) in it."""
+    R, frames = forward(chain, q)[:3, :3], joint_frames(chain, q)
     # Parallel axes stay parallel: axis 2 is the pitch axis. The last axis is the roll axis.
-    pitch_axis = R.T @ frames[1][:3, :3] @ chain.S[:3, 1]
-    roll_axis = R.T @ frames[-1][:3, :3] @ chain.S[:3, -1]
-    length = characteristic_length(chain)
+    axes = np.array([R.T @ frames[k][:3, :3] @ chain.S[:3, k] for k in (1, -1)])
     J = jacobian_body(chain, q)
-    task = np.vstack((pitch_axis @ J[:3], roll_axis @ J[:3], J[3:] / length))
-    return task, np.array((pitch_axis @ omega, roll_axis @ omega, *(v / length)))
+    return np.vstack((axes @ J[:3], J[3:] / characteristic_length(chain))), R, axes
 
 
 def _damped(J: FloatArray, wanted: FloatArray) -> FloatArray:
