@@ -13,6 +13,7 @@ import pytest
 from playwright.sync_api import Browser
 from playwright.sync_api import Error as PlaywrightError
 
+from katana450.client import Client, connect
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
@@ -97,8 +98,8 @@ def open_page(windows: Windows) -> Iterator[OpenPage]:
 
 
 @pytest.fixture(scope="package")
-def shared_server() -> Iterator[SharedServer]:
-    """Return the server of the modules of this folder."""
+def shared_server(browser: Browser) -> Iterator[SharedServer]:  # noqa: ARG001
+    """Return the server of the modules of this folder. It ends before the browser."""
     with SharedServer() as shared_server:
         yield shared_server
 
@@ -137,6 +138,13 @@ def new_page(server: AppServer, open_page: OpenPage, truth: Truth) -> Iterator[V
     prepare(page, truth)
     yield page
     assert page.errors == []
+
+
+@pytest.fixture
+def reader(server: AppServer) -> Iterator[Client]:
+    """Connect a program that only reads."""
+    with connect(server.url, "Reader") as reader:
+        yield reader
 
 
 @pytest.fixture(scope="session")

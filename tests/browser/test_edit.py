@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.client import Client, connect
+from katana450.client import Client
 from katana450.server.api import answers
 from tests.browser.camera import Camera
 from tests.browser.conftest import OpenPage
@@ -49,12 +48,6 @@ def page(server: AppServer, open_page: OpenPage, truth: Truth) -> ViserPage:
     page = open_page(server.url, nodes=("/arm", MOVE))
     prepare(page, truth)
     return page
-
-
-@pytest.fixture
-def reader(server: AppServer) -> Iterator[Client]:
-    with connect(server.url, "Reader") as reader:
-        yield reader
 
 
 def names(reader: Client) -> set[str]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import trimesh
 
-from katana450.client import Client, connect
+from katana450.client import Client
 from katana450.extensions.export.vrml_text import HEADER
 from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
@@ -36,12 +35,6 @@ def page(server: AppServer, open_page: OpenPage, truth: Truth) -> ViserPage:
     page = open_page(server.url, nodes=("/arm", MOVE))
     prepare(page, truth)
     return page
-
-
-@pytest.fixture
-def reader(server: AppServer) -> Iterator[Client]:
-    with connect(server.url, "Reader") as reader:
-        yield reader
 
 
 def scales(reader: Client) -> dict[str, float]:

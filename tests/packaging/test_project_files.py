@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -52,6 +53,20 @@ def test_python_files_have_at_most_400_lines() -> None:
     assert len(files) > 1000
     lines = {file: file.read_bytes().count(b"\n") for file in files}
     assert not {str(file): count for file, count in lines.items() if count > MAX_LINES}
+
+
+def test_every_dependency_has_a_reason() -> None:
+    about = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    lists = (
+        about["project"]["dependencies"],
+        *about["project"]["optional-dependencies"].values(),
+        *about["dependency-groups"].values(),
+    )
+    words = [each for group in lists for each in group if isinstance(each, str)]
+    names = {re.split(r"[^\w.-]", each)[0].lower() for each in words}
+    assert {"numpy", "pyserial", "pytest"} < names
+    reasons = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8").lower()
+    assert not {name for name in names if f"[{name}]" not in reasons}
 
 
 def test_version_has_an_entry_in_the_changelog_with_its_date() -> None:
