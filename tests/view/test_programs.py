@@ -72,20 +72,25 @@ def test_texts_are_escaped_in_markup() -> None:
     assert _page(None) == ""
 
 
+def panel_of(
+    server: viser.ViserServer,
+    robot: Robot,
+    runner: ProgramRunner,
+    scripts: Scripts,
+    session: Session,
+    state: State,
+) -> ProgramsPanel:
+    """Return the panel of an arm that keeps its state."""
+    gestures = RecordedGestures()
+    return ProgramsPanel(server, robot, runner, scripts, gestures, lambda: state, lambda: session)
+
+
 def test_panel_previews_and_steers(
     server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
     program_runner = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ProgramsPanel(
-        server,
-        robot,
-        program_runner,
-        Scripts(tmp_path),
-        RecordedGestures(),
-        lambda: state,
-        lambda: session,
-    )
+    panel = panel_of(server, robot, program_runner, Scripts(tmp_path), session, state)
     # The first choice is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
     panel.follow()
@@ -136,15 +141,7 @@ def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
 ) -> None:
     program_runner = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ProgramsPanel(
-        server,
-        robot,
-        program_runner,
-        Scripts(tmp_path),
-        RecordedGestures(),
-        lambda: state,
-        lambda: session,
-    )
+    panel = panel_of(server, robot, program_runner, Scripts(tmp_path), session, state)
     plan_context = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
     program = compiled(parse(text), plan_context, state)
@@ -207,15 +204,7 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
     program_runner = ProgramRunner()
     session = describe_robot(Settings(), URDF_PATH, None).session
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ProgramsPanel(
-        server,
-        robot,
-        program_runner,
-        Scripts(tmp_path),
-        RecordedGestures(),
-        lambda: state,
-        lambda: session,
-    )
+    panel = panel_of(server, robot, program_runner, Scripts(tmp_path), session, state)
     plan_context = PlanContext(session, arm.T_base_shoulder)
     program = compiled(parse(PourDemo().text), plan_context, state)
     panel._with_ghosts = True
@@ -280,15 +269,7 @@ def test_list_follows_the_folder(
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     scripts = Scripts(tmp_path)
-    panel = ProgramsPanel(
-        server,
-        robot,
-        ProgramRunner(),
-        scripts,
-        RecordedGestures(),
-        lambda: state,
-        lambda: session,
-    )
+    panel = panel_of(server, robot, ProgramRunner(), scripts, session, state)
     chosen = panel._choice.value
     scripts.save("Mine", "steps: [home]")
     panel.follow()
