@@ -21,19 +21,19 @@ EARLY = "computes for long, so that nothing else would be left beside it at the 
 
 KINDS = {
     "tests/browser": BROWSER,
-    # These run servers too, or control loops on the clock of the machine. They follow the browser,
-    # which makes the rows equally long.
+    # These run servers too, or control loops on the clock of the machine. They are distributed so
+    # that the rows are about equally long.
     "tests/event_log": BROWSER,
-    "tests/extensions": BROWSER,
+    "tests/extensions": SERVERS[0],
     "tests/runtime": BROWSER,
     "tests/cli/test_lines.py": BROWSER,
     "tests/cli/test_live.py": BROWSER,
     "tests/cli/test_run_control.py": SERVERS[0],
-    "tests/cli/test_serve.py": BROWSER,
-    "tests/docs": BROWSER,
-    "tests/examples": BROWSER,
+    "tests/cli/test_serve.py": SERVERS[0],
+    "tests/docs": SERVERS[0],
+    "tests/examples": SERVERS[1],
     "tests/leader/test_leader_on_a_server.py": SERVERS[1],
-    "tests/library/test_run.py": BROWSER,
+    "tests/library/test_run.py": SERVERS[1],
     "tests/real_arm/test_arm_commands.py": SERVERS[0],
     "tests/real_arm/test_driver.py": SERVERS[1],
     "tests/real_arm/test_driver_with_emulator.py": SERVERS[0],
@@ -43,7 +43,7 @@ KINDS = {
     "tests/recording/test_episodes_on_a_server.py": SERVERS[1],
     "tests/recording/test_recorder.py": SERVERS[0],
     "tests/recording/test_run_again_on_a_server.py": SERVERS[0],
-    "tests/robot/test_other_arms.py": BROWSER,
+    "tests/robot/test_other_arms.py": SERVERS[1],
     "tests/api/test_descriptions.py": SERVERS[1],
     "tests/rosbridge": SERVERS[1],
     # The most tests come first, so a file of many takes the single test of the types along.
