@@ -65,7 +65,7 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         robot = bare(robot)
     arm = robot.require_arm()
     world, left_out = _world(robot)
-    notes = [*arm.notes, *robot.notes, *left_out]
+    notes = [*arm.notes, *robot.notes, *robot.joint_notes, *left_out]
     props = load_props()
     hand: Hand | None = None
     objects: tuple[SceneObject, ...] = ()

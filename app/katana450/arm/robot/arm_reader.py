@@ -11,7 +11,7 @@ import numpy as np
 
 from katana450.arm.robot.conduit import Hinge, read_stretches
 from katana450.arm.robot.gripper import Fingers, fingers_of
-from katana450.arm.robot.link import Link
+from katana450.arm.robot.link import SLOW_TURN, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.structure import Structure, structure_of
 from katana450.arm.robot.urdf import Urdf, UrdfJoint
@@ -88,7 +88,7 @@ def described_chain(
         S=np.column_stack([_screw(j, T_shoulder_base @ frames[j.child]) for j in joints]),
         lower=np.array([_limit(joint, "lower") for joint in joints]),
         upper=np.array([_limit(joint, "upper") for joint in joints]),
-        speed=np.array([_limit(joint, "velocity") for joint in joints]),
+        speed=np.array([_speed(joint) for joint in joints]),
         names=tuple(joint.name for joint in joints),
     )
     return chain, T_base_shoulder
@@ -126,6 +126,12 @@ def _screw(joint: UrdfJoint, T_shoulder_child: FloatArray) -> FloatArray:
         raise RobotDescriptionError(
             f"The description of joint {joint.name!r} is wrong. {error}"
         ) from error
+
+
+def _speed(joint: UrdfJoint) -> float:
+    """Return the speed of ``joint`` [rad/s], a slow one if none is stated."""
+    stated = None if joint.limit is None else joint.limit.velocity
+    return stated if stated is not None and 0.0 < stated < math.inf else SLOW_TURN
 
 
 def _limit(joint: UrdfJoint, which: str) -> float:

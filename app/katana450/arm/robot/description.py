@@ -19,6 +19,14 @@ XACRO = re.compile(r"^https?://(www\.|wiki\.)?ros\.org/(wiki/)?xacro")
 SUFFIX = ".xacro"
 """Suffix of the files that are always expanded."""
 
+DECLARATION = re.compile(rb"\A(\s*)<\?xml\s+version\s*=\s*[\"'][^\"']*[\"']([^?]*\?>)")
+"""An XML declaration, which must be the first bytes of a file."""
+
+PREFIX = re.compile(rb"<([A-Za-z_][\w.-]*):")
+DECLARED = re.compile(rb"\sxmlns:([\w.-]+)\s*=")
+ROOT = re.compile(rb"<robot\b")
+"""The prefix of an element, the declaration of one, and the outermost element."""
+
 UNEXPANDED = re.compile(r"\$[({]")
 """Beginning of an expression of xacro."""
 
@@ -72,7 +80,7 @@ def checked(path: Path) -> bytes:
     if not path.is_file():
         raise RobotDescriptionError(f"There is no robot description at {path}.")
     try:
-        data = path.read_bytes()
+        data = _mended(path.read_bytes())
     except OSError as error:
         raise RobotDescriptionError(f"{path} cannot be opened: {error.strerror}.") from error
     checks = _Checks(str(path))
@@ -85,6 +93,19 @@ def checked(path: Path) -> bytes:
         root = checks.parsed(data)
     checks.check(root)
     return data
+
+
+def _mended(data: bytes) -> bytes:
+    """Return ``data`` without faults that readers of URDF in ROS overlook.
+
+    These are an XML declaration that is not at the beginning or names another version, and
+    prefixes, as of Gazebo, that are not declared. No line changes its number.
+    """
+    # The blank lines before the declaration are moved behind it.
+    data = DECLARATION.sub(rb'<?xml version="1.0"\2\1', data, count=1)
+    unknown = {*PREFIX.findall(data)} - {*DECLARED.findall(data), b"xml", b"xacro"}
+    declarations = b"".join(b' xmlns:%s="%s"' % (each, each) for each in sorted(unknown))
+    return ROOT.sub(lambda match: match[0] + declarations, data, count=1)
 
 
 @contextmanager

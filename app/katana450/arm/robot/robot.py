@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -228,21 +229,38 @@ class Robot:
     @property
     def joint_notes(self) -> tuple[str, ...]:
         """Sentences for a person on assumptions about the driven joints."""
-        return tuple(
+        driven = [self.joints[name] for name in self.driven]
+        slow = tuple(
             f"Joint {joint.name!r} has no speed in its file; it gets {_speed(joint):g} "
             f"{'m/s' if joint.slides else 'rad/s'}."
-            for joint in map(self.joints.__getitem__, self.driven)
+            for joint in driven
             if _speed(joint) != joint.speed
         )
+        return slow + tuple(
+            f"The limits of the joints that follow {joint.name!r} exclude each other, so only its "
+            "own are kept."
+            for joint in driven
+            if not operator.lt(*self._common_range(joint)) and joint.lower < joint.upper
+        )
 
-    def _range(self, driven: Joint) -> tuple[float, float]:
-        """Return the range [rad, m] where ``driven`` and its followers are inside their limits."""
+    def _common_range(self, driven: Joint) -> tuple[float, float]:
+        """Return the range [rad, m] where ``driven`` and its followers are inside their limits.
+
+        The first number is not below the second one if there is no such range.
+        """
         low, high = -math.inf, math.inf
         for joint in self.joints.values():
             if joint.leader != driven.name or joint.factor == 0.0:
                 continue
             ends = sorted((end - joint.offset) / joint.factor for end in (joint.lower, joint.upper))
             low, high = max(low, ends[0]), min(high, ends[1])
+        return low, high
+
+    def _range(self, driven: Joint) -> tuple[float, float]:
+        """Return the range [rad, m] of ``driven``."""
+        low, high = self._common_range(driven)
+        if low >= high:
+            low, high = driven.lower, driven.upper
         if not driven.slides:
             low, high = (
                 -math.pi if low == -math.inf else low,
@@ -250,8 +268,8 @@ class Robot:
             )
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise RobotDescriptionError(
-                f"Joint {driven.name!r} of {self.name} cannot be driven: together with the joints "
-                f"that follow it, its range is {low:g} to {high:g}. Set lower below upper limits."
+                f"Joint {driven.name!r} of {self.name} cannot be driven: its range is {low:g} to "
+                f"{high:g}. Set the lower below the upper limit."
             )
         return low, high
 

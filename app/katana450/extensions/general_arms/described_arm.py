@@ -9,6 +9,7 @@ from pathlib import Path
 
 from katana450.arm.robot.arm_reader import described_chain
 from katana450.arm.robot.description import checked, explained
+from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.structure import structure_of
 from katana450.arm.robot.urdf import urdf_of
 from katana450.errors import InputError, RobotDescriptionError
@@ -89,11 +90,16 @@ def described_arm(path: Path, tool: str | None = None) -> DescribedArm:
         described, T_base_shoulder = described_chain(frames, structure)
     T_shoulder_base = se3.inverse(T_base_shoulder)
     chain, notes = exact_arm(described)
+    slow = [
+        f"Joint {joint.name!r} has no speed in its file; it gets {SLOW_TURN:g} rad/s."
+        for joint, speed in zip(structure.axes, chain.speed.tolist(), strict=True)
+        if joint.limit is None or joint.limit.velocity != speed
+    ]
     method = f"The kinematics are {kinematics_of(chain).method}."
     return DescribedArm(
         chain=chain,
         tools={link: frozen(T_shoulder_base @ frames[link]) for link in structure.tools},
         default_tool=structure.tools[0],
         T_base_shoulder=frozen(T_base_shoulder),
-        notes=(*notes, method),
+        notes=(*notes, *slow, method),
     )
