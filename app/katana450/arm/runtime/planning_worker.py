@@ -7,8 +7,11 @@ import threading
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
@@ -92,7 +95,8 @@ class PlanningWorker:
             state = self._at_rest(actor, cancelled)
             arm = self._session.require_arm()
             goal = with_branch(arm, state, command.branch).goal
-            if (goal != state.setpoint).any():
+            # At a stretched elbow two branches are one posture, but for rounding.
+            if (np.abs(goal - state.setpoint) > START_TOLERANCE).any():
                 world = self._session.world_at(state)
                 plan = plan_to(arm, world, state, goal)
                 # An arm that the server has paused meanwhile moves only by a newer command.

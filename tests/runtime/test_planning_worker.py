@@ -1,0 +1,61 @@
+"""A change of branch is planned, or is none where two branches are one posture."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.session import Session
+from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.planning_worker import PlanningWorker
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.maths.kinematics.branch import Branch
+
+
+class Sink:
+    """Keeps the commands."""
+
+    last_ticket = 0
+
+    def __init__(self) -> None:
+        self.commands: list[cmd.Command] = []
+
+    def deliver(self, command: cmd.Command, actor: Actor | None) -> int:  # noqa: ARG002
+        self.commands.append(command)
+        return 0
+
+
+def planned(session: Session, elbow: float) -> tuple[PlanningWorker, list[cmd.Command]]:
+    """Return the worker, and the commands, after a change to the other side of the elbow."""
+    state = session.begin(np.array([0.3, -0.9, elbow, -0.6, -0.2]), 0.0, 0.0)
+    sink = Sink()
+    worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
+    here = state.branch
+    worker.deliver(
+        cmd.TakeBranch(Branch(here.shoulder, "down" if here.elbow == "up" else "up")), None
+    )
+    end = time.monotonic() + 30.0
+    while any(each.name == "planning" for each in threading.enumerate()):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    return worker, sink.commands
+
+
+@pytest.mark.parametrize("elbow", [0.0, 1e-12, 1e-9, -1e-9, 3e-8])
+def test_stretched_elbow_is_on_both_branches(session: Session, elbow: float) -> None:
+    worker, commands = planned(session, elbow)
+    assert worker.failure == ""
+    assert commands == []
+
+
+def test_bent_elbow_follows_a_plan(session: Session) -> None:
+    worker, commands = planned(session, 0.4)
+    assert worker.failure == ""
+    (follow,) = commands
+    assert isinstance(follow, cmd.Follow)
+    assert follow.plan.duration > 0.1
