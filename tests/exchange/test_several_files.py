@@ -173,6 +173,21 @@ def test_files_of_a_folder_are_bounded(tmp_path: Path) -> None:
         read_mesh_file(tmp_path / "a.gltf")
 
 
+def test_files_beyond_the_limit_are_not_read() -> None:
+    """Each file alone is small enough; together they would be 9 GB."""
+    names, asked = [f"{number}.wrl" for number in range(450)], []
+
+    def beside(name: str, maximum: int) -> bytes:
+        asked.append((name, maximum))
+        return bytes(min(8_000_000, maximum + 1))
+
+    world = HEADER + "".join(f'\nInline {{ url "{name}" }}' for name in names)
+    with pytest.raises(InputError, match="and the files that it names have over 20 MB"):
+        read_mesh(world.encode(), "a.wrl", beside=beside)
+    left = 20_000_000 - len(world)
+    assert asked == [(names[0], left), (names[1], left - 8_000_000), (names[2], left - 16_000_000)]
+
+
 def test_serve_places_objects_of_several_files_and_with_a_scale(
     tmp_path: Path, session: object
 ) -> None:

@@ -41,9 +41,9 @@ MAX_PASSES = 8
 MAX_COMPANIONS = 500
 """Maximum number of files that a file may name."""
 
-Beside = Callable[[str], bytes | None]
-"""A function that returns the content of a file by its path in the folder of the shape file; None
-if it is not there.
+Beside = Callable[[str, int], bytes | None]
+"""A function that returns the content of a file by its path in the folder of the shape file, up to
+one byte more than a maximum; None if it is not there.
 """
 
 
@@ -72,14 +72,11 @@ def read_shape_guarded(
     found = _parsed(data, [format.value, file, *words, main], file)
     # What a .zip names is in it.
     for _ in range(0 if format is Format.ZIP else MAX_PASSES):
-        more = _companions(found, beside, companions.keys() | {own}, file)
+        left = MAX_FILE_BYTES - len(data) - sum(map(len, companions.values()))
+        more = _companions(found, beside, companions.keys() | {own}, file, left)
         if not more:
             break
         companions |= more
-        if len(data) + sum(map(len, companions.values())) > MAX_FILE_BYTES:
-            raise InputError(
-                f"{file} and the files that it names have over {MAX_FILE_BYTES // 1_000_000} MB."
-            )
         bundle = packed(own, {own: data} | companions)
         found = _parsed(bundle, [Format.ZIP.value, file, *words, own], file)
     if "choices" in found:
@@ -107,16 +104,29 @@ def read_shape_guarded(
 
 
 def _companions(
-    found: dict[str, Any], beside: Beside | None, known: set[str], file: str
+    found: dict[str, Any], beside: Beside | None, known: set[str], file: str, left: int
 ) -> dict[str, bytes]:
-    """Return those files beside a file that it names and that are not ``known`` yet."""
+    """Return those files beside a file that it names and that are not ``known`` yet.
+
+    Raises InputError once they have more than ``left`` bytes; no further one is then read.
+    """
     if beside is None:
         return {}
     paths = [path for path in map(str, found["missing"]) if is_inside(path) and path not in known]
     if len(paths) + len(known) > MAX_COMPANIONS:
         raise InputError(f"{file} names more than {MAX_COMPANIONS} other files.")
-    contents = {path: beside(path) for path in paths}
-    return {path: content for path, content in contents.items() if content is not None}
+    contents: dict[str, bytes] = {}
+    for path in paths:
+        content = beside(path, left)
+        if content is None:
+            continue
+        contents[path] = content
+        left -= len(content)
+        if left < 0:
+            raise InputError(
+                f"{file} and the files that it names have over {MAX_FILE_BYTES // 1_000_000} MB."
+            )
+    return contents
 
 
 def _parsed(data: bytes, words: list[str], file: str) -> dict[str, Any]:

@@ -80,11 +80,11 @@ def read_mesh_file(path: Path, unit: str | None = None, up: Up | None = None) ->
     """
     folder = path.resolve().parent
 
-    def beside(name: str) -> bytes | None:
+    def beside(name: str, maximum: int) -> bytes | None:
         found = (folder / name).resolve()
         if not found.is_relative_to(folder) or not found.is_file():
             return None
-        return _content(found, MAX_FILE_BYTES)
+        return _content(found, maximum)
 
     maximum = MAX_ARCHIVE_BYTES if Format.of(path.name) is Format.ZIP else MAX_FILE_BYTES
     return read_mesh(_content(path, maximum), path.name, unit, up, beside=beside)

@@ -208,9 +208,9 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
             f"{sha256}. To use it nevertheless, remove `sha256`."
         )
 
-    def beside(name: str) -> bytes | None:
+    def beside(name: str, maximum: int) -> bytes | None:
         try:
-            return opened(str(parts.parent / name), MAX_FILE_BYTES)
+            return opened(str(parts.parent / name), maximum)
         except InputError:
             return None
 
