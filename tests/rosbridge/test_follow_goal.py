@@ -25,6 +25,7 @@ class WaitingRunner(Runner):
 
     def __init__(self) -> None:
         self.waits = True
+        self.owned = True
         self.status = "ready"
         self.ended: list[str] = []
         self.name = ""
@@ -32,6 +33,9 @@ class WaitingRunner(Runner):
     def progress(self) -> answers.Progress:
         # A script has no name until its thread has read it.
         return answers.Progress(name=self.name, by="A client", status=self.status)
+
+    def owns(self, participant: Participant) -> bool:  # noqa: ARG002
+        return self.owned
 
     def runs_for(self, participant: Participant) -> bool:  # noqa: ARG002
         return self.waits
@@ -74,3 +78,14 @@ def test_program_that_runs_with_the_next_tick_is_not_reported_as_cancelled(
 def test_cancel_voids_the_run_that_waits(goal: FollowGoal, runner: WaitingRunner) -> None:
     assert goal.end("The client cancelled it.").status is GoalStatus.CANCELED
     assert runner.ended == ["The client cancelled it"]
+
+
+def test_cancel_leaves_the_unread_program_of_another_client(
+    goal: FollowGoal, runner: WaitingRunner
+) -> None:
+    runner.status, runner.owned = "planning", False
+    assert goal.end("The client cancelled it.").status is GoalStatus.CANCELED
+    assert runner.ended == []
+    result = goal.follow()
+    assert result is not None
+    assert result.status is GoalStatus.CANCELED

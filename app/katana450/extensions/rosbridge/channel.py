@@ -39,12 +39,13 @@ from katana450.server.web.program_socket import BURST, FORGIVEN_PER_SECOND, MAX_
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
-
 TICK = 0.02
 """[s] Interval at which goals and streams are advanced."""
 
 MAX_GOALS = 4
 """Maximum number of goals of one client at a time."""
+
+ERROR_TEXT = "The server had an internal error; see its log."
 
 LEVELS = ("info", "warning", "error", "none")
 """Levels of status messages, from the most to the least verbose."""
@@ -347,13 +348,16 @@ class RosChannel(Channel):
         self.wake()
 
     async def _act(self) -> None:
-        """Continue goals and streams while there are any."""
-        while True:
-            await self._acting.wait()
-            self._acting.clear()
-            while self._goals or self._stream.moves or self._comes_to_rest():
-                self._continue()
-                await asyncio.sleep(TICK)
+        """Continue goals and streams while there are any; an error ends the connection."""
+        try:
+            while await self._acting.wait():
+                self._acting.clear()
+                while self._goals or self._stream.moves or self._comes_to_rest():
+                    self._continue()
+                    await asyncio.sleep(TICK)
+        except Exception:
+            log.exception("Error on a channel.")
+            await self._disconnect(1011, ERROR_TEXT)
 
     def _comes_to_rest(self) -> bool:
         """Return whether the arm still moves and this client drives it."""
@@ -375,7 +379,7 @@ class RosChannel(Channel):
                 goal.tick()
             except Exception:
                 log.exception("Error in a goal.")
-                goal.cancel("The server had an internal error; see its log.")
+                goal.cancel(ERROR_TEXT)
         self._goals = [goal for goal in self._goals if not goal.ended]
 
     def _ask(self, request: requests.Request) -> answers.Answer:

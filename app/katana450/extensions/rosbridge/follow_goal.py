@@ -167,9 +167,11 @@ class FollowGoal(Goal):
     def _progress(self) -> answers.Progress | None:
         """Return the progress of the program; None if it is not the present one any more."""
         now = self._runner.progress()
+        if now is None:
+            return None
         # A script has no name until its thread has read it.
-        mine = now is not None and now.name in (self._name, "")
-        return now if mine else None
+        unread = not now.name and self._runner.owns(self.host.participant)
+        return now if now.name == self._name or unread else None
 
     @property
     def _runner(self) -> Runner:

@@ -68,6 +68,10 @@ class Runner:
         kind = type(request).__name__
         raise AssertionError(f"{type(self).__name__} lists {kind} and does not execute it.")
 
+    def owns(self, participant: Participant) -> bool:  # noqa: ARG002
+        """Return whether ``participant`` owns the present or last run, or its planning."""
+        return False
+
     def runs_for(self, participant: Participant) -> bool:  # noqa: ARG002
         """Return whether a run of ``participant`` drives the arm, or will once it is planned."""
         return False
