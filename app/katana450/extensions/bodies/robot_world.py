@@ -6,30 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from katana450.arm.robot.collision import Pieces, as_modelled, world_of
+from katana450.arm.robot.collision import as_modelled, world_of
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
-from katana450.arm.robot.visual import GEOMETRY_FILES, Visual
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
-from katana450.maths.collision.convex_body import convex_body
+from katana450.extensions.bodies.pieces import pieces
 from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
 
 
-def one_body(shape: Visual) -> Sequence[FloatArray]:
-    """Return the corners of one convex body round the whole ``shape``."""
-    return [shape.kept(lambda: convex_body(shape.mesh.vertices).corners, files=GEOMETRY_FILES)]
-
-
-def robot_world(
-    robot: Robot, pieces: Pieces = one_body
-) -> tuple[CollisionWorld | None, tuple[str, ...]]:
+def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
     """Return the bodies and pairs of ``robot``, and sentences for a person on what is left out.
 
     x is that of ``world_of``. An arm of the five-axis family keeps the pairs that sampled postures
-    bring near each other. ``pieces`` divides the shapes that were not made as convex bodies for
-    such an arm. The world is None if no link has a shape.
+    bring near each other, and its collision shapes count as convex. All other shapes are divided by
+    ``pieces``. The world is None if no link has a shape.
     """
     if robot.arm is not None and robot.arm.chain.n == ARM_JOINTS:
         return world_of(robot, as_modelled if robot.collides else pieces)

@@ -1,0 +1,111 @@
+"""Division of a concave shape into convex bodies that together contain its surface.
+
+The triangles are divided by planes across the axes, each time by the plane that reduces the volume
+of the hulls most. A triangle belongs to one side whole, and each body is a hull of all its
+triangles. So no point of the surface is left out, as approximate decompositions do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.robot.visual import GEOMETRY_FILES, PrimitiveShape, Visual
+from katana450.maths.collision.convex_body import convex_body
+from katana450.maths.collision.engine import engine
+from katana450.maths.geometry.arrays import FloatArray
+
+MAX_PIECES = 8
+"""Maximum number of bodies of one shape."""
+
+MIN_GAIN_FRACTION, MIN_GAIN = 0.03, 1e-6
+"""Minimum volume that a division saves, as a fraction [1] of the hull of the whole, and in m^3."""
+
+PLACES = np.linspace(0.125, 0.875, 7)
+"""Places [1] of the planes that are tried, from end to end of a piece."""
+
+SAMPLED = 1500
+"""Number of triangles of a piece that are used to choose its plane; its body contains all."""
+
+FLAT = 1e-6
+"""[m] Points that deviate less from a plane have no volume."""
+
+
+class _Split(NamedTuple):
+    gain: float
+    one: npt.NDArray[np.int64]
+    other: npt.NDArray[np.int64]
+
+
+def pieces(shape: Visual) -> Sequence[FloatArray]:
+    """Return the corners (k, 3) [m] of the convex bodies that stand for ``shape``.
+
+    Raises InputError for a mesh without points or size.
+    """
+
+    def divided() -> list[FloatArray]:
+        mesh = shape.mesh
+        return divided_mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+    if isinstance(shape.source, PrimitiveShape):
+        return [convex_body(shape.mesh.vertices).corners]
+    return shape.kept(divided, files=GEOMETRY_FILES)
+
+
+def divided_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> list[FloatArray]:
+    """Return the corners (k, 3) of at most MAX_PIECES convex bodies round a mesh.
+
+    vertices: (n, 3) [m]. faces: (m, 3) indices. Raises InputError for points all in one place.
+    """
+    if not len(faces):
+        return [convex_body(vertices).corners]
+    triangles = vertices[faces]
+    whole = np.arange(len(triangles))
+    least = max(MIN_GAIN, MIN_GAIN_FRACTION * _volume(triangles[whole].reshape(-1, 3)))
+    found = [_best_split(triangles, whole)]
+    numbers = [whole]
+    while len(numbers) < MAX_PIECES:
+        best = int(np.argmax([each.gain for each in found]))
+        if found[best].gain < least:
+            break
+        halves = found[best].one, found[best].other
+        numbers[best : best + 1] = halves
+        found[best : best + 1] = [_best_split(triangles, half) for half in halves]
+    return [convex_body(triangles[each].reshape(-1, 3)).corners for each in numbers]
+
+
+def _best_split(triangles: FloatArray, numbers: npt.NDArray[np.int64]) -> _Split:
+    """Return the division of the triangles ``numbers`` that saves most volume."""
+    sample = numbers[:: max(1, len(numbers) // SAMPLED)]
+    middles = triangles[numbers].mean(axis=1)
+    sampled = triangles[sample].mean(axis=1)
+    volume = _volume(triangles[sample].reshape(-1, 3))
+    low, high = middles.min(axis=0), middles.max(axis=0)
+    best, place = 0.0, None
+    for axis in range(3):
+        for at in (low[axis] + PLACES * (high[axis] - low[axis])).tolist():
+            side = sampled[:, axis] < at
+            if side.all() or not side.any():
+                continue
+            parts = (triangles[sample[each]].reshape(-1, 3) for each in (side, ~side))
+            gain = volume - sum(map(_volume, parts))
+            if gain > best:
+                best, place = gain, (axis, at)
+    if place is None:
+        return _Split(0.0, numbers, numbers[:0])
+    side = middles[:, place[0]] < place[1]
+    return _Split(best, numbers[side], numbers[~side])
+
+
+def _volume(points: FloatArray) -> float:
+    """Return the volume [m^3] of the hull of ``points`` (n, 3), 0 if they lie in a plane."""
+    corners = np.unique(points, axis=0)
+    spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
+    # The engine ends the process when it is given points without a volume.
+    if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
+        return 0.0
+    a, b, c = (engine().triangles(corners) - corners.mean(axis=0)).transpose(1, 0, 2)
+    return float(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))).sum()) / 6.0
