@@ -69,6 +69,7 @@ BUILT_IN = (
     "rosbridge",
     "gallery",
     "bodies",
+    "loops",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 

@@ -27,6 +27,9 @@ DECLARED = re.compile(rb"\sxmlns:([\w.-]+)\s*=")
 ROOT = re.compile(rb"<robot\b")
 """The prefix of an element, the declaration of one, and the outermost element."""
 
+LOOP = re.compile(rb"<loop_joint[^>]*\sname\s*=\s*[\"']([\w .-]*)")
+"""An element that closes a loop, as in files of Drake and Isaac Sim, and its name."""
+
 UNEXPANDED = re.compile(r"\$[({]")
 """Beginning of an expression of xacro."""
 
@@ -93,6 +96,16 @@ def checked(path: Path) -> bytes:
         root = checks.parsed(data)
     checks.check(root)
     return data
+
+
+def refuse_loops(data: bytes, path: Path) -> None:
+    """Raise RobotDescriptionError if joints of the file at ``path`` close loops, by extensions."""
+    found = LOOP.search(data)
+    if found is not None:
+        raise RobotDescriptionError(
+            f"{path.name} has a closed loop of joints, <loop_joint {found[1].decode()!r}>. Only "
+            "commands with --urdf solve it: remove it, or write a <mimic> in its place."
+        )
 
 
 def _mended(data: bytes) -> bytes:

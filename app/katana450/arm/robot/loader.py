@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.robot.arm_reader import arm_in
-from katana450.arm.robot.description import checked, explained
+from katana450.arm.robot.description import checked, explained, refuse_loops
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf, UrdfJoint, urdf_of
@@ -38,6 +38,7 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
             message says what is wrong, and in which line.
     """
     data = checked(path)
+    refuse_loops(data, path)
     with explained(path):
         urdf = urdf_of(data, path.parent)
         links, faults = _links_of(urdf, path)

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from katana450.arm.robot.arm_reader import described_chain
-from katana450.arm.robot.description import checked, explained
+from katana450.arm.robot.description import checked, explained, refuse_loops
 from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.structure import structure_of
 from katana450.arm.robot.urdf import urdf_of
@@ -72,6 +72,7 @@ def described_arm(path: Path, tool: str | None = None) -> DescribedArm:
             joints that carries it. The message says what is wrong.
     """
     data = checked(path)
+    refuse_loops(data, path)
     with explained(path):
         urdf = urdf_of(data, path.parent)
         structure = structure_of(urdf, path, tool, count=None)
