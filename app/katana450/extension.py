@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from katana450.arm.control.grip_model import GripModel
     from katana450.arm.control.scene_objects import Environment, Hand
     from katana450.arm.control.session import Session
+    from katana450.arm.control.tool_kinematics import ArmKinematics
     from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
@@ -38,10 +39,12 @@ if TYPE_CHECKING:
     from katana450.arm.runtime.tick import TickRecord
     from katana450.maths.collision.world import CollisionWorld
     from katana450.maths.geometry.arrays import FloatArray
+    from katana450.maths.kinematics.chain import Chain
     from katana450.server.service.nodes import Nodes
     from katana450.server.service.recorder import Recorder
     from katana450.server.service.runner import Runner
     from katana450.server.service.server_log import ServerLog
+    from katana450.server.view.gizmo import Gizmo
     from katana450.server.view.layer import ViewLayer
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
@@ -70,6 +73,7 @@ BUILT_IN = (
     "gallery",
     "bodies",
     "loops",
+    "general_arms",
 )
 """Built-in extensions, in the order of their commands in the help text."""
 
@@ -210,6 +214,10 @@ class Extension:
             it leaves out. Of the first extension that has it.
         grip_model: Returns the model of the forces in the hand of a robot with its collision world;
             None if the pads of that hand are not known. Called for each session of an arm.
+        kinematics: Returns the kinematics of the chain of an arm outside the five-axis family, or
+            None. Called when a robot is read for ``serve``.
+        gizmo: Returns the class of the gizmo of a tool with so many freedoms, or None. Called in
+            the process of the view.
     """
 
     name: str
@@ -218,6 +226,8 @@ class Extension:
     grip_model: Callable[[CollisionWorld, Hand], GripModel | None] | None = None
     prepare: Callable[[Namespace], None] | None = None
     world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
+    kinematics: Callable[[Chain], ArmKinematics | None] | None = None
+    gizmo: Callable[[int], type[Gizmo] | None] | None = None
 
 
 @cache

@@ -18,7 +18,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
-from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.tool import ToolTarget
 
 TICK = 0.01
@@ -129,7 +129,7 @@ def test_target_is_kept_on_the_other_shoulder(
     for each in (state, back):
         assert isinstance(each.target, ToolTarget)
     T, T_back = (
-        each.pose(arm.chain, each.facing(arm.chain, branch, 0.0))
+        each.pose(arm.chain, each.facing(arm.chain, branch, 0.0))  # type: ignore[arg-type]
         for each, branch in ((state.target, state.branch), (back.target, back.branch))
     )
     assert np.allclose(T, T_back, atol=1e-12)
@@ -198,7 +198,7 @@ def test_each_priority_keeps_its_part_and_reports_what_is_lost(
         assert gap == pytest.approx(math.dist(point(arm, state.goal), FAR_OUT), abs=1e-12)
 
 
-@pytest.mark.parametrize("priority", Priority)
+@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
 def test_each_priority_loses_its_own_part_in_a_drag_out_of_reach(
     arm: ArmModel, session: Session, state: State, priority: Priority
 ) -> None:

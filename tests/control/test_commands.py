@@ -30,7 +30,7 @@ NAN = math.nan
         (lambda: cmd.MoveTool(np.array([0.0, 0.0, NAN])), "finite"),
         (lambda: cmd.MoveTool("abc"), "list of numbers"),  # type: ignore[arg-type]
         (lambda: cmd.TurnTool(NAN, 0.0), "pitch"),
-        (lambda: cmd.StepTool(np.zeros(3)), "5 numbers"),
+        (lambda: cmd.StepTool(np.zeros(3)), "5 or 6 numbers"),
         (lambda: cmd.StepTool(np.zeros(5), "tool"), "JogFrame"),  # type: ignore[arg-type]
         (lambda: cmd.TurnTool(0.0, -math.inf), "roll"),
         (lambda: cmd.SetPose(np.zeros((4, 4))), "T"),
@@ -40,8 +40,9 @@ NAN = math.nan
         (lambda: cmd.SetGripper(NAN), "finger"),
         (lambda: cmd.SetPriority("pose"), "Priority.POSE"),  # type: ignore[arg-type]
         (lambda: cmd.SetPriority([]), "Priority.POSE"),  # type: ignore[arg-type]
-        (lambda: cmd.TakeBranch("front-up"), "front-up, front-down"),  # type: ignore[arg-type]
-        (lambda: cmd.TakeBranch(None), "front-up, front-down"),  # type: ignore[arg-type]
+        (lambda: cmd.TakeBranch(3), "one of the arm"),  # type: ignore[arg-type]
+        (lambda: cmd.TakeBranch(None), "one of the arm"),  # type: ignore[arg-type]
+        (lambda: cmd.OrientTool(np.ones((3, 3))), "rotation"),
     ],
 )
 def test_invalid_command_is_refused_with_the_reason(

@@ -95,7 +95,7 @@ def test_go_arrives_on_the_same_branch(shipped: Session, offered: State, let_go:
         assert isinstance(state.target, JointTarget)
         # An offer outlasts the end of the drag.
         assert state.detour is offered.detour
-    region = BranchRegion(chain, state.branch)
+    region = BranchRegion(chain, state.branch)  # type: ignore[arg-type]
     state = shipped.step(state, [cmd.Go()], state.t + TICK)
     assert isinstance(state.mode, Following)
     for _ in range(2000):

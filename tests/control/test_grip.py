@@ -127,7 +127,7 @@ def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
     chain = arm.chain_to("grasp")
     at = ToolTarget.at(chain, state.q)
     up = replace(at, position=at.position + np.array((0.0, 0.0, by)))
-    way = ToolPath(chain, ToolLine(at, up), state.branch, state.q)
+    way = ToolPath(chain, ToolLine(at, up), state.branch, state.q)  # type: ignore[arg-type]
     return run(
         session,
         state,

@@ -47,7 +47,7 @@ def test_typed_level_cup_stays_level_from_any_posture(session: Session) -> None:
         state = typed(session, start, T)
         away = math.dist(forward(chain, state.goal)[:3, 3], place)
         reasons = {finding.reason: finding for finding in state.findings}
-        if state.branch.shoulder == "front":
+        if state.branch.shoulder == "front":  # type: ignore[union-attr]
             assert tilt(session, state.goal) <= LEVEL, (azimuth, radius, height, start)
             assert Reason.PITCH_CHANGED not in reasons
             assert (Reason.POSITION_CHANGED in reasons) == (away > 5e-5)

@@ -162,7 +162,7 @@ def test_elbow_that_is_too_fast_for_its_branch_brakes_beyond_it(
     goal = q + np.array([0.0, 0.0, 0.5, 0.0, 0.0])
     begun = run(session, state, [cmd.SetJoints(goal)])
     moving = replace(begun, motion=JointMotion(frozen(q), frozen(qd), frozen(np.zeros(5))))
-    assert moving.branch.elbow == state.branch.elbow
+    assert moving.branch.elbow == state.branch.elbow  # type: ignore[union-attr]
     after = session.step(moving, [command], moving.t + TICK)
     check(session, moving.motion, after.motion)
     travelled, expected = after.motion.q - q, 0.5 * TICK * (qd + after.motion.qd)

@@ -240,7 +240,7 @@ def check_detour(
     """Take the detour from ``state``; it exists if brute force finds a continuous path."""
     assert state.beyond_gap is not None
     goal, branch, chain = state.beyond_gap.q, state.branch, arm.chain
-    here, there = (regions.label(q, branch) for q in (state.setpoint, goal))
+    here, there = (regions.label(q, branch) for q in (state.setpoint, goal))  # type: ignore[arg-type]
     assert here
     assert there
     seen["continuous path"] += here == there
@@ -258,7 +258,7 @@ def check_detour(
         if not state.moving:
             break
         state = session.step(state, (), state.t + TICK)
-        assert regions.holds(state.setpoint[1:4], branch), number
+        assert regions.holds(state.setpoint[1:4], branch), number  # type: ignore[arg-type]
         assert chain.within_limits(state.setpoint, slack=0.0)
         assert true_speed(chain, state.setpoint, state.motion.qd) <= TOOL_SPEED * (1.0 + ROUNDING)
     np.testing.assert_array_equal(state.setpoint, goal)

@@ -229,8 +229,8 @@ def test_dragging_never_changes_the_branch(arm: ArmModel, session: Session, stat
             math.cos(state.goal[0]) * tool_point(arm, state)[0]
             + math.sin(state.goal[0]) * tool_point(arm, state)[1]
         )
-        assert on.elbow == branch.elbow or abs(state.goal[2]) < 1e-6
-        assert on.shoulder == branch.shoulder or abs(r) < 1e-6
+        assert on.elbow == branch.elbow or abs(state.goal[2]) < 1e-6  # type: ignore[union-attr]
+        assert on.shoulder == branch.shoulder or abs(r) < 1e-6  # type: ignore[union-attr]
 
 
 def test_sliders_may_change_the_branch(session: Session, state: State) -> None:

@@ -20,7 +20,7 @@ from katana450.errors import KatanaError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.planning.plan import Plan
@@ -140,7 +140,7 @@ class ArmRules(JointRules):
     def take_branch(self, branch: Branch, ticks: int) -> None:
         self.run([cmd.TakeBranch(branch)], ticks)
 
-    @rule(priority=st.sampled_from(Priority), ticks=ticks)
+    @rule(priority=st.sampled_from(FIVE_AXIS_PRIORITIES), ticks=ticks)
     def set_priority(self, priority: Priority, ticks: int) -> None:
         self.run([cmd.SetPriority(priority)], ticks)
 

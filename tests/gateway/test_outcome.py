@@ -19,7 +19,7 @@ from katana450.arm.runtime.mailbox import Mailbox
 from katana450.client import Client, RefusedError, aconnect
 from katana450.extensions.api_description.messages import kinds
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
-from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
 from katana450.server.service import pending_answer, serialize
 from katana450.server.service.hub import Hub
@@ -101,7 +101,9 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Turn: [requests.Turn(pitch=0.3, roll=0.0)],
         requests.Gripper: [requests.Gripper(angle=0.1)],
         requests.Tool: [requests.Tool(name="flange"), requests.Tool(name="tcp")],
-        requests.SetPriority: [requests.SetPriority(priority=each) for each in reversed(Priority)],
+        requests.SetPriority: [
+            requests.SetPriority(priority=each) for each in reversed(FIVE_AXIS_PRIORITIES)
+        ],
         requests.GoToZero: [requests.GoToZero()],
         requests.Home: [requests.Home()],
         requests.Pause: [requests.Pause()],

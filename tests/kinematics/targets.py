@@ -51,5 +51,5 @@ def targets(chain: Chain, rng: np.random.Generator, rounds: int) -> list[FloatAr
 def assert_on_branch(p: Projection) -> None:
     """Check that `p` is on `p.branch` or its edge."""
     r = p.T[0, 3] * math.cos(p.q[0]) + p.T[1, 3] * math.sin(p.q[0])
-    assert abs(r) < 1e-11 or (r > 0.0) == (p.branch.shoulder == "front")
-    assert p.q[2] == 0.0 or (p.q[2] > 0.0) == (p.branch.elbow == "up")
+    assert abs(r) < 1e-11 or (r > 0.0) == (p.branch.shoulder == "front")  # type: ignore[union-attr]
+    assert p.q[2] == 0.0 or (p.q[2] > 0.0) == (p.branch.elbow == "up")  # type: ignore[union-attr]

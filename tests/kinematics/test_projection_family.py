@@ -158,7 +158,7 @@ def test_limits_beyond_the_folded_arm_hold_both_elbows() -> None:
     for three, elbow in ((2.0, "up"), (4.2, "down")):
         q = np.array([0.2, -0.4, three, 0.2, 0.4])
         p = project(chain, forward(chain, q), branch=branch_of(chain, q))
-        assert p.branch.elbow == elbow
+        assert p.branch.elbow == elbow  # type: ignore[union-attr]
         np.testing.assert_allclose(p.q, q, atol=1e-12)
 
 

@@ -31,7 +31,7 @@ from katana450.arm.control.state import Finding, Reason, State, Status
 from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.branch_metrics import BranchMetrics
-from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.server.view.view import GHOST_COLOURS
 
 
@@ -59,7 +59,7 @@ def test_every_status_has_a_headline(status: Status) -> None:
 def test_texts_and_kinds_match() -> None:
     assert set(REASONS) == set(Reason)
     assert set(STATUS) == set(Status)
-    assert set(PRIORITIES) == set(PRIORITY_HINTS) == set(Priority)
+    assert set(PRIORITIES) == set(PRIORITY_HINTS) == set(FIVE_AXIS_PRIORITIES)
     assert set(GHOST_COLOURS) == set(Status)
     assert len(AXIS_NAMES) == 5
 
@@ -84,7 +84,7 @@ def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, expecte
     assert sentence(with_findings(state, finding)) == expected
 
 
-@pytest.mark.parametrize("priority", Priority)
+@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
 def test_every_priority_has_a_unique_name_and_a_hint(priority: Priority) -> None:
     assert list(PRIORITIES.values()).count(PRIORITIES[priority]) == 1
     assert PRIORITY_HINTS[priority]

@@ -19,10 +19,11 @@ from katana450.assembly.frontend_process import FrontendConfig
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.errors import ConfigurationError
-from katana450.extension import serve_extensions
+from katana450.extension import extensions, serve_extensions
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.nodes import Nodes
 from katana450.server.service.runner import guarded
+from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
@@ -70,7 +71,8 @@ def build_frontend(
         return front_end, _machine_view(gateway, config, robot, front_end), None
     planning_worker = PlanningWorker(session, front_end.state_publisher, front_end)
     folders = partial(_folders, gateway, config.options, robot, front_end)
-    view = _view(gateway, config, found, front_end, ViewOptions(layers, meshes, folders))
+    options = ViewOptions(layers, meshes, folders, find_gizmo(robot.arm.kinematics.freedoms))
+    view = _view(gateway, config, found, front_end, options)
     go = partial(gateway.hub.gate.submit, cmd.Go()) if settings.go_on_release else None
     detours = DetourPlanner(session, front_end.state_publisher, planning_worker, go)
     planning_worker.notify = gateway.announce
@@ -79,6 +81,12 @@ def build_frontend(
     gateway.attach(ArmHandle(robot, session, front_end, planning_worker, nodes))
     detours.start()
     return front_end, view, detours
+
+
+def find_gizmo(freedoms: int) -> type[Gizmo] | None:
+    """Return the class of the gizmo that an extension has for a tool of so many freedoms."""
+    found = (each.gizmo(freedoms) for each in extensions() if each.gizmo is not None)
+    return next(found, None)
 
 
 def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:

@@ -9,6 +9,8 @@ from typing import NamedTuple
 from katana450.arm.control.messages import UNCHECKED
 from katana450.arm.control.scene_objects import Hand, SceneObject
 from katana450.arm.control.session import Session
+from katana450.arm.control.tool_kinematics import ArmKinematics
+from katana450.arm.robot.arm_reader import FindKinematics
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.loader import load
@@ -18,6 +20,7 @@ from katana450.arm.robot.water import water_environment
 from katana450.errors import RobotDescriptionError
 from katana450.extension import extensions
 from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.kinematics.chain import Chain
 from katana450.settings import Settings
 
 
@@ -29,13 +32,21 @@ class DescribedRobot(NamedTuple):
     notes: tuple[str, ...]
 
 
-def describe_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
+def describe_robot(
+    settings: Settings, urdf: Path, tool: str | None, find: FindKinematics | None = None
+) -> DescribedRobot:
     """Return the robot with an arm in the file ``urdf``.
 
-    ``tool``: the link to which targets refer; see ``load``. Raises RobotDescriptionError for a
-    robot without an arm.
+    ``tool``: the link to which targets refer. ``find``: see ``load``. Raises RobotDescriptionError
+    for a robot without an arm.
     """
-    return arm_session(settings, load(urdf, tool))
+    return arm_session(settings, load(urdf, tool, find))
+
+
+def find_kinematics(chain: Chain) -> ArmKinematics | None:
+    """Return the kinematics that an extension has for ``chain``; None if none has."""
+    found = (each.kinematics(chain) for each in extensions() if each.kinematics is not None)
+    return next(found, None)
 
 
 def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
@@ -44,7 +55,7 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
     Raises RobotDescriptionError for a robot that is neither. A robot without an arm also raises it
     if a ``tool`` or an arm without gripper is requested.
     """
-    robot = load(urdf, tool)
+    robot = load(urdf, tool, find_kinematics)
     try:
         return arm_session(settings, robot)
     except RobotDescriptionError as error:

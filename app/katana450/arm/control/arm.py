@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from katana450.arm.control.five_axis_tool import FiveAxisTool
+from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -46,7 +48,7 @@ NO_GRIPPER = GripperModel(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class ArmModel:
-    """A 5-axis arm with interchangeable tool frames.
+    """An arm with interchangeable tool frames.
 
     Attributes:
         chain: the joints in frame {S}; its ``M`` is that of ``default_tool``.
@@ -54,6 +56,7 @@ class ArmModel:
         default_tool: a key of ``tools``.
         gripper: the finger joint, or ``NO_GRIPPER``.
         acceleration, jerk: (n,) maximum of each joint [rad/s^2, rad/s^3]; None if unknown.
+        to_tool: returns the kinematics of a chain to a tool.
     """
 
     chain: Chain
@@ -62,6 +65,7 @@ class ArmModel:
     gripper: GripperModel
     acceleration: FloatArray | None = None
     jerk: FloatArray | None = None
+    to_tool: Callable[[Chain], ToolKinematics] = FiveAxisTool
 
     @property
     def slides(self) -> tuple[bool, ...]:
@@ -79,6 +83,20 @@ class ArmModel:
     def chains(self) -> Mapping[str, Chain]:
         """The chain to each tool, by the name of the tool."""
         return {name: self.chain.with_tool(M) for name, M in self.tools.items()}
+
+    @cached_property
+    def _kinematics(self) -> Mapping[str, ToolKinematics]:
+        return {name: self.to_tool(chain) for name, chain in self.chains.items()}
+
+    @property
+    def kinematics(self) -> ToolKinematics:
+        """The kinematics of the default tool; all tools have the same branches and priorities."""
+        return self._kinematics[self.default_tool]
+
+    def kinematics_to(self, tool: str) -> ToolKinematics:
+        """Return the kinematics of ``tool``. Raises InputError with the names of all tools."""
+        self.chain_to(tool)
+        return self._kinematics[tool]
 
     def chain_to(self, tool: str) -> Chain:
         """Return the chain that ends in ``tool``. Raises InputError with the names of all tools."""

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.modes import PoseTarget
+from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.state import State
+from katana450.errors import InputError
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.branch_metrics import BranchMetrics
-from katana450.maths.kinematics.projection import Projection, project
-from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.tracker import leap
+from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.tool import DragTarget
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,41 +33,48 @@ class BranchOption:
     contact: Contact | None
 
 
-def current_target(arm: ArmModel, state: State) -> ToolTarget:
+def branch_named(arm: ArmModel, name: str) -> AnyBranch:
+    """Return the branch of that name. Raises InputError with the names of all."""
+    for branch in arm.kinematics.branches:
+        if str(branch) == name:
+            return branch
+    names = ", ".join(map(str, arm.kinematics.branches))
+    raise InputError(f"This arm has no branch {name!r}; its branches are {names}.")
+
+
+def current_target(arm: ArmModel, state: State) -> DragTarget:
     """Return the target that a drag starts from: the present tool target, or that of the goal."""
-    if isinstance(state.target, ToolTarget):
+    if not isinstance(state.target, JointTarget | PoseTarget):
         return state.target
-    return ToolTarget.at(arm.chain_to(state.tool), state.goal)
+    return arm.kinematics_to(state.tool).target_at(state.goal)
 
 
-def target_on_branch(arm: ArmModel, state: State, branch: Branch) -> ToolTarget:
-    """Return the present target in the numbers of ``branch``.
-
-    The plane of another branch may face the other way.
-    """
-    same = branch.shoulder == state.branch.shoulder
-    return current_target(arm, state) if same else current_target(arm, state).turned_round()
+def target_on_branch(arm: ArmModel, state: State, branch: AnyBranch) -> DragTarget:
+    """Return the present target in the numbers of ``branch``."""
+    kinematics = arm.kinematics_to(state.tool)
+    return kinematics.target_on(state, current_target(arm, state), branch)
 
 
-def branch_option(arm: ArmModel, state: State, branch: Branch) -> Projection:
+def branch_option(arm: ArmModel, state: State, branch: AnyBranch) -> Projection:
     """Return the posture on ``branch`` whose tool is nearest to the target inside the limits."""
-    chain = arm.chain_to(state.tool)
+    kinematics = arm.kinematics_to(state.tool)
     if isinstance(state.target, PoseTarget):
-        T = state.target.T
-        return project(chain, T, priority=state.priority, branch=branch, q_hint=state.goal)
-    return leap(chain, state.goal, target_on_branch(arm, state, branch), branch, state.priority)
+        return kinematics.project(state, state.target.T, branch)
+    return kinematics.leap(state, target_on_branch(arm, state, branch), branch)
 
 
 def branch_options(
     arm: ArmModel, state: State, world: CollisionWorld | None = None
 ) -> tuple[BranchOption, ...]:
-    """Return one option for each of BRANCHES, measured from where the arm is.
+    """Return one option for each branch, measured from where the arm is.
 
     world: the collision world; without one no contacts are reported.
     """
     chain = arm.chain_to(state.tool)
+    # An option keeps its name where the nearest posture is on another branch.
     found = [
-        BranchMetrics.of(chain, branch_option(arm, state, branch), state.q) for branch in BRANCHES
+        replace(BranchMetrics.of(chain, branch_option(arm, state, branch), state.q), branch=branch)
+        for branch in arm.kinematics.branches
     ]
     return tuple(
         BranchOption(metrics, contact_at(world, metrics.q, state.gripper)) for metrics in found

@@ -6,11 +6,24 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.pouring import CUP, Pouring
 from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.errors import InputError
+
+NUMBERS = {
+    5: "A jog or step of this arm has 5 numbers: x, y, z, pitch and roll.",
+    6: "A jog or step of this arm has 6 numbers: x, y, z, and a rotation about each axis.",
+}
+"""Refusals of a jog or a step with the wrong number of numbers, by the freedoms of the tool."""
+
+TURNS = {
+    5: "A five-axis arm turns its tool by a pitch and a roll, not by a rotation.",
+    6: "Only a five-axis arm has a pitch and a roll: give this tool a pose or a rotation.",
+}
+"""Refusals of a command that turns the tool of other arms."""
 
 NO_HAND = "This arm has no collision checking, so nothing can be fixed to its hand."
 
@@ -49,7 +62,25 @@ def check(
             if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
                 raise InputError("The plan was made for another arm: plan it for this one.")
         case _:
+            _check_tool(arm, command)
             _check_objects(pouring, environment, command)
+
+
+def _check_tool(arm: ArmModel, command: cmd.Command) -> None:
+    kinematics = arm.kinematics
+    match command:
+        case cmd.Jog(rates=numbers) | cmd.StepTool(by=numbers):
+            if numbers.size != kinematics.freedoms:
+                raise InputError(f"{NUMBERS[kinematics.freedoms]} The command has {numbers.size}.")
+        case cmd.TurnTool() | cmd.OrientTool() if not isinstance(command, kinematics.turn):
+            raise InputError(TURNS[kinematics.freedoms])
+        case cmd.SetPriority(priority=priority) if priority not in kinematics.priorities:
+            known = ", ".join(repr(each.value) for each in kinematics.priorities)
+            raise InputError(
+                f"This arm has no priority {priority.value!r}; its priorities are {known}."
+            )
+        case cmd.TakeBranch(branch=branch):
+            branch_named(arm, str(branch))
 
 
 def _check_objects(pouring: Pouring | None, environment: Environment, command: cmd.Command) -> None:

@@ -32,15 +32,14 @@ from katana450.arm.control.object_commands import (
     SetAppearance,
 )
 from katana450.arm.control.state import Finding
-from katana450.arm.control.step_tool import StepTool
 from katana450.arm.control.stop_commands import ClearStop, Stop
+from katana450.arm.control.tool_commands import Jog, OrientTool, StepTool, TurnTool
 from katana450.arm.control.traits import BaseCommand, CommandTraits
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.planning.plan import Plan
 
 __all__ = [
@@ -66,6 +65,7 @@ __all__ = [
     "Nudge",
     "OfferDetour",
     "OperateArm",
+    "OrientTool",
     "Pause",
     "PlaceObject",
     "Remove",
@@ -93,7 +93,7 @@ MIN_SPEED = 0.01
 
 @dataclass(frozen=True, eq=False)
 class MoveTool(BaseCommand):
-    """Bring the tool point to ``position``, (3,) [m] in {S}; its target pitch and roll stay."""
+    """Bring the tool point to ``position``, (3,) [m] in {S}; its target orientation stays."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(stream=True)
 
@@ -103,27 +103,9 @@ class MoveTool(BaseCommand):
         object.__setattr__(self, "position", vector("The tool position", self.position, 3))
 
 
-@dataclass(frozen=True)
-class TurnTool(BaseCommand):
-    """Give the tool a pitch and a roll [rad]; its target position stays.
-
-    ``pitch`` is the angle of the tool below the horizontal, theta2 + theta3 + theta4, and ``roll``
-    the turn about the tool's own axis, theta5: the two rotations a 5-axis arm is free to choose.
-    """
-
-    traits: ClassVar[CommandTraits] = CommandTraits(stream=True)
-
-    pitch: float
-    roll: float
-
-    def __post_init__(self) -> None:
-        check_finite("The pitch", self.pitch)
-        check_finite("The roll", self.roll)
-
-
 @dataclass(frozen=True, eq=False)
 class SetPose(BaseCommand):
-    """Bring the tool to the pose ``T``, (4, 4) in {S}, as near as five axes can."""
+    """Bring the tool to the pose ``T``, (4, 4) in {S}, or as near to it as the arm can."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(stream=True)
 
@@ -177,7 +159,7 @@ class SetTool(BaseCommand):
 
 @dataclass(frozen=True)
 class SetPriority(BaseCommand):
-    """Select the part of a target that is kept when five axes cannot satisfy all of it.
+    """Select the part of a target that is kept when the arm cannot satisfy all of it.
 
     A present target of the tool is projected again.
     """
@@ -198,12 +180,11 @@ class TakeBranch(BaseCommand):
 
     traits: ClassVar[CommandTraits] = CommandTraits(planned=True)
 
-    branch: Branch
+    branch: AnyBranch
 
     def __post_init__(self) -> None:
-        if self.branch not in BRANCHES:
-            known = ", ".join(str(branch) for branch in BRANCHES)
-            raise InputError(f"A branch must be one of {known}, not {self.branch!r}.")
+        if not isinstance(self.branch, Branch | str):
+            raise InputError(f"A branch must be one of the arm, not {self.branch!r}.")
 
 
 @dataclass(frozen=True)
@@ -324,25 +305,6 @@ class SpeedScale(BaseCommand):
 
 
 @dataclass(frozen=True, eq=False)
-class Jog(BaseCommand):
-    """Move at ``rates`` (5,) for JOG_TIME: vx, vy, vz [m/s] along ``frame``, pitch, roll [rad/s].
-
-    A client sends it repeatedly while a key, pad or stick is held. Without another one the arm
-    comes to rest.
-    """
-
-    traits: ClassVar[CommandTraits] = CommandTraits(while_paused=False)
-
-    rates: FloatArray
-    frame: JogFrame = JogFrame.BASE
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rates", vector("The jog", self.rates, 5))
-        if not isinstance(self.frame, JogFrame):
-            raise InputError(f"The frame of a jog must be a JogFrame, not {self.frame!r}.")
-
-
-@dataclass(frozen=True, eq=False)
 class Batch(BaseCommand):
     """Execute several commands in one tick: all of them, or none if one is invalid."""
 
@@ -369,6 +331,7 @@ Command = (
     | MoveTool
     | StepTool
     | TurnTool
+    | OrientTool
     | SetPose
     | SetGripper
     | SetTool

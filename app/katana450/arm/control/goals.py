@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import ClearStop, Command, Servo
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
@@ -18,8 +19,6 @@ from katana450.arm.control.modes import (
 )
 from katana450.arm.control.state import CAUSES, GRIPPER_REASONS, Finding, Reason, State
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import branch_of
-from katana450.maths.kinematics.chain import Chain
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
 
@@ -128,7 +127,7 @@ def with_time(command: Command, t: float) -> Command:
     return replace(command, t=t)
 
 
-def follow_plan(chain: Chain, state: State, plan: Plan, tau: float) -> State:
+def follow_plan(arm: ArmModel, state: State, plan: Plan, tau: float) -> State:
     """Return ``state`` that follows ``plan`` from here.
 
     If the arm does not stand at ``tau`` [s] of it, the only change is a finding that reports it.
@@ -139,7 +138,7 @@ def follow_plan(chain: Chain, state: State, plan: Plan, tau: float) -> State:
         others = without_finding(state, Reason.NOT_AT_START).findings
         finding = Finding(Reason.NOT_AT_START, float(distances[axis]), axis)
         return replace(state, findings=(*others, finding))
-    return _along(chain, state, Following.begin(plan, tau))
+    return _along(arm, state, Following.begin(plan, tau))
 
 
 def may_offer(state: State, plan: Plan) -> bool:
@@ -166,11 +165,11 @@ def go_on_detour(state: State, findings: tuple[Finding, ...]) -> State:
     return with_goal(state, following.goal, findings, following)
 
 
-def move_along_plan(chain: Chain, state: State, fraction: float) -> State:
+def move_along_plan(arm: ArmModel, state: State, fraction: float) -> State:
     """Return ``state`` that moves on its plan, forward or back, to ``fraction`` of it (0 to 1)."""
     assert isinstance(state.mode, Following)
     towards = fraction * state.mode.plan.span
-    return _along(chain, state, replace(state.mode, towards=towards))
+    return _along(arm, state, replace(state.mode, towards=towards))
 
 
 def with_place(state: State, along: Following | None) -> State:
@@ -182,7 +181,8 @@ def with_place(state: State, along: Following | None) -> State:
     return replace(state, mode=along)
 
 
-def _along(chain: Chain, state: State, following: Following) -> State:
+def _along(arm: ArmModel, state: State, following: Following) -> State:
     """Return ``state`` with its goal where ``following`` ends."""
     goal = following.goal
-    return with_goal(replace(state, branch=branch_of(chain, goal)), goal, (), following)
+    branch = arm.kinematics.branch_of(goal)
+    return with_goal(replace(state, branch=branch), goal, (), following)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
-from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.state import CAUSES, Finding, Reason, State, Status
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
+
+if TYPE_CHECKING:
+    from katana450.arm.control.branch_options import BranchOption
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
 
@@ -42,7 +45,8 @@ def axis_names(names: Sequence[str]) -> Sequence[str]:
 
     Joints that the description only numbers have the names of a five-axis arm.
     """
-    return AXIS_NAMES if all(re.fullmatch(r"axis_?\d+", name) for name in names) else names
+    numbered = all(re.fullmatch(r"axis_?\d+", name) for name in names)
+    return AXIS_NAMES if numbered and len(names) == len(AXIS_NAMES) else names
 
 
 PARTS = {
@@ -110,6 +114,9 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     ),
     Reason.PITCH_CHANGED: lambda f: f"pitch gives way by {_short(math.degrees(f.amount))}°",
     Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
+    Reason.ORIENTATION_CHANGED: lambda f: (
+        f"orientation gives way by {_short(math.degrees(f.amount))}°"
+    ),
     Reason.LOPSIDED: _lopsided,
     Reason.SLIDING: lambda f: (
         f"{part((f.parts or ('the object',))[0])} slides in the fingers under a load of "

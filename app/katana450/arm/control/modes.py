@@ -6,12 +6,14 @@ mode outlasts it. The effect of each command in each mode is in ``transitions``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from katana450.arm.control.following import Following
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
@@ -26,12 +28,12 @@ class JointTarget:
 
 @dataclass(frozen=True, eq=False)
 class PoseTarget:
-    """A full pose ``T`` (4, 4) in {S}: six numbers, of which five axes can follow five."""
+    """A full pose ``T`` (4, 4) in {S}."""
 
     T: FloatArray
 
 
-Target = JointTarget | ToolTarget | PoseTarget
+Target = JointTarget | DragTarget | PoseTarget
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,8 @@ class Tracking:
             path.
     """
 
-    target: ToolTarget
-    since: ToolTarget
+    target: DragTarget
+    since: DragTarget
     let_go: bool = False
 
 
@@ -79,7 +81,8 @@ class Jogging:
     """Motion at given rates for a limited time.
 
     Attributes:
-        rates: (5,) velocity of the tool point [m/s], pitch and roll [rad/s].
+        rates: (5,) or (6,) velocity of the tool point [m/s], then pitch and roll or the three
+            rotations [rad/s].
         frame: the frame of the velocity.
         until: time [s] at which the jog ends unless it is renewed.
     """
@@ -87,6 +90,10 @@ class Jogging:
     rates: FloatArray
     frame: JogFrame
     until: float
+
+    def ending(self) -> Jogging:
+        """Return the jog with zero rates, with which it ends."""
+        return replace(self, rates=frozen(np.zeros(self.rates.size)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,26 +19,22 @@ from katana450.arm.control.contact_rule import (
     with_contact,
     with_distance,
 )
+from katana450.arm.control.five_axis_tool import ELBOW
 from katana450.arm.control.following import Following
 from katana450.arm.control.goals import with_place
-from katana450.arm.control.modes import Jogging, Leaving
+from katana450.arm.control.modes import Leaving
 from katana450.arm.control.plan_follower import PlanFollower
 from katana450.arm.control.state import State
+from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.maths.collision.clearance import STOP, advance
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitched_frame
-from katana450.maths.kinematics.velocity import JogFrame, coasted, jog, tool_speed, tool_speed_bound
+from katana450.maths.kinematics.velocity import JogFrame, coasted, jog
 from katana450.maths.motion.limiter import LIMIT_TOLERANCE, JointMotion, Limiter, Limits
 from katana450.maths.motion.proportional import STILL, in_proportion
 from katana450.maths.motion.pursuit import stream_step
-
-ELBOW = 2
-"""Index of axis 3, which bends the elbow."""
 
 PLANNED_SPEED_FRACTION = 0.9
 """[1] Fraction of the maximum tool speed that a step is planned with: the same joint speeds may
@@ -92,7 +88,8 @@ class MotionStepper:
         self._tool_speed = PLANNED_SPEED_FRACTION * tool_speed
         self._follower = PlanFollower(world, slides=arm.gripper.slides)
         self._any = Limiter(arm.limits)
-        self._elbow = {elbow: Limiter(_bent(arm, elbow)) for elbow in ("up", "down")}
+        kept = arm.kinematics.branch_limits(arm.limits)
+        self._elbow = {branch: Limiter(limits) for branch, limits in kept.items()}
 
     def step(self, state: State, dt: float) -> State:
         """Return ``state`` with its setpoints advanced by ``dt`` [s]."""
@@ -142,7 +139,9 @@ class MotionStepper:
         Returns the limiter without that bound if the motion starts or ends on another branch, or
         is too fast to stop on this one: a new goal can come while the elbow changes its branch.
         """
-        limiter = self._elbow[state.branch.elbow]
+        limiter = self._elbow.get(state.branch)
+        if limiter is None:
+            return self._any
         limits = limiter.limits
         for q in (state.setpoint, state.goal):
             if not ((q >= limits.lower) & (q <= limits.upper)).all():
@@ -182,8 +181,8 @@ class MotionStepper:
         """Return whether the arm may leave its plan and brake as hard as it can."""
         if state.motion.at_rest:
             return True
-        chain = self._arm.chain_to(state.tool)
-        if not self._below(self._maximum, chain, state.motion, FINE_SAMPLING):
+        tool = self._arm.kinematics_to(state.tool)
+        if not self._below(self._maximum, tool, state.motion, FINE_SAMPLING):
             return False
         return (
             self._world is None
@@ -213,18 +212,19 @@ class MotionStepper:
         limiter, motion = self.limiter(state), state.motion
         if state.stopped is not None:
             return self._any.stop(motion, dt)
-        chain = self._arm.chain_to(state.tool)
+        tool = self._arm.kinematics_to(state.tool)
         if state.paused and state.jogging is None:
             pause = limiter.pause(motion, state.goal, dt)
-            return self._slow_or_braking(chain, motion, pause, dt)
-        fraction = min(state.speed, self._fraction(chain, state))
+            return self._slow_or_braking(tool, motion, pause, dt)
+        fraction = min(state.speed, self._fraction(tool, state))
         rates = None
         if state.jogging is not None:
+            chain, jogging = tool.chain, state.jogging
             q = chain.clamp(motion.q + dt * motion.qd)
-            V = jog_twist(chain, q, state.jogging) * (not state.paused)
+            V = tool.jog_twist(q, jogging.rates, jogging.frame) * (not state.paused)
             low, high = self._any.stoppable(q)
-            rates = jog(chain, q, V, JogFrame.BASE, dt, bounds=(low, high))
-            steady = coasted(chain, motion.q, motion.qd, dt)
+            rates = jog(chain, q, V, JogFrame.BASE, dt, bounds=(low, high), task=tool.task)
+            steady = coasted(chain, motion.q, motion.qd, dt, tool.task)
             # Joints that their limits slow move one by one.
             free = (rates > low) & (rates < high) | (np.abs(steady) < STILL)
         for _ in range(MAX_SLOWDOWNS):
@@ -236,44 +236,46 @@ class MotionStepper:
                 ahead = stream_step(limiter, motion, state.servo, state.t, dt, fraction)
             else:
                 ahead = limiter.towards(motion, state.goal, dt, fraction)
-            speed = tool_speed(chain, ahead.q, ahead.qd)
-            enough = max(self._tool_speed, tool_speed(chain, motion.q, motion.qd))
-            if speed <= enough and self._slow_to_rest(chain, ahead):
+            speed = tool.tool_speed(ahead.q, ahead.qd)
+            enough = max(self._tool_speed, tool.tool_speed(motion.q, motion.qd))
+            if speed <= enough and self._slow_to_rest(tool, ahead):
                 return ahead
             fraction *= 0.9 * min(1.0, self._tool_speed / speed)
-        return self._slow_or_braking(chain, motion, ahead, dt)
+        return self._slow_or_braking(tool, motion, ahead, dt)
 
     def _slow_or_braking(
-        self, chain: Chain, now: JointMotion, ahead: JointMotion, dt: float
+        self, tool: ToolKinematics, now: JointMotion, ahead: JointMotion, dt: float
     ) -> JointMotion:
-        return ahead if self._slow_to_rest(chain, ahead) else self._any.stop(now, dt)
+        return ahead if self._slow_to_rest(tool, ahead) else self._any.stop(now, dt)
 
-    def _slow_to_rest(self, chain: Chain, motion: JointMotion) -> bool:
+    def _slow_to_rest(self, tool: ToolKinematics, motion: JointMotion) -> bool:
         """Return whether the tool stays below its maximum speed if every joint brakes now."""
-        return self._below(BRAKE_SPEED_FRACTION * self._maximum, chain, motion, COARSE_SAMPLING)
+        return self._below(BRAKE_SPEED_FRACTION * self._maximum, tool, motion, COARSE_SAMPLING)
 
-    def _below(self, maximum: float, chain: Chain, motion: JointMotion, spacing: float) -> bool:
+    def _below(
+        self, maximum: float, tool: ToolKinematics, motion: JointMotion, spacing: float
+    ) -> bool:
         """Return whether the tool stays below ``maximum`` [m/s] in samples of a brake begun now.
 
         The samples are at least ``spacing`` [s] apart, and farther where the tool needs longer to
         become so fast.
         """
         fastest = self._any.fastest(motion)
-        if tool_speed_bound(chain, fastest) <= maximum:
+        if tool.tool_speed_bound(fastest) <= maximum:
             return True
         limits = self._any.limits
         # Joints that brake also turn the tool about each other's axes, which can speed it up.
-        pull = tool_speed_bound(chain, limits.acceleration + fastest * float(fastest.sum()))
+        pull = tool.tool_speed_bound(limits.acceleration + fastest * float(fastest.sum()))
         rising = float((np.abs(motion.qdd) / limits.jerk).max())
         at, duration = self._any.braking(motion)
         t, braking = 0.0, motion
-        while (speed := tool_speed(chain, braking.q, braking.qd)) <= maximum:
+        while (speed := tool.tool_speed(braking.q, braking.qd)) <= maximum:
             t += max(spacing, (maximum - speed) / pull)
             if t >= duration:
                 return True
             braking = at(t)
             # Slow joints cannot make the tool too fast in any posture.
-            if t > rising and tool_speed_bound(chain, braking.qd) <= maximum:
+            if t > rising and tool.tool_speed_bound(braking.qd) <= maximum:
                 return True
         return False
 
@@ -284,15 +286,15 @@ class MotionStepper:
         along = self._follower.braking(state.following, dt)
         return along.motion(), along
 
-    def _fraction(self, chain: Chain, state: State) -> float:
+    def _fraction(self, tool: ToolKinematics, state: State) -> float:
         """Return the fraction of the joint speeds at which the tool keeps its limit to the goal."""
-        change = state.goal - state.setpoint
+        change, chain = state.goal - state.setpoint, tool.chain
         if state.jogging is not None or state.servo is not None or not change.any():
             return 1.0
         fastest = change / float(np.max(np.abs(change) / chain.speed))
         # The tool may be farther out at the place where the arm can have slowed down.
         soon = np.clip(state.setpoint + SLOWDOWN_TIME * state.motion.qd, chain.lower, chain.upper)
-        speed = max(tool_speed(chain, q, fastest) for q in (state.setpoint, soon))
+        speed = max(tool.tool_speed(q, fastest) for q in (state.setpoint, soon))
         return min(1.0, self._tool_speed / speed) if speed > 0.0 else 1.0
 
     def _fingers(self, state: State, dt: float) -> float:
@@ -322,27 +324,3 @@ class MotionStepper:
         if state.following is not None:
             return self._follower.may_go_on(state.following, state.gripper_setpoint)
         return may_go_on(self._world, state)
-
-
-def _bent(arm: ArmModel, elbow: str) -> Limits:
-    """Return the limits of ``arm`` with its elbow kept on one side of the stretched arm."""
-    canonical = arm_of(arm.chain)
-    limits = arm.limits
-    sign, shift = canonical.signs[ELBOW], canonical.shifts[ELBOW]
-    seam = -sign * shift
-    lower, upper = np.array(limits.lower), np.array(limits.upper)
-    if lower[ELBOW] < seam < upper[ELBOW]:
-        if (elbow == "up") == (sign > 0.0):
-            lower[ELBOW] = seam
-        else:
-            upper[ELBOW] = seam
-    return replace(limits, lower=lower, upper=upper)
-
-
-def jog_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
-    """Return the twist (6,) of the tool in {S} [rad/s, m/s] that a jog commands."""
-    R = forward(chain, q)[:3, :3]
-    pitched = pitched_frame(chain, q)
-    v = jogging.rates[:3] if jogging.frame is JogFrame.BASE else R @ jogging.rates[:3]
-    omega = jogging.rates[3] * pitched[:, 1] + jogging.rates[4] * pitched[:, 0]
-    return np.concatenate((omega, v))

@@ -78,10 +78,13 @@ def plan_to(
 def detour_from(arm: ArmModel, world: CollisionWorld | None, state: State) -> Plan:
     """Return the plan of a detour to the pose beyond the gap, to be sent as ``OfferDetour``.
 
-    It stays on the branch of ``state``, which has that pose. Raises BlockedError if none is found.
+    With five axes it stays on the branch of ``state``, which has that pose. Raises BlockedError if
+    none is found.
     """
     assert state.beyond_gap is not None
-    q_goal, branch = state.beyond_gap.q, state.branch
+    q_goal = state.beyond_gap.q
+    # The end is on the branch, wherever the path leads.
+    branch = state.branch if isinstance(state.branch, Branch) else None
     *seeds, last = range(DETOUR_SEARCHES)
     for seed in seeds:
         with suppress(BlockedError):

@@ -53,7 +53,7 @@ from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.branch import BRANCHES, branch_of
+from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.water.environment import WaterEnvironment
 
 TOOL_SPEED = 0.5
@@ -145,7 +145,7 @@ class Session:
         q = frozen(q)
         if self.arm is None:
             return State.standing(q, gripper, t, "", NO_BRANCH)
-        branch = branch_of(self.arm.chain, q)
+        branch = self.arm.kinematics.branch_of(q)
         return State.standing(q, gripper, t, self.arm.default_tool, branch, self._objects)
 
     def require_arm(self) -> ArmModel:
@@ -281,7 +281,7 @@ class Session:
         """Return ``state`` after a command that the present mode continues with."""
         match command:
             case cmd.GoAlong(fraction=fraction):
-                return move_along_plan(self.require_arm().chain, state, fraction)
+                return move_along_plan(self.require_arm(), state, fraction)
             case cmd.EndDrag():
                 return end_drag(state)
             case cmd.SetPriority(priority=priority):
@@ -304,7 +304,7 @@ class Session:
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 held = self._at_rest_soon(without_finding(held, Reason.CONTACT))
                 if state.jogging is not None:
-                    end = replace(state.jogging, rates=tool_targets.NO_RATES, until=state.t)
+                    end = replace(state.jogging.ending(), until=state.t)
                     held = with_mode(held, end)
                 why = () if cause is None else (Finding(Reason.WAITING), cause)
                 return replace(held, findings=(*why, *held.findings))
@@ -333,13 +333,12 @@ class Session:
         """Return ``state`` in the mode that a command about the tool begins."""
         match command:
             case cmd.MoveTool(position=position):
-                target = replace(current_target(arm, state), position=position)
+                target = current_target(arm, state).moved(position)
                 return tool_targets.dragged(arm, state, target)
-            case cmd.TurnTool(pitch=pitch, roll=roll):
-                target = replace(current_target(arm, state), pitch=pitch, roll=roll)
-                return tool_targets.dragged(arm, state, target)
-            case cmd.StepTool(by=by, frame=frame):
-                return tool_targets.stepped(arm, state, by, frame)
+            case cmd.TurnTool() | cmd.OrientTool():
+                return tool_targets.turned(arm, state, command)
+            case cmd.StepTool():
+                return tool_targets.stepped(arm, state, command)
             case cmd.SetPose(T=T):
                 return tool_targets.with_pose_target(arm, state, PoseTarget(T))
             case cmd.TakeBranch(branch=branch):
@@ -349,7 +348,7 @@ class Session:
             case cmd.Go():
                 return tool_targets.gone(arm, state)
             case cmd.Follow(plan=plan, tau=tau):
-                return follow_plan(arm.chain, state, plan, tau)
+                return follow_plan(arm, state, plan, tau)
         raise AssertionError(f"The table of transitions has no rule for {command!r}.")
 
     def _retooled(self, state: State, name: str) -> State:
@@ -360,7 +359,8 @@ class Session:
         """Return ``state`` that is positioning at ``q`` (n,), or as near as the limits allow."""
         goal = frozen(np.clip(q, self._limits.lower, self._limits.upper))
         if self.arm is not None:
-            state = replace(state, branch=branch_of(self.arm.chain_to(state.tool), goal))
+            branch = self.arm.kinematics_to(state.tool).branch_of(goal)
+            state = replace(state, branch=branch)
         findings = of_joints(self._limits, self._robot.slides, q)
         return with_goal(state, goal, findings, Positioning(JointTarget(q)))
 

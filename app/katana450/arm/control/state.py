@@ -28,10 +28,10 @@ from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.stop_cause import WATCHDOG, StopCause
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
@@ -68,6 +68,7 @@ class Reason(Enum):
     YAW_FIXED = "yaw fixed"
     PITCH_CHANGED = "pitch changed"
     ROLL_CHANGED = "roll changed"
+    ORIENTATION_CHANGED = "orientation changed"
     NOT_AT_START = "not at the start"
     LOPSIDED = "one finger only"
     SLIDING = "sliding"
@@ -205,7 +206,7 @@ class State:
         tool: the tool frame that targets and read-outs refer to. It is empty for a robot that has
             only joints; ``branch`` and ``priority`` have no meaning then.
         branch: the branch that dragging keeps.
-        priority: which part of a target is kept when five axes cannot satisfy all of it.
+        priority: which part of a target is kept when the arm cannot satisfy all of it.
         findings: why the goal is not the target, or is not approached; else empty.
         blocked: whether the arm waits on its path because it would touch something.
         stopped: the stop that holds the arm until it is cleared; None if there is none.
@@ -234,7 +235,7 @@ class State:
     goal: FloatArray
     gripper_goal: float
     tool: str
-    branch: Branch
+    branch: AnyBranch
     priority: Priority = Priority.POSE
     findings: tuple[Finding, ...] = ()
     blocked: bool = False
@@ -258,7 +259,7 @@ class State:
         gripper: float,
         t: float,
         tool: str,
-        branch: Branch,
+        branch: AnyBranch,
         objects: tuple[SceneObject, ...] = (),
     ) -> State:
         """Return the state of joints that stand at ``q`` (n,) and hold, without a target."""
@@ -326,7 +327,7 @@ class State:
         return self.intent.stream if isinstance(self.intent, Servoing) else None
 
     @property
-    def since(self) -> ToolTarget | None:
+    def since(self) -> DragTarget | None:
         """Target up to which a drag has been followed along its path; None without a drag."""
         return self.intent.since if isinstance(self.intent, Tracking) else None
 

@@ -59,6 +59,7 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     cmd.TakeBranch: _row(Positioning,   S,   S,   S,   S,   S,   S),
     cmd.MoveTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
     cmd.TurnTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
+    cmd.OrientTool: _row(Tracking,      S,   S,   C,   S,   S,   S),
     cmd.StepTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
     cmd.EndDrag: _row(Positioning,      A,   S,   C,   R,   R,   R),
     cmd.Jog: _row(Jogging,              S,   S,   S,   C,   S,   S),

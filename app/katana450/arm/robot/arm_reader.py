@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from katana450.arm.control.five_axis_tool import FiveAxisTool
+from katana450.arm.control.tool_kinematics import ArmKinematics, ToolKinematics
 from katana450.arm.robot.conduit import Hinge, read_stretches
 from katana450.arm.robot.gripper import Fingers, fingers_of
 from katana450.arm.robot.link import SLOW_TURN, Link
@@ -28,7 +31,17 @@ CONDUITS = "conduits.json"
 """File beside the URDF that describes where the conduit is held."""
 
 
-def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> MountedArm:
+FindKinematics = Callable[[Chain], ArmKinematics | None]
+"""Returns the kinematics of a chain outside the five-axis family; None if it has none."""
+
+
+def arm_in(
+    urdf: Urdf,
+    links: Sequence[Link],
+    path: Path,
+    tool: str | None,
+    find: FindKinematics | None = None,
+) -> MountedArm:
     """Return the arm that ``urdf`` describes.
 
     Args:
@@ -37,21 +50,31 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
         path: path of the file, for error messages; the file of its conduits is beside it.
         tool: link to which targets refer by default; None for the first of TOOL_FRAMES that exists,
             else the outermost link that the arm carries.
+        find: finds the kinematics of an arm outside the five-axis family; None to refuse it.
 
     Raises:
         RobotDescriptionError: the kinematics do not support the arm, or its conduits are described
             wrongly. The message says what is wrong.
     """
     frames = urdf.frames()
-    structure = structure_of(urdf, path, tool)
-    described, T_base_shoulder = described_chain(frames, structure)
-    T_shoulder_base = se3.inverse(T_base_shoulder)
-    up = T_shoulder_base[:3, 2]
-    chain, notes = exact_member(described, up)
-    tools = {
-        link: exact_member(described.with_tool(T_shoulder_base @ frames[link]), up)[0].M
-        for link in structure.tools
-    }
+    to_tool: Callable[[Chain], ToolKinematics] = FiveAxisTool
+    try:
+        structure = structure_of(urdf, path, tool)
+        described, T_base_shoulder = described_chain(frames, structure)
+        T_shoulder_base = se3.inverse(T_base_shoulder)
+        up = T_shoulder_base[:3, 2]
+        chain, notes = exact_member(described, up)
+        tools = {
+            link: exact_member(described.with_tool(T_shoulder_base @ frames[link]), up)[0].M
+            for link in structure.tools
+        }
+    except RobotDescriptionError:
+        other = None if find is None else _other_arm(urdf, frames, path, tool, find)
+        if other is None:
+            raise
+        structure, T_base_shoulder, (chain, to_tool, [*notes]) = other
+        T_shoulder_base = se3.inverse(T_base_shoulder)
+        tools = {link: frozen(T_shoulder_base @ frames[link]) for link in structure.tools}
     fingers = fingers_of(structure.hand, structure.others, frames)
     notes = [*notes, *fingers.notes]
     if structure.chosen and fingers.driven:
@@ -60,6 +83,7 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
         chain=chain,
         tools=tools,
         default_tool=structure.tools[0],
+        to_tool=to_tool,
         gripper=fingers.gripper,
         T_base_shoulder=frozen(T_base_shoulder),
         fingers=fingers.follow,
@@ -70,6 +94,26 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
         ),
         notes=tuple(notes),
     )
+
+
+def _other_arm(
+    urdf: Urdf,
+    frames: Mapping[str, FloatArray],
+    path: Path,
+    tool: str | None,
+    find: FindKinematics,
+) -> tuple[Structure, FloatArray, ArmKinematics] | None:
+    """Return structure, {S} (4, 4) in the root, and kinematics of an arm outside the family.
+
+    None if there is no such arm, or if joints beside it could then no longer be driven.
+    """
+    with suppress(RobotDescriptionError):
+        structure = structure_of(urdf, path, tool, count=None)
+        described, T_base_shoulder = described_chain(frames, structure)
+        if tool is not None or all(joint.mimic is not None for joint in structure.others):
+            found = find(described)
+            return None if found is None else (structure, T_base_shoulder, found)
+    return None
 
 
 def described_chain(

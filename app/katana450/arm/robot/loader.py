@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.robot.arm_reader import arm_in
+from katana450.arm.robot.arm_reader import FindKinematics, arm_in
 from katana450.arm.robot.description import checked, explained, refuse_loops
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
@@ -23,7 +23,9 @@ MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
 """Supported types of movable joints, and whether each slides."""
 
 
-def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
+def load(
+    path: Path = URDF_PATH, tool: str | None = None, find: FindKinematics | None = None
+) -> Robot:
     """Read the robot in a URDF file.
 
     A link without shapes that has child links is drawn as thin rods. Meshes are read on first use.
@@ -32,6 +34,7 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
         path: the URDF file.
         tool: link to which targets refer by default; None for the first of TOOL_FRAMES that exists,
             else the last link behind five turning joints.
+        find: finds the kinematics of an arm outside the five-axis family; None to leave it without.
 
     Raises:
         RobotDescriptionError: the file cannot be read, or there is no arm with that ``tool``. The
@@ -45,7 +48,7 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
     arm, why = None, ""
     try:
         with explained(path):
-            arm = arm_in(urdf, links, path, tool)
+            arm = arm_in(urdf, links, path, tool, find)
     except RobotDescriptionError as error:
         if tool is not None:
             raise

@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.robot.conduit import ConduitStretch
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.turns import in_limits_turn
-
-READY_ROOM = 0.05
-"""Minimum distance of the ready posture from the limits of a joint, as a fraction of its range."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MountedArm(ArmModel):
-    """A five-axis arm as part of a robot.
+    """An arm as part of a robot.
 
     The control core uses it as an ``ArmModel``. ``ArmModel`` is a separate class because the core
     knows neither base frames nor links nor conduits.
@@ -44,14 +37,12 @@ class MountedArm(ArmModel):
         return joint in self.chain.names or joint in self.fingers
 
     def ready(self, posture: Sequence[float]) -> FloatArray:
-        """Return the joint angles (5,) [rad] inside limits, nearest to a canonical posture.
+        """Return the joint angles (n,) [rad] inside limits in which the arm starts.
 
-        ``posture``: (5,) [rad] of the canonical arm; for the Katana these are its joint angles.
+        ``posture``: (5,) [rad] of the canonical arm, for an arm of the five-axis family; for the
+        Katana these are its joint angles.
         """
-        chain = self.chain
-        q = in_limits_turn(chain, arm_of(chain).joints(posture))
-        room = READY_ROOM * (chain.upper - chain.lower)
-        return np.clip(q, chain.lower + room, chain.upper - room)
+        return self.kinematics.ready(posture, self.T_base_shoulder)
 
     def joint_values(self, q: FloatArray, gripper: float) -> dict[str, float]:
         """Return the value of every movable joint of the robot [rad or m].

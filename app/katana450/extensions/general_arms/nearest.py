@@ -101,7 +101,7 @@ def _described(
     position = math.dist(reached[:3, 3], target[:3, 3])
     rotation = so3.angle(reached[:3, :3], target[:3, :3])
     missed = position > POSITION_WORTH_TELLING or rotation > ANGLE_WORTH_TELLING
-    limits = _held_by(chain, q, reached, target) if missed and not is_free else ()
+    limits = held_by(chain, q, reached, target) if missed and not is_free else ()
     words = []
     if position > POSITION_WORTH_TELLING:
         words.append(REASONS[Reason.OUT_OF_REACH](Finding(Reason.OUT_OF_REACH, position)))
@@ -118,7 +118,7 @@ def _described(
     return BestPosture(q, reached, branch, position, rotation, limits, "; ".join(words))
 
 
-def _held_by(
+def held_by(
     chain: Chain, q: FloatArray, reached: FloatArray, target: FloatArray
 ) -> tuple[int, ...]:
     """Return the axes at a limit that would bring the tool nearer beyond it."""

@@ -121,9 +121,8 @@ class Numerical:
         return max(0.5 * self.links.reach, 1e-3) / self.weight
 
     @cached_property
-    def _state(
-        self,
-    ) -> Callable[[Sequence[float]], Motion]:
+    def motion(self) -> Callable[[Sequence[float]], Motion]:
+        """`tool_and_jacobian` of the links."""
         return tool_and_jacobian(self.links)
 
     @cached_property
@@ -163,7 +162,7 @@ class Numerical:
         self, T: FloatArray, hint: FloatArray | None = None, seeds: int = SEEDS
     ) -> tuple[float, ...]:
         """Return the joint angles [rad] nearest to the pose `T` (4, 4), without checks."""
-        goal = self._goal(T)
+        goal = self.goal(T)
         best: tuple[float, ...] = ()
         least = math.inf
         for start in self._starts(T, hint, seeds):
@@ -191,7 +190,7 @@ class Numerical:
         at `starts` and at the seeds.
         """
         search = replace(self, weight=weight)
-        goal = search._goal(T)
+        goal = search.goal(T)
         begun = [search.descend(goal, start.tolist(), QUICK_STEPS) for start in starts]
         begun += [
             search.descend(goal, start, QUICK_STEPS) for start in self.seeds(T)[:FEW_SEEDS].tolist()
@@ -203,14 +202,14 @@ class Numerical:
         q, _ = min(ends, key=lambda each: each[1])
         return in_limits_turn(self.chain, np.array(q))
 
-    def _goal(self, T: FloatArray) -> tuple[float, ...]:
+    def goal(self, T: FloatArray) -> tuple[float, ...]:
         """Return `T` in the frame of axis 1: the rotation by columns, then the place."""
         here = self.links.T_1_S @ T
         return (*here[:3, :3].T.ravel().tolist(), *here[:3, 3].tolist())
 
     def step(self, goal: tuple[float, ...], q: Sequence[float]) -> SearchState:
         """Return error and Jacobian at `q` [rad], translations divided by `length`."""
-        pose, moved = self._state(q)
+        pose, moved = self.motion(q)
         scale = 1.0 / self.length
         error = (
             *_turn(pose, goal),
@@ -282,7 +281,7 @@ class Numerical:
 
         It never passes a singular posture and never turns a joint by more than JUMP.
         """
-        goal = self._goal(T)
+        goal = self.goal(T)
         lower, upper = self._limits
         here = q.tolist()
         now = self.step(goal, here)

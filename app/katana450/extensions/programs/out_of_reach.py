@@ -143,6 +143,7 @@ def _binding_axes(chain: Chain, nearest: NearestPlace) -> tuple[int, ...]:
         wider = np.zeros(len(chain.names))
         wider[axis] = WIDER
         freed = replace(chain, lower=chain.lower - wider, upper=chain.upper + wider)
+        assert isinstance(best.branch, Branch)
         found = leap(freed, best.q, nearest.target, best.branch, nearest.priority)
         return replace(nearest, projection=found).errors < nearest.errors
 

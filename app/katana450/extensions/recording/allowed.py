@@ -21,6 +21,7 @@ from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode, ArmReport, MeasuredStop
 from katana450.arm.control.following import Following
 from katana450.arm.control.lease import Person, Role
+from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.extensions.programs.trajectory_path import TrajectoryPath
 from katana450.maths.collision.contact import Contact
@@ -29,7 +30,7 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
@@ -74,7 +75,7 @@ CLASSES: Final[tuple[type, ...]] = (
     *(state.State, state.ActiveStop, state.Finding, state.Outcome, state.PartRefusal),
     *(modes.Idle, modes.Positioning, modes.Tracking, modes.Jogging, modes.Servoing),
     *(ArmReport, MeasuredStop),
-    *(modes.Leaving, modes.JointTarget, modes.PoseTarget, Following, ToolTarget),
+    *(modes.Leaving, modes.JointTarget, modes.PoseTarget, Following, ToolTarget, ToolPose),
     *(JointMotion, Stream, Projection, Branch),
     # Objects and water.
     *(scene_objects.SceneObject, solid.Solid, solid.ObjectAppearance),
@@ -93,6 +94,7 @@ MEMBERS: Final[Mapping[Any, Any]] = {
     Path: JointPath | ToolPath | TrajectoryPath,
     Curve: CURVES,
     Callable: PROFILES,
+    DragTarget: ToolTarget | ToolPose,
 }
 """Types that stand for a protocol in the fields of plans."""
 

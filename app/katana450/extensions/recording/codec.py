@@ -124,7 +124,11 @@ class Codec:
             items = parts[:1] if repeated else parts
             return TupleCoder(tuple(map(self.coder, items)), repeated=repeated)
         if origin in (types.UnionType, typing.Union):
-            members = tuple(self.coder(part) for part in parts if part is not types.NoneType)
+            named = [
+                typing.get_args(MEMBERS[each]) if each in MEMBERS else (each,) for each in parts
+            ]
+            kinds = [each for some in named for each in some if each is not types.NoneType]
+            members = tuple(map(self.coder, kinds))
             return UnionCoder(members, optional=types.NoneType in parts)
         if origin in MEMBERS:
             return self.coder(MEMBERS[origin])

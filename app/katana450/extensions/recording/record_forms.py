@@ -104,6 +104,10 @@ class ClassCoder:
             self._fields, self._ready = self._coders(self.kind), True
         return self._fields
 
+    def has_form_of(self, form: Mapping[str, Any]) -> bool:
+        """Return whether ``form`` has all fields that are required, and no others."""
+        return self._required <= form.keys() <= self.fields.keys()
+
     def encode(self, value: Any) -> Any:
         """Return the object of the forms of the fields."""
         if type(value) is not self.kind:
@@ -198,7 +202,11 @@ class UnionCoder:
             return None
         if self._tagged and isinstance(form, dict):
             name = form.get(TAG)
+            # Before a field had several types, its objects had no tag.
+            fit = [each for each in self._tagged.values() if each.has_form_of(form)]
             tagged = self._tagged.get(name) if isinstance(name, str) else None
+            if name is None and len(fit) == 1:
+                tagged = fit[0]
             if tagged is None:
                 raise FormError(f"{shown(name)} is not one of {', '.join(self._tagged)}")
             return tagged.decode(form)

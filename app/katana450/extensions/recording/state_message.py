@@ -16,10 +16,12 @@ from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.scene_objects import Environment, SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.flow import Water
 from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import MILLILITRE
@@ -197,9 +199,12 @@ def _target(state: State) -> dict[str, Any]:
             return {"q": _rounded(q, DIGITS)}
         case PoseTarget(T=T):
             return {"T": [_rounded(row, DIGITS) for row in T]}
+        case ToolTarget(pitch=pitch, roll=roll) as target:
+            return {"position": _rounded(target.position, DIGITS), "pitch": pitch, "roll": roll}
+        case ToolPose(T=T):
+            return {"T": [_rounded(row, DIGITS) for row in T]}
         case target:
-            position = _rounded(target.position, DIGITS)
-            return {"position": position, "pitch": target.pitch, "roll": target.roll}
+            return {"position": _rounded(target.position, DIGITS)}
 
 
 def _time(t: float) -> dict[str, int]:

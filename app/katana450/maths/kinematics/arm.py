@@ -147,6 +147,15 @@ class FiveAxisArm:
 
 
 @lru_cache(maxsize=64)
+def family_arm(chain: Chain) -> FiveAxisArm | None:
+    """Return `arm_of`; None for a chain outside the family."""
+    try:
+        return arm_of(chain)
+    except RobotDescriptionError:
+        return None
+
+
+@lru_cache(maxsize=64)
 def arm_of(chain: Chain) -> FiveAxisArm:
     """Return the canonical arm of `chain`; the result is cached.
 

@@ -47,6 +47,9 @@ class Branch:
         raise InputError(f"There is no branch {text!r}; the branches are {names}.")
 
 
+AnyBranch = Branch | str
+"""A branch of an arm: one of BRANCHES, or its name for an arm outside the five-axis family."""
+
 BRANCHES: Final[tuple[Branch, ...]] = (
     Branch("front", "up"),
     Branch("front", "down"),

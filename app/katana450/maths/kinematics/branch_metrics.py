@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse import Solution, inverse
 from katana450.maths.kinematics.projection import Projection
@@ -29,7 +29,7 @@ class BranchMetrics:
         smallest_singular_value: 0 in a singularity [1].
     """
 
-    branch: Branch
+    branch: AnyBranch
     q: FloatArray
     within_limits: bool
     position_error: float

@@ -1,4 +1,4 @@
-"""Priority between the six numbers of a target pose on an arm with five axes."""
+"""Priority between the six numbers of a target pose, for an arm that cannot satisfy all of them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,21 @@ class Priority(Enum):
     tool facing the other way: a pose that the arm can take is kept as it is; otherwise the
     direction that keeps the roll is preferred, then the nearer one.
 
+    Arms of other kinds have POSE, POSITION and ORIENTATION; these take no yaw from the arm.
+
     Attributes:
         POSE: position, then the whole orientation as near as possible in angle.
         PITCH: the pitch, then the nearest position with it, then the roll.
-        POSITION: position, then the nearest pitch inside the limits, then the roll.
+        POSITION: position, then the nearest pitch inside the limits, then the roll. Arms of other
+            kinds leave the orientation free.
+        ORIENTATION: the orientation, then the nearest position with it.
     """
 
     POSE = "pose"
     PITCH = "position and pitch"
     POSITION = "position"
+    ORIENTATION = "orientation"
+
+
+FIVE_AXIS_PRIORITIES = (Priority.POSE, Priority.PITCH, Priority.POSITION)
+"""The priorities of five axes."""

@@ -19,7 +19,7 @@ from katana450 import tolerances
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
-from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.canonical_target import CanonicalTarget
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
@@ -43,7 +43,7 @@ class Projection:
 
     Attributes:
         T: the pose T_S_tool (4, 4) of the arm.
-        q: the joint angles (5,) [rad] that take it.
+        q: the joint angles (n,) [rad] that take it.
         branch: the branch of `q`.
         position_error, rotation_error: difference [m], [rad] between the target pose and `T`.
         yaw_error: angle [rad] between the target's roll axis and the arm's plane, which no
@@ -59,7 +59,7 @@ class Projection:
 
     T: FloatArray
     q: FloatArray
-    branch: Branch
+    branch: AnyBranch
     position_error: float
     rotation_error: float
     yaw_error: float

@@ -1,9 +1,10 @@
-"""A target with as many numbers as the arm has axes."""
+"""Targets of a drag; that of a five-axis arm has as many numbers as the arm has axes."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -15,6 +16,20 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import wrapped
+
+
+class DragTarget(Protocol):
+    """A target that a drag moves: `ToolTarget`, or that of an arm outside the five-axis family.
+
+    Attributes:
+        position: the tool point (3,) [m] in {S}.
+    """
+
+    @property
+    def position(self) -> FloatArray: ...  # noqa: D102
+
+    def moved(self, position: FloatArray) -> DragTarget:
+        """Return the target with another `position` (3,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +80,10 @@ class ToolTarget:
         return ToolTarget(
             self.position, wrapped(math.pi - self.pitch), wrapped(self.roll + math.pi)
         )
+
+    def moved(self, position: FloatArray) -> ToolTarget:
+        """Return the target with another `position` (3,)."""
+        return replace(self, position=position)
 
     def towards(self, other: ToolTarget, fraction: float) -> ToolTarget:
         """Return the target at `fraction` (0 to 1) of the straight path to `other`."""

@@ -34,7 +34,7 @@ from katana450.maths.kinematics.projection import (
     Projection,
     measured,
 )
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
 from katana450.maths.kinematics.turns import wrapped
 
 HOP: Final = 0.1
@@ -98,7 +98,7 @@ class Tracked:
 
     best: Projection
     beyond_gap: Projection | None = None
-    since: ToolTarget | None = None
+    since: DragTarget | None = None
 
     @property
     def status(self) -> TrackingStatus:

@@ -10,6 +10,7 @@ Sources: Yoshikawa (1985) for the manipulability; Nakamura & Hanafusa (1986) for
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -45,6 +46,10 @@ class JogFrame(Enum):
 
     BASE = "base"
     TOOL = "tool"
+
+
+Task = Callable[[Chain, FloatArray, FloatArray, JogFrame], tuple[FloatArray, FloatArray]]
+"""Returns Jacobian (k, n) and task (k,) of a twist (6,) at joint angles (n,) [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +124,9 @@ def jog(
     dt: float,
     *,
     bounds: tuple[FloatArray, FloatArray] | None = None,
+    task: Task | None = None,
 ) -> FloatArray:
-    """Return the joint rates (5,) [rad/s] that move the tool with the twist `V` (6,).
+    """Return the joint rates (n,) [rad/s] that move the tool with the twist `V` (6,).
 
     The unit of `V` is [rad/s, m/s]. The arm can follow two components of a rotation, about the axes
     of pitch and of roll; the third follows from the path of the tool. Damped least squares keep the
@@ -136,6 +142,7 @@ def jog(
         dt: duration of the jog [s].
         bounds: additional minimum and maximum rate (n,) [rad/s] of each joint, around 0. They bound
             a joint with inertia that approaches its limit.
+        task: the components that count; those of a five-axis arm if not given.
 
     Raises:
         InputError: `q` or `V` is invalid, or `dt` is not above 0.
@@ -144,7 +151,7 @@ def jog(
         raise InputError(f"The duration of a jog must be finite and above 0 s, not {dt:g} s.")
     q = chain.check_q(q)
     V = finite_array(V, (6,), "The twist")
-    J, wanted = _task(chain, q, V, frame)
+    J, wanted = (task or _task)(chain, q, V, frame)
     # Slowed before the limits are checked: motion that the arm is too slow for reaches no limit.
     wanted /= _excess(chain, _damped(J, wanted))
     # A joint beyond its limit may return, but need not.
@@ -165,26 +172,40 @@ def jog(
     return qd / _excess(chain, qd)
 
 
-def coasted(chain: Chain, q: FloatArray, qd: FloatArray, dt: float) -> FloatArray:
-    """Return the joint rates (5,) [rad/s] after `dt` [s] with which the tool keeps its twist.
+def coasted(
+    chain: Chain, q: FloatArray, qd: FloatArray, dt: float, task: Task | None = None
+) -> FloatArray:
+    """Return the joint rates (n,) [rad/s] after `dt` [s] with which the tool keeps its twist.
 
-    The twist is that of the rates `qd` (5,) [rad/s] at `q` (5,) [rad]: the velocity of the tool
-    point in {S}, and the rotation about the axes of pitch and of roll. Near a singularity
-    it is kept as far as the damping allows.
+    The twist is that of the rates `qd` (n,) [rad/s] at `q` (n,) [rad]: the velocity of the tool
+    point in {S}, and the rotation that counts in `task`, see `jog`: for five axes that about the
+    axes of pitch and of roll. Near a singularity it is kept as far as the damping allows.
     """
-    (J, R, _), (J_after, R_after, _) = (_freedoms(chain, each) for each in (q, q + dt * qd))
-    wanted = J @ qd
-    wanted[2:] = R_after.T @ R @ wanted[2:]
+    after = q + dt * qd
+    if task is None:
+        (J, R, _), (J_after, R_after, _) = (_freedoms(chain, each) for each in (q, after))
+        wanted = J @ qd
+        wanted[2:] = R_after.T @ R @ wanted[2:]
+    else:
+        R, twist = forward(chain, q)[:3, :3], jacobian_body(chain, q) @ qd
+        V = np.concatenate((R @ twist[:3], R @ twist[3:]))
+        J_after, wanted = task(chain, after, V, JogFrame.BASE)
     return qd + _damped(J_after, wanted - J_after @ qd)
 
 
-def limited_jog(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None = None) -> float:
+def limited_jog(
+    chain: Chain,
+    q: FloatArray,
+    V: FloatArray,
+    edge: float | None = None,
+    task: Task | None = None,
+) -> float:
     """Return the fraction, from 0 to 1, of the twist `V` (6,) in {S} that a jog can follow.
 
     The speed of the twist does not count; `q` (n,) are joint angles [rad]. A joint nearer than
     `edge` [rad] to a limit does not move towards it; None ignores limits.
     """
-    J, wanted = _task(chain, q, V, JogFrame.BASE)
+    J, wanted = (task or _task)(chain, q, V, JogFrame.BASE)
     size = float(wanted @ wanted)
     if size == 0.0:
         return 1.0
@@ -193,7 +214,7 @@ def limited_jog(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None =
     minimum = np.where(q - chain.lower > edge, -chain.speed, 0.0)
     maximum = np.where(chain.upper - q > edge, chain.speed, 0.0)
     slow = SLOW / math.sqrt(size)
-    qd = jog(chain, q, slow * V, JogFrame.BASE, SLOW, bounds=(minimum, maximum))
+    qd = jog(chain, q, slow * V, JogFrame.BASE, SLOW, bounds=(minimum, maximum), task=task)
     return float(wanted @ (J @ qd)) / (slow * size)
 
 

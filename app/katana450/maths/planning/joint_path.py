@@ -9,11 +9,16 @@ import numpy as np
 
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.arm import family_arm
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.polyline import PiecewisePolynomial, Polyline
-from katana450.maths.planning.posture import FiveJets, ThreeJets, tool_point
+from katana450.maths.planning.posture import (
+    JointJets,
+    ThreeJets,
+    point_by_exponentials,
+    tool_point,
+)
 
 VIA_TOLERANCE = 1e-9
 """Vias nearer to each other than this [rad] are the same."""
@@ -30,14 +35,15 @@ class PolynomialPath:
         """The places where pieces meet."""
         return self._line.joins
 
-    def joints(self, sigma: Jet) -> FiveJets:
+    def joints(self, sigma: Jet) -> JointJets:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
-        one, two, three, four, five = self._line.at(sigma)
-        return one, two, three, four, five
+        return tuple(self._line.at(sigma))
 
     def point(self, sigma: Jet) -> ThreeJets:
-        """Return the tool point [m], in {C}."""
-        arm = arm_of(self.chain)
+        """Return the tool point [m], in {C}; in {S} for an arm outside the five-axis family."""
+        arm = family_arm(self.chain)
+        if arm is None:
+            return point_by_exponentials(self.chain, self.joints(sigma))
         one, two, three, four, five = (
             sign * q + shift
             for q, sign, shift in zip(self.joints(sigma), arm.signs, arm.shifts, strict=True)
@@ -54,7 +60,7 @@ class JointPath(PolynomialPath):
 
     Attributes:
         chain: the arm with its tool.
-        vias: (m, 5) [rad], the first and last are start and end.
+        vias: (m, n) [rad], the first and last are start and end.
         blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
             1.
     """
@@ -85,10 +91,10 @@ class JointPath(PolynomialPath):
 
     @property
     def start(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the start."""
+        """The joint angles (n,) [rad] at the start."""
         return frozen(self.vias[0])
 
     @property
     def end(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the end."""
+        """The joint angles (n,) [rad] at the end."""
         return frozen(self.vias[-1])

@@ -9,7 +9,7 @@ import numpy as np
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.posture import FiveJets, ThreeJets
+from katana450.maths.planning.posture import JointJets, ThreeJets
 
 
 class Path(Protocol):
@@ -22,12 +22,12 @@ class Path(Protocol):
 
     @property
     def start(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the start."""
+        """The joint angles (n,) [rad] at the start."""
         ...
 
     @property
     def end(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the end."""
+        """The joint angles (n,) [rad] at the end."""
         ...
 
     @property
@@ -35,7 +35,7 @@ class Path(Protocol):
         """The places between 0 and 1 where the third derivative leaps, in rising order."""
         ...
 
-    def joints(self, sigma: Jet) -> FiveJets:
+    def joints(self, sigma: Jet) -> JointJets:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         ...
 
@@ -45,7 +45,7 @@ class Path(Protocol):
 
 
 def joint_derivatives(path: Path, sigma: FloatArray) -> FloatArray:
-    """Return the joint angles at `sigma` (N,) and their first three derivatives, (4, N, 5)."""
+    """Return the joint angles at `sigma` (N,) and their first three derivatives, (4, N, n)."""
     return _stacked(path.joints(Jet.variable(sigma)), sigma)
 
 

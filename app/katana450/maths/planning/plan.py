@@ -37,7 +37,7 @@ CHORDS = 1000
 
 @dataclass(frozen=True, eq=False)
 class PathMotion:
-    """The joints at some tau, (5,) each: q [rad] and its derivatives by tau [rad/s, rad/s^2]."""
+    """The joints at some tau, (n,) each: q [rad] and its derivatives by tau [rad/s, rad/s^2]."""
 
     q: FloatArray
     first: FloatArray
@@ -125,13 +125,13 @@ class Plan:
 
     @cached_property
     def start(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the start."""
+        """The joint angles (n,) [rad] at the start."""
         path = self.segments[0].path
         return frozen(path.chain.clamp(path.start))
 
     @cached_property
     def end(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the end."""
+        """The joint angles (n,) [rad] at the end."""
         path = self.segments[-1].path
         return frozen(path.chain.clamp(path.end))
 
@@ -140,12 +140,12 @@ class Plan:
         return min(max(bisect_right(self.begins, tau) - 1, 0), len(self.segments) - 1)
 
     def q(self, tau: float) -> FloatArray:
-        """Return the joint angles (5,) [rad] at `tau` [s], from 0 to `span`."""
+        """Return the joint angles (n,) [rad] at `tau` [s], from 0 to `span`."""
         number = self.segment_at(tau)
         return self.segments[number].at(tau - self.begins[number]).q
 
     def postures(self, count: int, tau: float = 0.0) -> FloatArray:
-        """Return joint angles (count, 5) [rad] evenly from `tau` [s] to the end, for a preview."""
+        """Return joint angles (count, n) [rad] evenly from `tau` [s] to the end, for a preview."""
         return np.array([self.q(each) for each in np.linspace(tau, self.span, count).tolist()])
 
 
@@ -218,7 +218,7 @@ def _clearance(
         f"The path is blocked {100.0 * met.sigma:.0f} % along it, with the tool at {{point}}: "
         f"{{parts}} would {apart(worst.distance)}, and {1e3 * margin:g} mm are required. Lead the "
         "path around the obstacle, or move it.",
-        forward(path.chain, x[:5])[:3, 3].tolist(),
+        forward(path.chain, x[:-1])[:3, 3].tolist(),
         parts=worst.parts,
     )
 

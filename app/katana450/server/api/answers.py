@@ -119,8 +119,8 @@ class State(Answer, frozen=True, kw_only=True):
         gripper_goal: Goal of the finger joint.
         tool: Tool frame to which ``T``, ``pitch`` and ``roll`` refer.
         T: (4, 4) Pose of the tool in the frame {S}.
-        pitch: Angle of the tool below the horizontal [rad].
-        roll: Angle about the tool's own axis [rad].
+        pitch: Angle of the tool below the horizontal [rad]; null unless the arm has five axes.
+        roll: Angle about the tool's own axis [rad]; null unless the arm has five axes.
         tool_speed: Speed of the tool point by its setpoints [m/s].
         holding: (n,) Torques [N m] that hold the arm at rest against its own weight, without a
             load; null where its description states no masses.
@@ -129,8 +129,9 @@ class State(Answer, frozen=True, kw_only=True):
         touch: Forces, pressures and sensors of the gripper, see the documentation of touch; null
             for a gripper whose pads are not known.
         held: Object that both fingers hold; null with an empty hand.
-        branch: Shoulder and elbow.
-        priority: Part of a target that is kept when five axes cannot satisfy all of it.
+        branch: Shoulder and elbow; for an arm outside the five-axis family, the words of the name
+            of its branch.
+        priority: Part of a target that is kept when the arm cannot satisfy all of it.
         status: ok, limited, paused, blocked, gap, stopped or fault.
         moving: Whether the arm moves, or plans a path that it will follow.
         why: Reason for the status in words; empty without one.
@@ -175,7 +176,7 @@ class State(Answer, frozen=True, kw_only=True):
     touching: list[str]
     touch: dict[str, Any] | None
     held: str | None
-    branch: tuple[str, str] | None
+    branch: tuple[str, ...] | None
     priority: str | None
     status: str
     moving: bool
@@ -285,8 +286,9 @@ class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
     """A branch that can be chosen, and its cost.
 
     Attributes:
-        shoulder: Shoulder, front or back.
-        elbow: Elbow, up or down.
+        name: Name of the branch.
+        shoulder: Shoulder, front or back; null unless the arm has five axes.
+        elbow: Elbow, up or down; null unless the arm has five axes.
         q: (n,) Joint angles [rad].
         within_limits: Whether all joints are inside their limits.
         position_error: Distance from the target position [m].
@@ -297,8 +299,9 @@ class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
         contact: The two parts that would meet there; null without contact.
     """
 
-    shoulder: str
-    elbow: str
+    name: str
+    shoulder: str | None
+    elbow: str | None
     q: Numbers
     within_limits: bool
     position_error: float

@@ -44,11 +44,13 @@ MIN_WAIT, MAX_WAIT = 0.1, 600.0
 
 MAX_JOINTS = 32
 
-Rates = tuple[float, float, float, float, float]
-"""Velocity of the tool point (x, y, z) [m/s], then the rates of pitch and roll [rad/s]."""
+Rates = Annotated[tuple[float, ...], Meta(min_length=5, max_length=6)]
+"""Velocity of the tool point (x, y, z) [m/s], then the rates of pitch and roll [rad/s]; for arms
+outside the five-axis family those of the rotations about x, y and z."""
 
 Numbers = list[float]
 Vector3 = tuple[float, float, float]
+Matrix3 = tuple[Vector3, Vector3, Vector3]
 Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
 

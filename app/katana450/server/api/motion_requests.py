@@ -17,6 +17,7 @@ from katana450.server.api.fields import (
     MAX_LINEAR_RATE,
     MAX_LINEAR_STEP,
     Frame,
+    Matrix3,
     Matrix4,
     MotionRequest,
     Rates,
@@ -30,8 +31,11 @@ class Jog(Request, frozen=True, kw_only=True):
     """Move the tool at given rates for 0.2 s. Repeat the request to continue the motion.
 
     Attributes:
-        rates: Velocity of the tool point (x, y, z) [m/s], then rates of pitch and roll [rad/s].
-        frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`.
+        rates: (5,) Velocity of the tool point (x, y, z) [m/s], then rates of pitch and roll
+            [rad/s]. (6,) for arms outside the five-axis family: the rates of the rotations about x,
+            y and z follow.
+        frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`; with six rates it
+            also turns about them.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(stream=True)
@@ -40,7 +44,7 @@ class Jog(Request, frozen=True, kw_only=True):
     frame: JogFrame = JogFrame.BASE
 
     def __post_init__(self) -> None:
-        limits = (MAX_LINEAR_RATE,) * 3 + (MAX_ANGULAR_RATE,) * 2
+        limits = (MAX_LINEAR_RATE,) * 3 + (MAX_ANGULAR_RATE,) * (len(self.rates) - 3)
         for rate, limit in zip(self.rates, limits, strict=True):
             if not math.isfinite(rate) or abs(rate) > limit:
                 raise ValueError(f"the rate {rate} is not between {-limit:g} and {limit:g}")
@@ -50,8 +54,10 @@ class StepTool(MotionRequest, frozen=True, kw_only=True):
     """Move the target of the tool by one step. Steps in a row add up.
 
     Attributes:
-        by: Step of the tool point (x, y, z) [m], then of pitch and roll [rad].
-        frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`.
+        by: (5,) Step of the tool point (x, y, z) [m], then of pitch and roll [rad]. (6,) for arms
+            outside the five-axis family: a rotation vector [rad] follows.
+        frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`; with six numbers
+            it also turns about them.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -60,7 +66,7 @@ class StepTool(MotionRequest, frozen=True, kw_only=True):
     frame: JogFrame = JogFrame.BASE
 
     def __post_init__(self) -> None:
-        limits = (MAX_LINEAR_STEP,) * 3 + (MAX_ANGULAR_STEP,) * 2
+        limits = (MAX_LINEAR_STEP,) * 3 + (MAX_ANGULAR_STEP,) * (len(self.by) - 3)
         for step, limit in zip(self.by, limits, strict=True):
             if not math.isfinite(step) or abs(step) > limit:
                 raise ValueError(f"the step {step} is not between {-limit:g} and {limit:g}")
@@ -111,7 +117,7 @@ class Servo(Request, frozen=True, kw_only=True):
 
 
 class Pose(MotionRequest, frozen=True, kw_only=True):
-    """Move the tool to a pose, or as near to it as five axes can.
+    """Move the tool to a pose, or as near to it as the arm can.
 
     The priority (``set_priority``) decides which part of the pose is kept.
 
@@ -127,7 +133,7 @@ class Pose(MotionRequest, frozen=True, kw_only=True):
 
 
 class Position(MotionRequest, frozen=True, kw_only=True):
-    """Move the tool point to a position; pitch and roll of the target are kept.
+    """Move the tool point to a position; the orientation of the target is kept.
 
     Attributes:
         p: (3,) Position [m] in ``frame``.
@@ -141,7 +147,7 @@ class Position(MotionRequest, frozen=True, kw_only=True):
 
 
 class Turn(MotionRequest, frozen=True, kw_only=True):
-    """Turn the tool to a pitch and a roll; the target of the tool point is kept.
+    """Turn the tool of a five-axis arm to a pitch and a roll; its target position is kept.
 
     Attributes:
         pitch: Angle of the tool below the horizontal [rad], positive downwards.
@@ -152,6 +158,20 @@ class Turn(MotionRequest, frozen=True, kw_only=True):
 
     pitch: float
     roll: float
+
+
+class Orient(MotionRequest, frozen=True, kw_only=True):
+    """Turn the tool of an arm outside the five-axis family; its target position is kept.
+
+    Attributes:
+        R: (3, 3) Rotation of the tool in ``frame``.
+        frame: Frame of ``R``: {S} at the shoulder, or the base frame on the table.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+    R: Matrix3
+    frame: Frame = Frame.SHOULDER
 
 
 class Gripper(MotionRequest, frozen=True, kw_only=True):

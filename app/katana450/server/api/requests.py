@@ -53,6 +53,7 @@ from katana450.server.api.motion_requests import (
     Joint,
     Joints,
     OperateArm,
+    Orient,
     Pose,
     Position,
     Servo,
@@ -109,6 +110,7 @@ __all__ = [
     "Mute",
     "Nudge",
     "OperateArm",
+    "Orient",
     "Pause",
     "Place",
     "Pose",
@@ -183,7 +185,7 @@ class Tool(Request, frozen=True, kw_only=True):
 
 
 class SetPriority(Request, frozen=True, kw_only=True):
-    """Choose which part of a target is kept when five axes cannot satisfy all of it.
+    """Choose which part of a target is kept when the arm cannot satisfy all of it.
 
     Attributes:
         priority: The part that is kept first.
@@ -195,17 +197,24 @@ class SetPriority(Request, frozen=True, kw_only=True):
 
 
 class Branch(MotionRequest, frozen=True, kw_only=True):
-    """Move to the target pose with another shoulder or elbow.
+    """Move to the target pose on another branch: with another shoulder or elbow.
 
     Attributes:
-        shoulder: Shoulder of the branch.
-        elbow: Elbow of the branch.
+        shoulder: Shoulder of the branch of a five-axis arm.
+        elbow: Elbow of the branch of a five-axis arm.
+        name: Name of the branch, in place of shoulder and elbow; the answer ``branches`` has it.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
-    shoulder: Literal["front", "back"]
-    elbow: Literal["up", "down"]
+    shoulder: Literal["front", "back"] | None = None
+    elbow: Literal["up", "down"] | None = None
+    name: Name | None = None
+
+    def __post_init__(self) -> None:
+        five = (self.shoulder is None) + (self.elbow is None)
+        if five != (0 if self.name is None else 2):
+            raise ValueError("a branch has a shoulder and an elbow, or a name")
 
 
 class Nudge(MotionRequest, frozen=True, kw_only=True):
@@ -301,6 +310,7 @@ AnyRequest = (
     | Pose
     | Position
     | Turn
+    | Orient
     | Gripper
     | Tool
     | SetPriority

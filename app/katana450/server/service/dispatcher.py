@@ -8,13 +8,14 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
+from katana450 import tolerances
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.lease import Role
 from katana450.arm.control.state import Verdict
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import Branch
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
 from katana450.server.service.budget import Budget, BusyError
@@ -208,8 +209,12 @@ class Dispatcher:
                 return cmd.SetTool(name)
             case requests.SetPriority(priority=priority):
                 return cmd.SetPriority(priority)
-            case requests.Branch(shoulder=shoulder, elbow=elbow):
-                return cmd.TakeBranch(Branch(shoulder, elbow))
+            case requests.Branch(name=name, shoulder=shoulder, elbow=elbow):
+                name = name or f"{shoulder}-{elbow}"
+                return cmd.TakeBranch(branch_named(self._hub.present().arm, name))
+            case requests.Orient(R=R, frame=frame):
+                rotation = so3.validated(np.array(R), tolerance=tolerances.ROTATION_PRINTED)
+                return cmd.OrientTool(self._in_shoulder(frame)[:3, :3] @ rotation)
         return None
 
     def _setting(self, request: requests.Set) -> cmd.Command:

@@ -24,7 +24,6 @@ from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.velocity import tool_speed
 from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
@@ -119,7 +118,7 @@ def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
         touching=list(touching(hand, now)),
         touch=None if model is None else dict(model.report(now)),
         held=None if now.held is None else now.held.name,
-        branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
+        branch=None if tool is None else tuple(str(now.branch).split("-")),
         priority=None if tool is None else now.priority.value,
         status=now.status.value,
         moving=now.moving,
@@ -182,17 +181,20 @@ class _Tool(NamedTuple):
     """Tool of an arm: pose ``T`` (4, 4) in {S}, pitch and roll [rad], speed [m/s]."""
 
     T: list[answers.Numbers]
-    pitch: float
-    roll: float
+    pitch: float | None
+    roll: float | None
     speed: float
 
     @classmethod
     def of(cls, arm: MountedArm, now: control.State) -> _Tool:
         """Return the tool of ``arm`` in the state ``now``."""
-        chain = arm.chain_to(now.tool)
-        five = ToolTarget.at(chain, now.q)
-        speed = tool_speed(chain, now.setpoint, now.motion.qd)
-        return cls(forward(chain, now.q).tolist(), five.pitch, five.roll, speed)
+        kinematics = arm.kinematics_to(now.tool)
+        T = forward(kinematics.chain, now.q).tolist()
+        target = kinematics.target_at(now.q)
+        speed = kinematics.tool_speed(now.setpoint, now.motion.qd)
+        if isinstance(target, ToolTarget):
+            return cls(T, target.pitch, target.roll, speed)
+        return cls(T, None, None, speed)
 
 
 def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
@@ -296,8 +298,9 @@ def branch_option(choice: BranchOption) -> answers.BranchOption:
     """Return a branch that can be chosen as a part of an answer."""
     metrics, contact = choice.metrics, choice.contact
     return answers.BranchOption(
-        shoulder=metrics.branch.shoulder,
-        elbow=metrics.branch.elbow,
+        name=str(metrics.branch),
+        shoulder=None if isinstance(metrics.branch, str) else metrics.branch.shoulder,
+        elbow=None if isinstance(metrics.branch, str) else metrics.branch.elbow,
         q=metrics.q.tolist(),
         within_limits=metrics.within_limits,
         position_error=metrics.position_error,

@@ -13,17 +13,20 @@ from html import escape
 
 import viser
 
-from katana450.arm.control.branch_options import BranchOption
+from katana450.arm.control.branch_options import BranchOption, branch_named
 from katana450.arm.control.commands import TakeBranch
 from katana450.arm.control.messages import BRANCH_HEADINGS, branch_cells
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.server.view.controls import Listen
 from katana450.server.view.scene import Colour, GhostNodes
 
-COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (216, 67, 121))
-"""Colours of BRANCHES in their order, which colour-blind people can distinguish."""
+COLOURS: tuple[Colour, ...] = (
+    *((47, 128, 237), (124, 77, 219), (0, 150, 136), (216, 67, 121)),
+    *((202, 138, 4), (14, 116, 144), (154, 52, 18), (100, 116, 139)),
+)
+"""Colours of the branches in their order, which colour-blind people can distinguish."""
 
 OPACITY = 0.25
 
@@ -37,7 +40,7 @@ One update takes longer than several frames.
 """
 
 Find = Callable[[State], tuple[BranchOption, ...]]
-"""Returns the option for each of BRANCHES in a state."""
+"""Returns the option for each branch in a state."""
 
 
 class BranchList:
@@ -52,6 +55,7 @@ class BranchList:
         self._listen = listen
         self._seen = state
         self._seen_at = -math.inf
+        self._branches = robot.require_arm().kinematics.branches
         self._ghosts: list[GhostNodes] = []
         # viser calls `_show` in a thread of its own when a ghost is chosen.
         self._lock = threading.Lock()
@@ -59,17 +63,18 @@ class BranchList:
         self._table = server.gui.add_html(_rows(found, state.branch))
         self._ghost_choice = server.gui.add_dropdown(
             "Ghosts",
-            (NONE, OTHERS, *(str(branch) for branch in BRANCHES)),
+            (NONE, OTHERS, *map(str, self._branches)),
             initial_value=NONE,
             hint="Shows the arm on other branches. Click a ghost to move the arm there",
         )
         self._ghost_choice.on_update(lambda _: self._show())
         take = server.gui.add_button_group(
             "Take",
-            tuple(str(branch) for branch in BRANCHES),
+            tuple(map(str, self._branches)),
             hint="Moves the arm to this branch; the target of the tool stays the same",
         )
-        listen(take, lambda: TakeBranch(Branch.parse(take.value)))
+        arm = robot.require_arm()
+        listen(take, lambda: TakeBranch(branch_named(arm, take.value)))
 
     def follow(self, state: State, now: float) -> None:
         """Update the branches for ``state`` at time ``now`` [s].
@@ -95,7 +100,7 @@ class BranchList:
         wanted = self._ghost_choice.value
         if wanted != NONE and not self._ghosts:
             # Made on the first request: three more arms are half of the data that a page loads.
-            self._ghosts = [self._ghost(number) for number in range(len(BRANCHES))]
+            self._ghosts = [self._ghost(number) for number in range(len(self._branches))]
         for ghost, choice in zip(self._ghosts, found, strict=False):
             branch = choice.metrics.branch
             visible = wanted in (OTHERS, str(branch)) and branch != state.branch
@@ -104,7 +109,7 @@ class BranchList:
                 ghost.move(self._robot.joint_values(choice.metrics.q, state.gripper))
 
     def _ghost(self, number: int) -> GhostNodes:
-        branch = BRANCHES[number]
+        branch = self._branches[number]
         name = f"/branch/{branch}"
         ghost = GhostNodes(self._server, self._robot, name, COLOURS[number], OPACITY)
         for shape in ghost.shapes:
@@ -112,7 +117,7 @@ class BranchList:
         return ghost
 
 
-def _rows(found: tuple[BranchOption, ...], now: Branch) -> str:
+def _rows(found: tuple[BranchOption, ...], now: AnyBranch) -> str:
     """Return the table as HTML, with one row per branch and the branch ``now`` marked."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
     rows = "".join(
@@ -121,7 +126,7 @@ def _rows(found: tuple[BranchOption, ...], now: Branch) -> str:
         f"<th><i style='background:rgb{colour}'></i>{choice.metrics.branch}</th>"
         + "".join(f"<td>{escape(cell)}</td>" for cell in branch_cells(choice))
         + "</tr>"
-        for choice, colour in zip(found, COLOURS, strict=True)
+        for choice, colour in zip(found, COLOURS, strict=False)
     )
     return (
         f"<div class='k450'><table class='branches'><thead><tr>{head}</tr></thead>"

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import viser
@@ -41,10 +42,6 @@ TURN_WORTH_SENDING = 1e-7
 """Smallest change of a number of a quaternion that is sent."""
 
 
-PARTS = ("move", "pitch", "roll")
-"""Parts of the gizmo that can be held."""
-
-
 @dataclass
 class _Turn:
     """A drag of a ring: rotation, pitch and roll [rad] at its start, and the angle so far [rad]."""
@@ -56,7 +53,7 @@ class _Turn:
 
 
 @dataclass(frozen=True)
-class _Aim:
+class Aim:
     """The poses of the gizmo's parts while they are not held, in the types of viser."""
 
     point: Point
@@ -65,7 +62,13 @@ class _Aim:
 
 
 class Gizmo:
-    """The gizmo: sends the pose to which it is dragged, and follows the goal while not held."""
+    """The gizmo: sends the pose to which it is dragged, and follows the goal while not held.
+
+    That of another arm overrides the methods about rings.
+    """
+
+    parts: ClassVar[tuple[str, ...]] = ("move", "pitch", "roll")
+    """Parts of the gizmo that can be held."""
 
     def __init__(
         self,
@@ -88,7 +91,7 @@ class Gizmo:
         self._held: dict[str, Actor] = {}
         self._turns: dict[str, _Turn] = {}
         self._sent: tuple[float, ...] = ()
-        self._aim = _Aim((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        self._aim = Aim((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
         bounds = ((-WORKSPACE, WORKSPACE),) * 3
         self._move = server.scene.add_transform_controls(
             "/target/move",
@@ -99,10 +102,13 @@ class Gizmo:
             depth_test=False,
             translation_limits=bounds,
         )
+        self._move.on_update(self._moved)
+        self._add_rings(server)
+
+    def _add_rings(self, server: viser.ViserServer) -> None:
         # A ring is drawn where both axes that span it are active.
         self._pitch = self._ring(server, "/target/move/pitch", (True, False, True))
         self._roll = self._ring(server, "/target/move/roll", (False, True, True))
-        self._move.on_update(self._moved)
         self._pitch.on_update(self._pitched)
         self._roll.on_update(self._rolled)
 
@@ -127,18 +133,21 @@ class Gizmo:
         _, roll = pitch_and_roll(chain, state.goal)
         x, y, z = T[:3, 3].tolist()
         rolled = pitched @ so3.rotation_x(roll)
-        self._aim = _Aim((x, y, z), _quaternion(pitched), _quaternion(rolled))
+        self._aim = Aim((x, y, z), quaternion(pitched), quaternion(rolled))
 
     def follow(self) -> None:
         """Move the parts that are not held to the goal."""
         aim = self._aim
         apart = _apart(self._move.position, aim.point) > DISTANCE_WORTH_SENDING
-        if apart and not any(map(self._holds, PARTS)):
+        if apart and not any(map(self._holds, self.parts)):
             place(self._move, aim.point)
+        self._turn_rings(aim)
+
+    def _turn_rings(self, aim: Aim) -> None:
         if not self._holds("pitch"):
-            _turn(self._pitch, aim.pitched)
+            turn_ring(self._pitch, aim.pitched)
         if not self._holds("roll"):
-            _turn(self._roll, aim.rolled)
+            turn_ring(self._roll, aim.rolled)
 
     async def _moved(self, event: viser.TransformControlsEvent) -> None:
         actor = self._gestures.actor(event.client_id)
@@ -224,7 +233,8 @@ class Gizmo:
         return turn
 
 
-def _turn(handle: viser.TransformControlsHandle, wxyz: Quaternion) -> None:
+def turn_ring(handle: viser.TransformControlsHandle, wxyz: Quaternion) -> None:
+    """Turn a ring that is not turned so already."""
     if _apart(handle.wxyz, wxyz) > TURN_WORTH_SENDING:
         turn(handle, wxyz)
 
@@ -235,6 +245,7 @@ def _apart(shown: FloatArray, new: tuple[float, ...]) -> float:
     return max(abs(a - b) for a, b in zip(numbers, new, strict=True))
 
 
-def _quaternion(R: FloatArray) -> Quaternion:
+def quaternion(R: FloatArray) -> Quaternion:
+    """Return the rotation `R` (3, 3) in the type of viser."""
     w, x, y, z = so3.to_quaternion(R).tolist()
     return w, x, y, z

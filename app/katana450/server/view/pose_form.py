@@ -9,7 +9,6 @@ from typing import Any
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
@@ -30,7 +29,7 @@ class PoseForm:
 
     def __init__(self, gui: viser.GuiApi, arm: MountedArm, listen: Listen, state: State) -> None:
         """Add the controls to ``gui``. They show ``state`` first."""
-        self._arm = arm
+        self._arm, self._priorities = arm, arm.kinematics.priorities
         self._state = state
         self._tool = gui.add_dropdown(
             "Tool",
@@ -41,12 +40,12 @@ class PoseForm:
         listen(self._tool, lambda: cmd.SetTool(self._tool.value))
         self._priority = gui.add_dropdown(
             "Priority",
-            tuple(PRIORITIES.values()),
-            initial_value=PRIORITIES[state.priority],
-            hint="Which part of the target is kept when five axes cannot satisfy all of it",
+            tuple(name for name, _ in self._priorities.values()),
+            initial_value=self._priorities[state.priority][0],
+            hint="Which part of the target is kept when the arm cannot satisfy all of it",
         )
-        listen(self._priority, lambda: cmd.SetPriority(_priority(self._priority.value)))
-        self._meaning = gui.add_html(_meaning(state.priority))
+        listen(self._priority, lambda: cmd.SetPriority(self._chosen_priority()))
+        self._meaning = gui.add_html(self._hint(state.priority))
         self._unit = gui.add_dropdown(
             "Units", tuple(UNITS), hint="Of the pose here and above; joints are in degrees"
         )
@@ -83,10 +82,18 @@ class PoseForm:
     def set_controls(self, state: State) -> None:
         """Show the tool and the priority of ``state``."""
         set_value(self._tool, state.tool)
-        set_value(self._priority, PRIORITIES[state.priority])
-        meaning = _meaning(state.priority)
+        set_value(self._priority, self._priorities[state.priority][0])
+        meaning = self._hint(state.priority)
         if meaning != self._meaning.content:
             self._meaning.content = meaning
+
+    def _hint(self, priority: Priority) -> str:
+        hint = escape(self._priorities[priority][1])
+        return f"<div class='k450'><p class='hint'>{hint}</p></div>"
+
+    def _chosen_priority(self) -> Priority:
+        chosen = self._priority.value
+        return next(each for each, (name, _) in self._priorities.items() if name == chosen)
 
     def _goal(self, state: State) -> FloatArray:
         return forward(self._arm.chain_to(state.tool), state.goal)
@@ -126,11 +133,3 @@ class PoseForm:
 
 def _rounded(numbers: list[float], decimals: int) -> tuple[float, ...]:
     return tuple(round(number, decimals) + 0.0 for number in numbers)
-
-
-def _meaning(priority: Priority) -> str:
-    return f"<div class='k450'><p class='hint'>{escape(PRIORITY_HINTS[priority])}</p></div>"
-
-
-def _priority(name: str) -> Priority:
-    return next(priority for priority, text in PRIORITIES.items() if text == name)

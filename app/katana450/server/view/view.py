@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.messages import title
-from katana450.arm.control.modes import PoseTarget
+from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State, Status
 from katana450.arm.robot.object_meshes import Meshes
@@ -19,7 +19,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.tool import ToolTarget
 from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.display_options import DisplayOptions
@@ -66,11 +65,13 @@ class ViewOptions:
         layers: layers of extensions.
         meshes: the meshes of scene objects.
         folders: adds the controls of extensions to the tabs of the panel. Raises KatanaError.
+        gizmo: the class of the gizmo of an arm outside the five-axis family.
     """
 
     layers: tuple[ViewLayer, ...] = ()
     meshes: Meshes = field(default_factory=Meshes)
     folders: Callable[[PanelTabs], Iterable[PanelFolder]] = lambda _: ()
+    gizmo: type[Gizmo] | None = None
 
 
 class View(ViewUpdater):
@@ -116,7 +117,9 @@ class View(ViewUpdater):
         self._setpoint: GhostNodes | None = None
         self._gap = Gap(server)
         self._traces = Traces(server, self._arm)
-        self._gizmo = Gizmo(server, self._arm, gestures, lambda: state_publisher.snapshot.state)
+        self._gizmo = (view_options.gizmo or Gizmo)(
+            server, self._arm, gestures, lambda: state_publisher.snapshot.state
+        )
         self._ellipsoid = EllipsoidNode(server, self._arm)
         for layer in view_options.layers:
             layer.attach(server, robot)
@@ -198,11 +201,11 @@ class View(ViewUpdater):
     def _desired(self, state: State) -> FloatArray | None:
         """Return the tool point (3,) [m] of the target in the base frame; None without one."""
         match state.target:
-            case ToolTarget(position=position):
-                p = position
             case PoseTarget(T=T):
                 p = T[:3, 3]
-            case _:
+            case JointTarget():
                 return None
+            case target:
+                p = target.position
         T_base_shoulder = self._arm.T_base_shoulder
         return T_base_shoulder[:3, :3] @ p + T_base_shoulder[:3, 3]

@@ -1,0 +1,236 @@
+"""Steps of a posture towards a target that never leave its branch, its limits, or leap.
+
+A step minimises the weighted error of the pose, with the joints at a limit and the edge of the
+branch as constraints: the arm slides along what it meets. The priority sets the weights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.regularity import NEAR, WALL, Regularity
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tracker import HOP
+
+Angles = tuple[float, ...]
+
+FIRST: Final = 1e4
+"""[1] Weight of the square of what comes first, relative to what comes second."""
+
+WEIGHTS: Final[Mapping[Priority, tuple[float, float]]] = {
+    Priority.POSE: (1.0, FIRST),
+    Priority.POSITION: (0.0, 1.0),
+    Priority.ORIENTATION: (FIRST, 1.0),
+}
+"""Weights of the squared errors of rotation and position."""
+
+REACHED: Final = 1e-10
+"""[rad], [arm lengths] Error at which a target counts as reached."""
+
+DAMPING: Final = 1e-6
+"""[1] Damping of a step; it chooses among the motions that an arm with free joints has."""
+
+CENTRING: Final = 0.02
+"""[1] Part of the way to the middle of their limits that free joints take in a step."""
+
+HALVINGS: Final = 5
+"""Maximum number of halvings of a step that brings the tool no nearer."""
+
+EFFORT_OF_SLOPE: Final = 3
+"""Effort of a slope, in looks."""
+
+LEAST_GAIN: Final = 1e-3
+"""[1] Relative gain of a step below which it counts as slow."""
+
+MAX_SLOW: Final = 3
+"""Number of slow steps in a row after which the search ends."""
+
+PROBE: Final = 1e-6
+"""[rad] Turn of a joint by which a slope is measured."""
+
+
+class Look(NamedTuple):
+    """A posture [rad] as the search sees it.
+
+    Attributes:
+        q: joint angles.
+        error: rotation vector [rad] and translation [arm lengths] from the tool to the target.
+        J: (n, 6) how the joints lessen it.
+        matrix: of `Regularity`.
+        least: its smallest singular value.
+    """
+
+    q: Angles
+    error: FloatArray
+    J: FloatArray
+    matrix: FloatArray
+    least: float
+
+
+class Descended(NamedTuple):
+    """The end of a search: joint angles [rad], its effort in looks, and whether it is complete."""
+
+    q: Angles
+    effort: int
+    ended: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """The search of one arm. Its methods are pure."""
+
+    search: Numerical
+    regularity: Regularity
+
+    @cached_property
+    def _ends(self) -> tuple[list[float], list[float]]:
+        chain = self.search.chain
+        return chain.lower.tolist(), chain.upper.tolist()
+
+    @cached_property
+    def _middle(self) -> FloatArray:
+        chain = self.search.chain
+        return 0.5 * (chain.lower + chain.upper)
+
+    def goal(self, target: ToolPose) -> tuple[float, ...]:
+        """Return ``target`` as `Numerical` reads it."""
+        return self.search.goal(target.T)
+
+    def look(self, goal: tuple[float, ...], q: Angles) -> Look:
+        """Return the posture `q` as seen from ``goal``."""
+        follows = self.search.chain.n < 6
+        now = self.search.step(_turned_with_axis_1(goal, q[0]) if follows else goal, q)
+        J = np.array(now.J)
+        matrix = self.regularity.matrix(J.T)
+        if follows:
+            # The target turns with axis 1, which therefore does not change its orientation.
+            J[0, :3] = 0.0
+        return Look(q, np.array(now.error), J, matrix, self.regularity.least(matrix))
+
+    def misses(self, look: Look, priority: Priority) -> tuple[float, ...]:
+        """Return the errors [m], [rad] that count, in the order of the priority."""
+        place = float(np.linalg.norm(look.error[3:])) * self.search.length
+        turn = float(np.linalg.norm(look.error[:3]))
+        if priority is Priority.POSITION:
+            return (place,)
+        return (turn, place) if priority is Priority.ORIENTATION else (place, turn)
+
+    def run(
+        self, goal: tuple[float, ...], q: Angles, priority: Priority, maximum: int
+    ) -> Descended:
+        """Return where steps from `q` towards ``goal`` lead; ``maximum`` bounds the effort."""
+        weights = np.repeat(WEIGHTS[priority], 3)
+        now, slow, effort = self.look(goal, q), 0, 1
+        while effort < maximum:
+            cost = float(weights @ now.error**2)
+            if cost <= REACHED**2 * float(weights.max()):
+                return Descended(now.q, effort, ended=True)
+            then, spent = self._step(goal, now, weights, cost)
+            effort += spent
+            if then is None:
+                return Descended(now.q, effort, ended=True)
+            gained = float(weights @ then.error**2) < (1.0 - LEAST_GAIN) * cost
+            slow = 0 if gained else slow + 1
+            now = then
+            if slow == MAX_SLOW:
+                return Descended(now.q, effort, ended=True)
+        return Descended(now.q, effort, ended=False)
+
+    def _step(
+        self, goal: tuple[float, ...], now: Look, weights: FloatArray, cost: float
+    ) -> tuple[Look | None, int]:
+        """Return the posture after one step that brings the tool nearer, and the effort.
+
+        The posture is None if no step does.
+        """
+        slope, effort = None, 0
+        if now.least < NEAR:
+            slope, effort = self._slope(now), EFFORT_OF_SLOPE
+        dq = self._direction(now, weights, slope)
+        largest = float(np.abs(dq).max())
+        if largest <= REACHED:
+            return None, effort
+        fraction = min(1.0, HOP / largest)
+        for tries in range(1, HALVINGS + 1):
+            then = self.look(goal, self._moved(now.q, fraction * dq))
+            if float(weights @ then.error**2) < cost and self.regularity.allows(
+                now.least, now.matrix, then.least, then.matrix
+            ):
+                return then, effort + tries
+            fraction *= 0.5
+        return None, effort + HALVINGS
+
+    def _moved(self, q: Angles, dq: FloatArray) -> Angles:
+        lower, upper = self._ends
+        moves = zip(q, dq.tolist(), lower, upper, strict=True)
+        return tuple(min(max(x + d, a), b) for x, d, a, b in moves)
+
+    def _direction(self, now: Look, weights: FloatArray, slope: FloatArray | None) -> FloatArray:
+        """Return the step (n,) [rad] of least weighted error.
+
+        ``slope`` (n,): how the smallest singular value rises, which must not fall below WALL.
+        """
+        n = len(now.q)
+        lower, upper = self._ends
+        weighted = now.J * weights
+        A = weighted @ now.J.T + DAMPING * np.eye(n)
+        b = weighted @ now.error
+        if n > 6 or not weights[0]:
+            b = b + DAMPING * CENTRING * (self._middle - np.array(now.q))
+        free = list(range(n))
+        dq = np.zeros(n)
+        while free:
+            dq = np.zeros(n)
+            part = A[np.ix_(free, free)]
+            if slope is None:
+                dq[free] = np.linalg.solve(part, b[free])
+            else:
+                g = slope[free]
+                both = np.linalg.solve(part, np.column_stack((b[free], g)))
+                along = float(g @ both[:, 1])
+                back = float(g @ both[:, 0])
+                dq[free] = both[:, 0]
+                lowest = min(0.0, 0.5 * (WALL - now.least))
+                if back < lowest and along > 0.0:
+                    dq[free] += both[:, 1] * ((lowest - back) / along)
+            pushed = [
+                k
+                for k in free
+                if (now.q[k] <= lower[k] and dq[k] < 0.0) or (now.q[k] >= upper[k] and dq[k] > 0.0)
+            ]
+            if not pushed:
+                break
+            free = [k for k in free if k not in pushed]
+            dq = np.zeros(n)
+        return dq
+
+    def _slope(self, now: Look) -> FloatArray:
+        """Return how the smallest singular value rises with each joint (n,) [1/rad]."""
+        found = []
+        for k in range(len(now.q)):
+            q = list(now.q)
+            q[k] += PROBE
+            _, moved = self.search.motion(q)
+            J = np.array(moved).T
+            J[3:] /= self.search.length
+            found.append((self.regularity.least(self.regularity.matrix(J)) - now.least) / PROBE)
+        return np.array(found)
+
+
+def _turned_with_axis_1(goal: tuple[float, ...], angle: float) -> tuple[float, ...]:
+    """Return ``goal``, in the frame of axis 1, with its rotation turned about that axis [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    turned = []
+    for column in range(3):
+        x, y, z = goal[3 * column : 3 * column + 3]
+        turned += [c * x - s * y, s * x + c * y, z]
+    return (*turned, *goal[9:])

@@ -1,0 +1,258 @@
+"""The kinematics of arms outside the five-axis family, as a session drives their tool."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
+from katana450.arm.control.state import Finding, State
+from katana450.arm.control.tool_commands import OrientTool, StepTool, TurnCommand
+from katana450.extensions.general_arms.branch_solver import BranchSolver
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.descent import Descent
+from katana450.extensions.general_arms.links import links_of
+from katana450.extensions.general_arms.losses import losses_of
+from katana450.extensions.general_arms.nearest import nearest_posture
+from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.pose_tracker import PoseTracker
+from katana450.extensions.general_arms.projected import projected
+from katana450.extensions.general_arms.ready_posture import ready_posture
+from katana450.extensions.general_arms.regularity import Regularity
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.general_arms.twist_task import twist_task
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.kinematics import SolvedPosture
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tracker import Tracked
+from katana450.maths.kinematics.velocity import JogFrame, Task
+from katana450.maths.motion.limiter import Limits
+
+SEARCH_STEPS: Final = 40
+"""Maximum number of steps in the search for the posture nearest to a typed pose."""
+
+SETTLINGS: Final = 4
+"""Maximum number of searches in which axis 1 and the pose of fewer than six axes settle."""
+
+SIX_PRIORITIES: Final[Mapping[Priority, tuple[str, str]]] = {
+    Priority.POSE: (PRIORITIES[Priority.POSE], PRIORITY_HINTS[Priority.POSE]),
+    Priority.POSITION: (
+        "Position only",
+        "The tool point goes to the target; its orientation is free.",
+    ),
+    Priority.ORIENTATION: (
+        "Orientation, position",
+        "The tool keeps the orientation of the target, and stops where it cannot.",
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenTool:
+    """The functions of one arm as `ToolKinematics`."""
+
+    chain: Chain
+
+    freedoms: ClassVar[int] = 6
+    turn: ClassVar[type[TurnCommand]] = OrientTool
+    priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = SIX_PRIORITIES
+
+    @cached_property
+    def _branches(self) -> BranchSolver:
+        return BranchSolver(kinematics_of(self.chain))
+
+    @cached_property
+    def _tracker(self) -> PoseTracker:
+        search = Numerical(self.chain, links_of(self.chain, exact=False))
+        regularity = Regularity(self.chain.n, self._branches.swivel)
+        return PoseTracker(Descent(search, regularity), self._branches)
+
+    @property
+    def task(self) -> Task:
+        """`twist_task`."""
+        return twist_task
+
+    @property
+    def method(self) -> str:
+        """The method in words."""
+        return self._branches.solver.method
+
+    @property
+    def branches(self) -> Sequence[AnyBranch]:
+        """The names of the branches."""
+        return self._branches.names
+
+    def inverse(
+        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
+    ) -> Sequence[SolvedPosture]:
+        """Return a posture for each branch; see `Kinematics.inverse`."""
+        return self._branches.solver.inverse(T, q_hint)
+
+    def branch_of(self, q: FloatArray) -> AnyBranch:
+        """Return the name of the branch of `q` (n,) [rad]."""
+        return self._branches.branch_of(q)
+
+    def target_at(self, q: FloatArray) -> ToolPose:
+        """Return the pose of the tool at `q` (n,) [rad]."""
+        T = forward(self.chain, q)
+        return ToolPose(frozen(T[:3, 3]), frozen(self._pan(q).T @ T[:3, :3]))
+
+    def turned(self, state: State, target: DragTarget, command: TurnCommand) -> DragTarget:
+        """Return ``target`` with the rotation of ``command``."""
+        assert isinstance(command, OrientTool)
+        return ToolPose(target.position, frozen(self._pan(state.goal).T @ command.R))
+
+    def stepped(self, state: State, target: DragTarget, step: StepTool) -> DragTarget:
+        """Return ``target`` moved by ``step``: x, y, z [m], then a rotation vector [rad]."""
+        pose, pan, by = _pose(target), self._pan(state.goal), step.by
+        R = np.eye(3)
+        if step.frame is JogFrame.TOOL:
+            R = forward(self.chain, state.goal)[:3, :3]
+        turned = so3.exp(R @ by[3:]) @ pan @ pose.R
+        return ToolPose(frozen(pose.position + R @ by[:3]), frozen(pan.T @ turned))
+
+    def _pan(self, q: FloatArray) -> FloatArray:
+        """Return the rotation (3, 3) that axis 1 gives to targets of fewer than six axes."""
+        return so3.exp(self.chain.S[:3, 0] * float(q[0])) if self.chain.n < 6 else np.eye(3)
+
+    def target_on(self, state: State, target: DragTarget, branch: AnyBranch) -> DragTarget:  # noqa: ARG002
+        """Return ``target``: a pose is the same on every branch."""
+        return target
+
+    def track(self, state: State, target: DragTarget, since: DragTarget) -> Tracked:
+        """Return the goal moved on towards ``target``, see `PoseTracker`."""
+        pose, branch = _pose(target), str(state.branch)
+        found = self._tracker.track(state.goal, pose, _pose(since), branch, state.priority)
+        best = self._projected(found.q, pose, branch, state.priority)
+        if found.since is not None or found.beyond_gap is None:
+            return Tracked(best, since=found.since)
+        ahead = self._projected(found.beyond_gap, pose, branch, state.priority)
+        return Tracked(best, beyond_gap=ahead)
+
+    def _projected(
+        self, q: FloatArray, target: ToolPose, branch: str, priority: Priority
+    ) -> Projection:
+        T = np.array(target.T)
+        T[:3, :3] = self._pan(q) @ T[:3, :3]
+        return projected(self.chain, q, T, branch, priority)
+
+    def project(self, state: State, T: FloatArray, branch: AnyBranch) -> Projection:
+        """Return the posture on ``branch`` nearest to the pose `T` (4, 4).
+
+        An arm without a closed form searches from the goal, and from other postures if that does
+        not lead there.
+        """
+        chain, priority, goal = self.chain, state.priority, state.goal
+        closed = self._branches.on_branch(T, str(branch), goal)
+        if closed is None:
+            closed = nearest_posture(kinematics_of(chain), T, q_hint=goal).q
+        starts = [chain.clamp(closed)]
+        if branch == state.branch:
+            starts.append(chain.clamp(goal))
+        found = []
+        for start in starts:
+            pose = self._seen(T, start)
+            q = start
+            for _ in range(SETTLINGS if chain.n < 6 else 1):
+                end = self._tracker.descent.run(
+                    self._tracker.descent.goal(pose), tuple(q.tolist()), priority, SEARCH_STEPS
+                )
+                before, q = q, np.array(end.q)
+                if abs(q[0] - before[0]) < 1e-9:
+                    break
+                pose = self._seen(T, q)
+            found.append(projected(chain, q, T, str(self.branch_of(q)), priority))
+            if found[-1].branch == branch and _is_exact(found[-1], priority):
+                break
+        return min(found, key=lambda each: (each.branch != branch, *_misses(each, priority)))
+
+    def _seen(self, T: FloatArray, q: FloatArray) -> ToolPose:
+        """Return the pose `T` (4, 4) as a target with axis 1 as at `q` (n,) [rad]."""
+        return ToolPose(frozen(T[:3, 3]), frozen(self._pan(q).T @ T[:3, :3]))
+
+    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
+        """Return the posture on ``branch`` nearest to ``target``."""
+        pose, pan = _pose(target), self._pan(state.goal)
+        T = np.array(pose.T)
+        T[:3, :3] = pan @ T[:3, :3]
+        return self.project(state, T, branch)
+
+    def losses(
+        self,
+        state: State,
+        best: Projection,
+        *,
+        yaw_was_given: bool,  # noqa: ARG002
+    ) -> tuple[Finding, ...]:
+        """Return the findings on what ``best`` loses of its target."""
+        return losses_of(self.chain, best, state.priority)
+
+    def tracking_losses(self, state: State, tracked: Tracked) -> tuple[Finding, ...]:
+        """Return the findings on what following a drag loses, a gap first."""
+        gap = None if tracked.beyond_gap is None else tracked.leap_ahead()
+        return losses_of(self.chain, tracked.best, state.priority, gap)
+
+    def jog_twist(self, q: FloatArray, rates: FloatArray, frame: JogFrame) -> FloatArray:
+        """Return the twist (6,) of rates (6,): a velocity and three rotations along ``frame``."""
+        R = np.eye(3) if frame is JogFrame.BASE else forward(self.chain, q)[:3, :3]
+        return np.concatenate((R @ rates[3:], R @ rates[:3]))
+
+    def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:
+        """Return the speed of the tool point [m/s] for the rates `qd` (n,)."""
+        _, moved = self._tracker.descent.search.motion(q.tolist())
+        x = y = z = 0.0
+        for rate, (_, _, _, vx, vy, vz) in zip(qd.tolist(), moved, strict=True):
+            x, y, z = x + rate * vx, y + rate * vy, z + rate * vz
+        return math.sqrt(x * x + y * y + z * z)
+
+    def tool_speed_bound(self, qd: FloatArray) -> float:
+        """Return the maximum of ``tool_speed`` over all postures."""
+        return float(np.abs(qd) @ self._reaches)
+
+    @cached_property
+    def _reaches(self) -> FloatArray:
+        """Bounds (n,) on the distance of the tool point from each axis [m]."""
+        links = self._tracker.descent.search.links
+        tool = float(np.linalg.norm(links.T_n_tool[:3, 3]))
+        a, d = links.a, [*links.d, 0.0]
+        # An offset along an axis does not move the tool away from it.
+        lengths = [
+            sum(map(math.hypot, a[k:], [0.0, *d[k + 1 : len(a)]])) + tool for k in range(links.n)
+        ]
+        return np.array(lengths)
+
+    def branch_limits(self, limits: Limits) -> Mapping[AnyBranch, Limits]:  # noqa: ARG002
+        """Return no limits: the limits of one joint do not decide the branch."""
+        return {}
+
+    def ready(self, posture: Sequence[float], T_base_shoulder: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return `ready_posture`."""
+        return ready_posture(self._tracker.descent, T_base_shoulder)
+
+
+def _pose(target: DragTarget) -> ToolPose:
+    assert isinstance(target, ToolPose)
+    return target
+
+
+def _misses(found: Projection, priority: Priority) -> tuple[float, ...]:
+    position, rotation = round(found.position_error, 7), round(found.rotation_error, 7)
+    if priority is Priority.POSITION:
+        return (position,)
+    return (rotation, position) if priority is Priority.ORIENTATION else (position, rotation)
+
+
+def _is_exact(found: Projection, priority: Priority) -> bool:
+    return max(_misses(found, priority)) == 0.0

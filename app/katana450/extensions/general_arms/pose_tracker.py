@@ -1,0 +1,143 @@
+"""Following a dragged pose: the goal moves on from its present posture along the path of the drag.
+
+Six axes with a closed form take the posture of their branch at each place of the path, if it is a
+hop away. At limits, out of reach, and for all other arms, `Descent` leads the goal on.
+The goal stays on its branch and never leaps; a pose that only a leap would reach is reported.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.extensions.general_arms.branch_solver import BranchSolver
+from katana450.extensions.general_arms.descent import Angles, Descent
+from katana450.extensions.general_arms.regularity import WALL
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tracker import DRAG_STRIDE, HOP, MAX_PATH_LENGTH, MIN_LEAP_GAIN
+
+MAX_EFFORT: Final = 20
+"""Maximum effort of one call, in looks at a posture. The next call continues."""
+
+MIN_EFFORT: Final = 8
+"""Minimum effort of the descent on a stride, so that it makes some steps."""
+
+EFFORT_OF_FORM: Final = 2
+"""Effort of a posture in closed form, in looks."""
+
+LEAST_PART: Final = 1.0 / 32.0
+"""[1] Smallest part of a stride that the closed form is asked for."""
+
+EXACT: Final = 1e-8
+"""[rad], [arm lengths] Error of the pose up to which a closed form's posture takes it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pursued:
+    """The end of one call.
+
+    Attributes:
+        q: joint angles of the goal (n,) [rad].
+        since: the place of the path from which the next call continues; None at the end of the
+            path.
+        beyond_gap: joint angles (n,) [rad] nearer to the target that only a leap would reach.
+    """
+
+    q: FloatArray
+    since: ToolPose | None = None
+    beyond_gap: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTracker:
+    """The tracker of one arm. Its methods are pure."""
+
+    descent: Descent
+    branches: BranchSolver
+
+    @property
+    def chain(self) -> Chain:
+        """The chain."""
+        return self.descent.search.chain
+
+    def track(
+        self, q: FloatArray, target: ToolPose, since: ToolPose, branch: str, priority: Priority
+    ) -> Pursued:
+        """Return the goal moved on from `q` (n,) [rad] on ``branch`` towards ``target``."""
+        here, effort, place = tuple(self.chain.clamp(q).tolist()), MAX_EFFORT, since
+        distance, angle = since.apart(target)
+        count = max(1, math.ceil(min(max(distance / DRAG_STRIDE, angle / HOP), MAX_PATH_LENGTH)))
+        for number in range(1, count + 1):
+            stop = target if number == count else since.towards(target, number / count)
+            here, effort, ended = self._advanced(here, place, stop, branch, priority, effort)
+            if not ended or (effort <= 0 and number < count):
+                return Pursued(np.array(here), since=stop if ended else place)
+            place = stop
+        found = np.array(here)
+        return Pursued(found, beyond_gap=self._beyond(found, target, branch, priority))
+
+    def _advanced(
+        self,
+        q: Angles,
+        start: ToolPose,
+        stop: ToolPose,
+        branch: str,
+        priority: Priority,
+        effort: int,
+    ) -> tuple[Angles, int, bool]:
+        """Return `q` moved from ``start`` to ``stop``, the effort left, and whether it is done."""
+        done, part = 0.0, 1.0
+        while self.branches.is_exact and priority is Priority.POSE and done < 1.0 and effort > 0:
+            place = stop if done + part >= 1.0 else start.towards(stop, done + part)
+            found = self._exact(place, branch, q)
+            effort -= EFFORT_OF_FORM
+            if found is None or part < LEAST_PART:
+                break
+            if max(abs(a - b) for a, b in zip(found, q, strict=True)) > HOP:
+                part *= 0.5
+                continue
+            q, done = found, min(done + part, 1.0)
+            part = min(2.0 * part, 1.0 - done)
+        if done >= 1.0:
+            return q, effort, True
+        goal = self.descent.goal(stop)
+        end = self.descent.run(goal, q, priority, max(effort, MIN_EFFORT))
+        if self.descent.look(goal, q).least < WALL and self._leaves(end.q, branch):
+            return q, effort - end.effort, True
+        return end.q, effort - end.effort, end.ended
+
+    def _leaves(self, q: Angles, branch: str) -> bool:
+        return self.branches.branch_of(np.array(q)) != branch
+
+    def _exact(self, place: ToolPose, branch: str, q: Angles) -> Angles | None:
+        """Return the posture of ``branch`` at ``place`` inside the limits; None without one."""
+        near = np.array(q)
+        found = self.branches.on_branch(place.T, branch, near)
+        if found is None or not self.chain.within_limits(found):
+            return None
+        angles = tuple(self.chain.clamp(found).tolist())
+        now = self.descent.search.step(self.descent.goal(place), angles)
+        return angles if now.square <= EXACT * EXACT else None
+
+    def _beyond(
+        self, q: FloatArray, target: ToolPose, branch: str, priority: Priority
+    ) -> FloatArray | None:
+        """Return the exact posture of the branch for ``target``, if `q` (n,) misses it."""
+        goal = self.descent.goal(target)
+        misses = self.descent.misses(self.descent.look(goal, tuple(q.tolist())), priority)
+        if max(misses) <= MIN_LEAP_GAIN or self.chain.n < 6:
+            return None
+        ahead = self.branches.on_branch(target.T, branch, q)
+        if ahead is None or not self.chain.within_limits(ahead):
+            return None
+        ahead = self.chain.clamp(ahead)
+        after = self.descent.look(goal, tuple(ahead.tolist()))
+        exact = max(map(abs, after.error.tolist())) <= math.sqrt(tolerances.SAME_POSITION)
+        return ahead if exact else None

@@ -1,0 +1,274 @@
+"""Arms outside the five-axis family are driven by their tool."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.messages import sentence
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, Status, Verdict
+from katana450.arm.control.tool_targets import with_branch
+from katana450.errors import InputError
+from katana450.maths.geometry import se3, so3
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.velocity import JogFrame, singular_values
+from tests.general_arms.driven import TICK, begun, pose, run, session_of, settled
+from tests.general_arms.published_arms import (
+    FOUR,
+    OPENMANIPULATOR_X,
+    PANDA,
+    SEVEN,
+    SIX,
+    SKEWED,
+    UR5E,
+)
+
+ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED}
+SIX_AND_MORE = {**SIX, **SEVEN, **SKEWED}
+SMALL = np.array([0.02, -0.03, 0.01])
+TURN = so3.exp(np.array([0.1, -0.2, 0.15]))
+
+
+def every(arms: dict[str, Chain]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("chain", [pytest.param(c, id=name) for name, c in arms.items()])
+
+
+@every(ARMS)
+def test_ready_posture_is_inside_the_limits_and_regular(chain: Chain) -> None:
+    session = session_of(chain)
+    assert chain.within_limits(session.ready)
+    assert singular_values(chain, session.ready)[-1] > 0.1
+
+
+@every(SIX_AND_MORE)
+def test_drag_moves_the_tool_point_and_keeps_its_orientation(chain: Chain) -> None:
+    session = session_of(chain)
+    start = begun(session)
+    T = pose(session, start)
+    state = settled(session, start, [cmd.MoveTool(T[:3, 3] + SMALL)])
+    reached = pose(session, state)
+    np.testing.assert_allclose(reached[:3, 3], T[:3, 3] + SMALL, atol=1e-7)
+    assert so3.angle(reached[:3, :3], T[:3, :3]) < 1e-6
+    assert state.branch == start.branch
+    assert state.status is Status.OK
+
+
+@every(FOUR)
+def test_four_axes_keep_the_pitch_in_a_drag(chain: Chain) -> None:
+    session = session_of(chain)
+    start = begun(session)
+    T = pose(session, start)
+    aside = (se3.exp(0.7 * chain.S[:, 0]) @ T)[:3, 3]
+    state = settled(session, start, [cmd.MoveTool(aside)])
+    np.testing.assert_allclose(pose(session, state)[:3, 3], aside, atol=1e-7)
+    # The tool is in the plane that turns with axis 1, so all other joints stay.
+    np.testing.assert_allclose(state.q[1:], start.q[1:], atol=1e-6)
+    assert state.status is Status.OK
+
+
+@every(SIX_AND_MORE)
+def test_ring_turns_the_tool_about_its_point(chain: Chain) -> None:
+    session = session_of(chain)
+    start = begun(session)
+    T = pose(session, start)
+    state = settled(session, start, [cmd.OrientTool(TURN @ T[:3, :3])])
+    reached = pose(session, state)
+    np.testing.assert_allclose(reached[:3, 3], T[:3, 3], atol=1e-7)
+    np.testing.assert_allclose(reached[:3, :3], TURN @ T[:3, :3], atol=1e-6)
+
+
+def test_ring_pitches_four_axes() -> None:
+    session = session_of(OPENMANIPULATOR_X)
+    start = begun(session)
+    T = pose(session, start)
+    pitched = so3.exp(0.2 * OPENMANIPULATOR_X.S[:3, 3]) @ T[:3, :3]
+    state = settled(session, start, [cmd.OrientTool(pitched)])
+    np.testing.assert_allclose(pose(session, state)[:3, :3], pitched, atol=1e-6)
+    np.testing.assert_allclose(pose(session, state)[:3, 3], T[:3, 3], atol=1e-7)
+
+
+@every(SIX_AND_MORE)
+def test_typed_pose_is_taken(chain: Chain) -> None:
+    session = session_of(chain)
+    start = begun(session)
+    T = pose(session, start)
+    T[:3, 3] += SMALL
+    T[:3, :3] = TURN @ T[:3, :3]
+    state = settled(session, start, [cmd.SetPose(T)])
+    np.testing.assert_allclose(pose(session, state), T, atol=1e-6)
+    assert state.status is Status.OK
+
+
+@every(ARMS)
+def test_pose_out_of_reach_has_its_reason_in_words(chain: Chain) -> None:
+    session = session_of(chain)
+    T = pose(session, begun(session))
+    T[:3, 3] = 10.0 * T[:3, 3]
+    state = session.step(begun(session), [cmd.SetPose(T)], TICK)
+    assert state.outcomes[0].verdict is Verdict.LIMITED
+    assert state.findings[0].reason is Reason.OUT_OF_REACH
+    assert "mm out of reach" in sentence(state)
+    assert chain.within_limits(state.goal)
+
+
+@every(ARMS)
+def test_step_adds_up_along_the_tool(chain: Chain) -> None:
+    session = session_of(chain)
+    start = begun(session)
+    T = pose(session, start)
+    step = cmd.StepTool(np.array([0.0, 0.0, 0.01, 0.0, 0.0, 0.0]))
+    state = settled(session, run(session, start, [step]), [step])
+    np.testing.assert_allclose(pose(session, state)[:3, 3], T[:3, 3] + (0, 0, 0.02), atol=1e-7)
+
+
+@every(SIX_AND_MORE)
+def test_step_turns_about_an_axis_of_the_tool(chain: Chain) -> None:
+    session = session_of(chain)
+    start = begun(session)
+    T = pose(session, start)
+    step = cmd.StepTool(np.array([0.0, 0.0, 0.0, 0.0, 0.1, 0.0]), JogFrame.TOOL)
+    reached = pose(session, settled(session, start, [step]))
+    np.testing.assert_allclose(reached[:3, :3], T[:3, :3] @ so3.rotation_y(0.1), atol=1e-6)
+
+
+@every(SIX_AND_MORE)
+@pytest.mark.parametrize("frame", JogFrame)
+def test_jog_follows_all_six_rates(chain: Chain, frame: JogFrame) -> None:
+    session = session_of(chain)
+    state = begun(session)
+    rates = np.array([0.02, -0.01, 0.015, 0.03, 0.02, -0.04])
+    for _ in range(60):
+        state = run(session, state, [cmd.Jog(rates, frame)])
+    before = pose(session, state)
+    after = pose(session, run(session, state, [cmd.Jog(rates, frame)]))
+    moved = (after[:3, 3] - before[:3, 3]) / TICK
+    turned = so3.log(after[:3, :3] @ before[:3, :3].T) / TICK
+    R = before[:3, :3] if frame is JogFrame.TOOL else np.eye(3)
+    np.testing.assert_allclose(moved, R @ rates[:3], atol=1e-3)
+    np.testing.assert_allclose(turned, R @ rates[3:], atol=2e-3)
+
+
+@every(FOUR)
+def test_jog_of_four_axes_moves_the_point_exactly(chain: Chain) -> None:
+    session = session_of(chain)
+    state = begun(session)
+    rates = np.array([0.0, 0.02, 0.01, 0.0, 0.0, 0.0])
+    for _ in range(60):
+        state = run(session, state, [cmd.Jog(rates)])
+    before = pose(session, state)
+    after = pose(session, run(session, state, [cmd.Jog(rates)]))
+    np.testing.assert_allclose((after - before)[:3, 3] / TICK, rates[:3], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (cmd.Jog(np.zeros(5)), "6 numbers"),
+        (cmd.StepTool(np.zeros(5)), "6 numbers"),
+        (cmd.TurnTool(0.1, 0.2), "give this tool a pose or a rotation"),
+        (cmd.SetPriority(Priority.PITCH), "'pose', 'position', 'orientation'"),
+        (cmd.TakeBranch("left-up"), "front-up-plus, front-down-plus"),
+    ],
+)
+def test_command_of_five_axes_is_refused_with_what_works(
+    command: cmd.Command, message: str
+) -> None:
+    session = session_of(UR5E)
+    with pytest.raises(InputError, match=message):
+        session.step(begun(session), [command], TICK)
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (cmd.Jog(np.zeros(6)), "5 numbers: x, y, z, pitch and roll"),
+        (cmd.StepTool(np.zeros(6)), "5 numbers"),
+        (cmd.OrientTool(np.eye(3)), "by a pitch and a roll"),
+        (cmd.SetPriority(Priority.ORIENTATION), "'position and pitch'"),
+        (cmd.TakeBranch("front-up-plus"), "front-up, front-down, back-up, back-down"),
+    ],
+)
+def test_command_of_six_axes_is_refused_by_five(
+    session: Session, command: cmd.Command, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        session.check(command)
+
+
+@pytest.mark.parametrize("chain", [UR5E, PANDA], ids=["UR5e", "Panda"])
+def test_other_branch_keeps_the_pose(chain: Chain) -> None:
+    session = session_of(chain)
+    arm, start = session.require_arm(), begun(session)
+    T = pose(session, start)
+    choices = session.choices(start)
+    assert [each.metrics.branch for each in choices] == list(arm.kinematics.branches)
+    usable = [
+        each.metrics
+        for each in choices
+        if each.metrics.position_error < 1e-6 and each.metrics.branch != start.branch
+    ]
+    assert usable
+    goal = with_branch(arm, start, usable[-1].branch).goal
+    state = settled(session, start, [cmd.Follow(plan_to(arm, None, start, goal))])
+    np.testing.assert_allclose(pose(session, state), T, atol=1e-6)
+    assert state.branch == usable[-1].branch
+
+
+def test_priority_decides_what_is_kept_out_of_reach() -> None:
+    session = session_of(UR5E)
+    start = begun(session)
+    T = pose(session, start)
+    far = cmd.MoveTool(2.0 * T[:3, 3])
+    lost = {}
+    for priority in session.require_arm().kinematics.priorities:
+        state = settled(session, start, [cmd.SetPriority(priority), far])
+        reached = pose(session, state)
+        lost[priority] = (
+            float(np.linalg.norm(reached[:3, 3] - far.position)),
+            so3.angle(reached[:3, :3], T[:3, :3]),
+        )
+    assert lost[Priority.ORIENTATION][1] < 1e-2
+    assert lost[Priority.POSE][0] < lost[Priority.ORIENTATION][0] - 1e-3
+    assert lost[Priority.POSITION][0] < lost[Priority.ORIENTATION][0] - 1e-3
+
+
+def test_position_only_leaves_the_orientation_free() -> None:
+    session = session_of(UR5E)
+    start = begun(session)
+    target = pose(session, start)[:3, 3] + (0.1, 0.2, 0.05)
+    position_only: list[cmd.Command] = [cmd.SetPriority(Priority.POSITION), cmd.MoveTool(target)]
+    state = settled(session, start, position_only)
+    np.testing.assert_allclose(pose(session, state)[:3, 3], target, atol=1e-6)
+    assert state.status is Status.OK
+
+
+def test_stop_pause_and_home_work_during_a_drag() -> None:
+    session = session_of(UR5E)
+    start = begun(session)
+    far = cmd.MoveTool(pose(session, start)[:3, 3] + (0.2, 0.2, 0.1))
+    moving = run(session, start, [far], 15)
+    paused = settled(session, moving, [cmd.Pause()])
+    assert paused.status is Status.PAUSED
+    assert settled(session, paused, [cmd.Resume()]).status is Status.OK
+    stopped = run(session, moving, [cmd.Stop()], 120)
+    assert stopped.motion.at_rest
+    assert run(session, stopped, [far], 5).motion.at_rest
+    free = run(session, stopped, [cmd.ClearStop()], 2)
+    home = settled(session, free, [cmd.Home()])
+    np.testing.assert_allclose(home.q, session.ready, atol=1e-9)
+
+
+def test_drag_beside_the_base_is_held_at_a_singularity_and_says_so() -> None:
+    """The wrist of a UR cannot pass its singularity in a straight line without a leap."""
+    session = session_of(UR5E)
+    q = np.radians([0.0, -90.0, -90.0, -90.0, 20.0, 0.0])
+    start = session.begin(q, 0.0, 0.0)
+    T = pose(session, start)
+    turned = so3.exp(so3.log(np.eye(3)) + T[:3, :3] @ np.array([0.0, -1.2, 0.0])) @ T[:3, :3]
+    state = settled(session, start, [cmd.OrientTool(turned)])
+    assert state.branch == start.branch
+    assert str(session.require_arm().kinematics.branch_of(state.goal)) == start.branch

@@ -1,0 +1,97 @@
+"""Random drags of published arms keep their branch and their limits, and never leap."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.state import State
+from katana450.extensions.general_arms.driven_tool import DrivenTool
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.maths.geometry import so3
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.priority import Priority
+from tests.general_arms.published_arms import FOUR, SEVEN, SIX, SKEWED
+
+ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED}
+DRAGS_OF_A_TRIP = 10
+MAX_CALLS = 400
+MAX_MOVE = 2.0
+"""[rad] A call moves the goal by a few hops of 0.1 rad at most."""
+
+
+class Dragged(NamedTuple):
+    """The results of some drags."""
+
+    arrived: int
+    held: int
+    calls: int
+    seconds: float
+
+
+def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragged:
+    """Drag the tool along ``count`` random paths and check every call."""
+    tool = DrivenTool(chain)
+    rng = np.random.default_rng(23)
+    arrived = held = calls = 0
+    seconds = 0.0
+    for number in range(count):
+        if number % DRAGS_OF_A_TRIP == 0:
+            even = number // DRAGS_OF_A_TRIP % 2 == 0
+            q = tool.ready((), np.eye(4)) if even else rng.uniform(chain.lower, chain.upper)
+            state = State.standing(q, 0.0, 0.0, "tcp", tool.branch_of(q))
+            state = replace(state, priority=priority)
+            since = tool.target_at(q)
+        turn = so3.exp(0.3 * rng.normal(size=3))
+        target = ToolPose(since.position + 0.08 * rng.normal(size=3), turn @ since.R)
+        for _ in range(MAX_CALLS):
+            begin = time.thread_time()
+            found = tool.track(state, target, since)
+            seconds += time.thread_time() - begin
+            calls += 1
+            goal = found.best.q
+            assert ((goal >= chain.lower) & (goal <= chain.upper)).all()
+            assert np.abs(goal - state.goal).max() <= MAX_MOVE
+            assert tool.branch_of(goal) == state.branch
+            state = replace(state, goal=goal)
+            if found.since is None:
+                break
+            assert isinstance(found.since, ToolPose)
+            since = found.since
+        since = target
+        exact = found.best.position_error < 1e-6 and found.best.rotation_error < 1e-6
+        arrived += exact
+        held += not exact
+    return Dragged(arrived, held, calls, seconds)
+
+
+@pytest.mark.parametrize("name", ["UR5e", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
+def test_drags_keep_branch_and_limits(name: str) -> None:
+    found = drags(ARMS[name], 20)
+    assert found.arrived + found.held == 20
+    if ARMS[name].n >= 6:
+        assert found.arrived >= 5
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_drags_of_seven_axes_keep_branch_and_limits(name: str) -> None:
+    assert drags(ARMS[name], 4).arrived >= 1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ARMS)
+def test_10000_drags_keep_branch_and_limits(name: str) -> None:
+    found = drags(ARMS[name], 10_000)
+    print(
+        f"{name}: {found.arrived} arrived, {found.held} held, {found.calls} calls, "
+        f"{1e3 * found.seconds / found.calls:.2f} ms each"
+    )
+
+
+@pytest.mark.parametrize("priority", [Priority.POSITION, Priority.ORIENTATION])
+def test_drags_keep_branch_and_limits_under_every_priority(priority: Priority) -> None:
+    drags(ARMS["UR5e"], 6, priority)
