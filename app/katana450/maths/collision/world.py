@@ -19,7 +19,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 
 IndexArray = npt.NDArray[np.int64]
 
-FEW_PAIRS = 500
+FEW_PAIRS = 1000
 """Number of pairs up to which their balls are compared in one product of matrices."""
 
 DIRECT_PAIRS = 8
