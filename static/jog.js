@@ -1,4 +1,4 @@
-// Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates. An input that is released,
+// Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates, or six with a yaw. An input that is released,
 // unplugged or in a hidden tab counts as zero, and without new messages the arm comes to rest.
 "use strict";
 const Jog = (() => {
@@ -9,14 +9,18 @@ const Jog = (() => {
   const MOUSE_FULL = 350; // value of a SpaceMouse at full deflection
   const MOUSE_FRESH = 150; // ms for which a report is valid; it reports all the time while held
   const MOUSE_RESTS = 1000; // ms without a report after which it is at rest
-  // x, y, z, pitch, roll
+  // x, y, z, pitch, roll, yaw
   const KEYS = {
     KeyW: [0, 1], KeyS: [0, -1], KeyA: [1, 1], KeyD: [1, -1], KeyR: [2, 1], KeyF: [2, -1],
     KeyI: [3, 1], KeyK: [3, -1], KeyJ: [4, -1], KeyL: [4, 1],
+    KeyQ: [5, 1], KeyE: [5, -1],
   };
-  const HOLDS = { "pitch+": [3, 1], "pitch-": [3, -1], "roll-": [4, -1], "roll+": [4, 1] };
+  const HOLDS = {
+    "pitch+": [3, 1], "pitch-": [3, -1], "roll-": [4, -1], "roll+": [4, 1],
+    "yaw+": [5, 1], "yaw-": [5, -1],
+  };
 
-  const none = () => [0, 0, 0, 0, 0];
+  const none = () => [0, 0, 0, 0, 0, 0];
   const byId = (id) => document.getElementById(id);
   /** @returns {NodeListOf<HTMLButtonElement>} */
   const holdButtons = () => document.querySelectorAll("[data-hold]");
@@ -122,7 +126,8 @@ const Jog = (() => {
     steps?.grip(counts && pressed(3), counts && pressed(0));
     if (!counts) return none();
     const [x = 0, y = 0, u = 0, v = 0] = found.axes;
-    return [-bent(y), -bent(x), -bent(v), Number(pressed(12)) - Number(pressed(13)), bent(u)];
+    return [-bent(y), -bent(x), -bent(v), Number(pressed(12)) - Number(pressed(13)), bent(u),
+      Number(pressed(14)) - Number(pressed(15))];
   }
 
   function report({ reportId, data }) {
@@ -132,8 +137,10 @@ const Jog = (() => {
     if (reportId === 1) {
       // The axes of the device: x to the right, y towards the person, z down.
       [rates[0], rates[1], rates[2]] = [-number(2), -number(0), -number(4)].map(bent);
-      if (data.byteLength >= 12) [rates[3], rates[4]] = [-number(6), -number(8)].map(bent);
-    } else if (reportId === 2) [rates[3], rates[4]] = [-number(0), -number(2)].map(bent);
+      if (data.byteLength >= 12)
+        [rates[3], rates[4], rates[5]] = [-number(6), -number(8), -number(10)].map(bent);
+    } else if (reportId === 2)
+      [rates[3], rates[4], rates[5]] = [-number(0), -number(2), -number(4)].map(bent);
     else if (reportId === 3) {
       if (data.getUint8(0) & 1) stop();
       return;
@@ -180,7 +187,10 @@ const Jog = (() => {
     sentAt = performance.now();
     /** @type {HTMLInputElement} */
     const frame = document.querySelector("[name=frame]:checked");
-    say({ do: "jog", rates: now, frame: frame.value === "tool" ? "tool" : "base" });
+    const [x, y, z, pitch, roll, yaw] = now;
+    // With six freedoms a turn about each axis of the frame.
+    const sent = steps?.freedoms === 6 ? [x, y, z, roll, pitch, yaw] : [x, y, z, pitch, roll];
+    say({ do: "jog", rates: sent, frame: frame.value === "tool" ? "tool" : "base" });
   }
 
   function begin(options) {

@@ -127,12 +127,17 @@ function gauges(arm) {
       },
       ({ margins }) => [margins.smallest_singular_value],
     ),
-    gauge(
-      "pitch",
-      "Tool pitch",
-      { low: -180, high: 180, origin: 0, unit: "°, + is down", text: one },
-      ({ pitch }) => [pitch * DEGREES],
-    ),
+    // Other arms have a rotation in place of a pitch.
+    ...(arm.freedoms === 5
+      ? [
+          gauge(
+            "pitch",
+            "Tool pitch",
+            { low: -180, high: 180, origin: 0, unit: "°, + is down", text: one },
+            ({ pitch }) => [pitch * DEGREES],
+          ),
+        ]
+      : []),
     gauge(
       "touch",
       "Touch",

@@ -4,8 +4,8 @@ import { html } from "../instruments/shape.js";
 const SIZES = [0, 0.1, 1, 10]; // mm or degrees; 0 to hold
 const RADIANS = Math.PI / 180;
 const EDGE = 0.5; // fraction of a stick's travel that counts as a press
-// Name and unit of each of the five steps of the tool.
-const AXES = [["x", "mm"], ["y", "mm"], ["z", "mm"], ["Pitch", "°"], ["Roll", "°"]];
+// Name and unit of each step of the tool; only an arm with six freedoms has the last.
+const AXES = [["x", "mm"], ["y", "mm"], ["z", "mm"], ["Pitch", "°"], ["Roll", "°"], ["Yaw", "°"]];
 const GRIPPER_KEYS = { KeyO: "open", KeyC: "closed" };
 const STYLE = new URL("steps.css", import.meta.url).href;
 
@@ -14,7 +14,7 @@ export class Steps {
   #size = 0; // mm or degrees; 0 to hold
   #frame = "base";
   #arm = null; // the description of the arm
-  #held = [0, 0, 0, 0, 0]; // signs of the gamepad's sticks
+  #held = [0, 0, 0, 0, 0, 0]; // signs of the gamepad's sticks
   #gripped = [false, false];
   #grid = html("div", { id: "steps", hidden: "" });
   #leader = null; // a leader arm, loaded with the first press of its button
@@ -49,6 +49,7 @@ export class Steps {
       root.querySelector("#pads").before(this.#gripper);
     }
     root.addEventListener("change", ({ target }) => this.#choose(target));
+    if (arm.freedoms === 6) for (const yaw of root.querySelectorAll("[data-hold^=yaw]")) yaw.hidden = false;
     if (arm.joints_only) root.querySelector("[value=joints]").click();
     else if ("serial" in navigator) this.#offer(root, watch);
   }
@@ -81,9 +82,17 @@ export class Steps {
       const by = this.#arm.slides[axis] ? this.#size / 1000 : this.#size * RADIANS;
       return this.#say({ do: "nudge", axis: axis + 1, by: sign * by });
     }
-    const by = [0, 0, 0, 0, 0];
-    by[axis] = sign * (axis < 3 ? this.#size / 1000 : this.#size * RADIANS);
+    const by = new Array(this.freedoms).fill(0);
+    if (axis >= this.freedoms) return;
+    // With six freedoms the turns are about x, y and z: roll, pitch and yaw.
+    const place = this.freedoms === 6 ? [0, 1, 2, 4, 3, 5][axis] : axis;
+    by[place] = sign * (axis < 3 ? this.#size / 1000 : this.#size * RADIANS);
     this.#say({ do: "step_tool", by, frame: this.#frame });
+  }
+
+  // Number of numbers in a jog or a step of the tool.
+  get freedoms() {
+    return this.#arm.freedoms;
   }
 
   // Return whether the key was handled. moves: {code: [axis, sign]} of the keys that move.
@@ -139,7 +148,7 @@ export class Steps {
   #draw() {
     const columns = this.#frame === "joints"
       ? this.#arm.joints.map((_, i) => [`Axis ${i + 1}`, this.#arm.slides[i] ? "mm" : "°"])
-      : AXES;
+      : AXES.slice(0, this.freedoms);
     this.#grid.replaceChildren(
       ...columns.map(([name, unit], axis) => {
         const button = (sign) => {

@@ -5,6 +5,7 @@ import { html, write } from "../instruments/shape.js";
 const ROW = "tr[data-branch]";
 const EVERY = 250; // ms between two looks for ghosts that the server shows
 const OPACITY = 0.4;
+const PARTS = ["shoulder", "elbow", "wrist"]; // words of the name of a branch
 const ELBOW = 2; // number of the joint whose link carries the name
 
 export class Branches {
@@ -23,6 +24,7 @@ export class Branches {
     this.#arm = arm;
     this.#status = status;
     stage.append(this.#labels);
+    this.#read();
     setInterval(() => document.hidden || this.#name(), EVERY);
   }
 
@@ -100,16 +102,14 @@ export class Branches {
     const answers = await Promise.all(questions);
     if (answers.some((each) => !each?.ok) || asked !== this.#asked) return null;
     const [{ choices }, state] = await Promise.all(answers.map((each) => each.json()));
-    const [shoulder, elbow] = state.branch ?? [];
+    const now = state.branch ?? [];
     this.#options = new Map(
       choices.map((each) => {
-        const differs = [
-          each.shoulder === shoulder ? "" : `shoulder ${each.shoulder}`,
-          each.elbow === elbow ? "" : `elbow ${each.elbow}`,
-        ];
+        const parts = each.name.split("-");
+        const differs = parts.map((word, k) => (word === now[k] ? "" : `${PARTS[k]} ${word}`));
         const time = each.time / (this.#status()?.speed ?? 1);
         const words = [...differs.filter(Boolean), `${time.toFixed(1)} s`].join(", ");
-        return [`${each.shoulder}-${each.elbow}`, { words, q: each.q }];
+        return [each.name, { words, q: each.q }];
       }),
     );
     return state;
@@ -121,7 +121,7 @@ export class Branches {
     if (!node?.("")) return;
     const shown = new Map(); // name of a branch to the pixel of its elbow
     const path = this.#arm.links[ELBOW]?.path.join("/");
-    for (const name of ["front-up", "front-down", "back-up", "back-down"])
+    for (const name of this.#options.keys())
       if (node(`/branch/${name}`)?.visible) shown.set(name, pixelOf(`/branch/${name}/${path}`));
     if (this.#ghost?.elbow) {
       const { elbow } = this.#ghost;

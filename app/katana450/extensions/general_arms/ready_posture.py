@@ -21,8 +21,8 @@ MAX_TURNED: Final = 5
 ROOM: Final = 0.05
 """[1] Minimum distance from the limits, as a fraction of the range of a joint."""
 
-LOWEST: Final = 0.1
-"""[1] Minimum height of the tool over the base, as a fraction of the reach of the arm."""
+HEIGHT: Final = 0.35
+"""[1] Preferred height of the tool over the base, as a fraction of the reach of the arm."""
 
 
 def ready_posture(descent: Descent, T_base_shoulder: FloatArray) -> FloatArray:
@@ -30,7 +30,7 @@ def ready_posture(descent: Descent, T_base_shoulder: FloatArray) -> FloatArray:
 
     The first joint, and the last one of arms with six and more axes, stand in the middle of their
     limits. The others are a few right or half right angles away from it: far from a singularity,
-    with the tool in front of the base and above it, and turned as little as that allows.
+    with the tool in front of the base and at a medium height, and turned as little as that allows.
     """
     chain = descent.search.chain
     q = _candidates(chain)
@@ -42,7 +42,7 @@ def ready_posture(descent: Descent, T_base_shoulder: FloatArray) -> FloatArray:
     turned = np.abs(q - q[0]).sum(axis=1)
     upright = np.abs(T[:, :3, :3]).max(axis=2).min(axis=1)
     score = np.minimum(least, 0.25) / 0.25 + 0.5 * np.clip(ahead, -0.5, 0.5) + 0.5 * upright
-    score -= 0.05 * turned + 5.0 * np.clip(LOWEST - height, 0.0, 1.0)
+    score -= 0.05 * turned + np.abs(height - HEIGHT)
     return np.array(q[int(score.argmax())])
 
 

@@ -236,6 +236,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         slides: (n,) Whether each joint slides.
         links: (n,) The link that each joint moves.
         joints_only: Reason for which no tool can be moved to a pose; empty where one can.
+        freedoms: Number of numbers in ``jog`` and ``step_tool``, 5 or 6; 0 without tools.
     """
 
     name: str
@@ -254,6 +255,7 @@ class Arm(Answer, frozen=True, kw_only=True):
     slides: list[bool]
     links: list[JointLink]
     joints_only: str
+    freedoms: int = 0
 
 
 class LogLine(msgspec.Struct, frozen=True, kw_only=True):

@@ -13,6 +13,7 @@ from katana450.arm.control.messages import title
 from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State, Status
+from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -124,6 +125,10 @@ class View(ViewUpdater):
         for layer in view_options.layers:
             layer.attach(server, robot)
         self._cameras = Cameras(server, self._arm)
+        if view_options.gizmo is not None:
+            # The named views are those of an arm of the size of the Katana.
+            look = camera(robot)
+            server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
         shows = DisplayOptions(
             self._show_ellipsoid,
             self._scenery.objects.show_handles,

@@ -1,0 +1,69 @@
+"""The page of an arm outside the five-axis family: a UR5e with gizmo, jog and branches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.maths.geometry import so3
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import APP, AppServer
+from tests.general_arms.links_of_arms import ur5e
+
+pytestmark = pytest.mark.long
+
+TURN_WORTH_SEEING = 0.05
+"""[rad]"""
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
+    path = tmp_path_factory.mktemp("ur5e") / "ur5e.urdf"
+    path.write_text(ur5e(), encoding="utf-8")
+    with AppServer((*APP, "--urdf", str(path))) as server:
+        yield server
+
+
+@pytest.fixture
+def six(other: AppServer, open_page: OpenPage) -> ViserPage:
+    return open_page(other.url)
+
+
+def tool(page: ViserPage) -> Any:
+    names = page.frame.evaluate("() => Object.keys(__viserMutable.nodeRefFromName)")
+    return page.node_pose(next(each for each in names if each.endswith("/tool0")))
+
+
+def test_a_held_key_turns_the_tool_about_the_vertical(six: ViserPage) -> None:
+    six.page.click("#jog-button")
+    six.page.wait_for_selector("[data-hold='yaw+']", state="visible")
+    start = tool(six)
+    six.page.keyboard.down("KeyQ")
+    six.wait_until(
+        lambda: so3.angle(tool(six)[:3, :3], start[:3, :3]) > TURN_WORTH_SEEING, "the tool to turn"
+    )
+    six.page.keyboard.up("KeyQ")
+    six.page.wait_for_timeout(1500)
+    end = tool(six)
+    turn = so3.log(end[:3, :3] @ start[:3, :3].T)
+    np.testing.assert_allclose(turn[:2], 0.0, atol=0.02)
+    assert turn[2] > TURN_WORTH_SEEING
+    np.testing.assert_allclose(end[:3, 3], start[:3, 3], atol=0.003)
+    assert not six.errors
+
+
+def test_gizmo_has_arrows_and_rings_and_branches_have_names(six: ViserPage) -> None:
+    names = six.frame.evaluate("() => Object.keys(__viserMutable.nodeRefFromName)")
+    assert "/target/move" in names
+    assert "/target/move/turn" in names
+    assert "/target/move/roll" not in names
+    six.frame.get_by_text("Branches", exact=True).click()
+    rows = six.frame.locator("tr[data-branch]")
+    rows.first.wait_for()
+    assert rows.count() == 8
+    assert "front-up-plus" in {rows.nth(k).get_attribute("data-branch") for k in range(8)}
+    assert not six.errors
