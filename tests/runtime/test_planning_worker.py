@@ -36,6 +36,7 @@ def planned(session: Session, elbow: float) -> tuple[PlanningWorker, list[cmd.Co
     sink = Sink()
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
     here = state.branch
+    assert isinstance(here, Branch)
     worker.deliver(
         cmd.TakeBranch(Branch(here.shoulder, "down" if here.elbow == "up" else "up")), None
     )
