@@ -9,9 +9,10 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import sentence
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, Status, Verdict
+from katana450.arm.control.state import Reason, State, Status, Verdict
 from katana450.arm.control.tool_targets import with_branch
 from katana450.errors import InputError
+from katana450.extensions.recording.codec import Codec, json_form, json_text
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
@@ -272,3 +273,18 @@ def test_drag_beside_the_base_is_held_at_a_singularity_and_says_so() -> None:
     state = settled(session, start, [cmd.OrientTool(turned)])
     assert state.branch == start.branch
     assert str(session.require_arm().kinematics.branch_of(state.goal)) == start.branch
+
+
+def test_state_of_a_drag_and_its_commands_are_recorded_to_the_bit() -> None:
+    session, codec = session_of(UR5E), Codec()
+    start = begun(session)
+    far = cmd.MoveTool(pose(session, start)[:3, 3] + (0.6, 0.3, 0.2))
+    state = session.step(start, [far], TICK)
+    text = json_text(codec.encoded(State, state))
+    again = codec.decoded(State, json_form(text))
+    assert json_text(codec.encoded(State, again)) == text
+    following, repeated = (session.step(each, [], 2 * TICK) for each in (state, again))
+    np.testing.assert_array_equal(following.goal, repeated.goal)
+    for command in (cmd.OrientTool(TURN), cmd.TakeBranch("front-up-plus")):
+        form = json_text(codec.encoded(cmd.Command, command))
+        assert type(codec.decoded(cmd.Command, json_form(form))) is type(command)

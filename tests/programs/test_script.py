@@ -70,7 +70,7 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps:\n  - wait: nan", 2, "number"),
         ("steps:\n  - wait: -1", 2, "not between"),
         ("steps:\n  - wait: yes", 2, "number"),
-        ("steps:\n  - joints: [1, 2, 3]", 2, "list of 5"),
+        ("steps:\n  - joints: [1, 2]", 2, "list of 3 to 32"),
         ("steps:\n  - joints: [1, 2, 3, 4, x]", 2, "'x'"),
         ("steps:\n  - line: {to: {x: 1, y: 2}}", 2, "needs 'z'"),
         ("steps:\n  - line: {to: [1, 2, 3], by: [1, 2, 3]}", 2, "`to` or `by`, not both"),

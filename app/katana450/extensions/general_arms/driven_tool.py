@@ -40,8 +40,11 @@ from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import JogFrame, Task
 from katana450.maths.motion.limiter import Limits
 
-SEARCH_STEPS: Final = 40
-"""Maximum number of steps in the search for the posture nearest to a typed pose."""
+SEARCH_EFFORT: Final = 60
+"""Maximum effort of the search for the posture nearest to a typed pose, in looks."""
+
+SETTLED: Final = 1e-9
+"""[rad] Turn of axis 1 below which that search has settled."""
 
 SETTLINGS: Final = 4
 """Maximum number of searches in which axis 1 and the pose of fewer than six axes settle."""
@@ -154,40 +157,45 @@ class DrivenTool:
         An arm without a closed form searches from the goal, and from other postures if that does
         not lead there.
         """
-        chain, priority, goal = self.chain, state.priority, state.goal
-        closed = self._branches.on_branch(T, str(branch), goal)
-        if closed is None:
-            closed = nearest_posture(kinematics_of(chain), T, q_hint=goal).q
-        starts = [chain.clamp(closed)]
-        if branch == state.branch:
-            starts.append(chain.clamp(goal))
         found = []
-        for start in starts:
-            pose = self._seen(T, start)
+        for start in self._starts(state, T, branch):
             q = start
-            for _ in range(SETTLINGS if chain.n < 6 else 1):
-                end = self._tracker.descent.run(
-                    self._tracker.descent.goal(pose), tuple(q.tolist()), priority, SEARCH_STEPS
-                )
-                before, q = q, np.array(end.q)
-                if abs(q[0] - before[0]) < 1e-9:
+            for _ in range(SETTLINGS if self.chain.n < 6 else 1):
+                before, q = q, self._descended(q, self._seen(T, q), state.priority)
+                if abs(q[0] - before[0]) < SETTLED:
                     break
-                pose = self._seen(T, q)
-            found.append(projected(chain, q, T, str(self.branch_of(q)), priority))
-            if found[-1].branch == branch and _is_exact(found[-1], priority):
-                break
-        return min(found, key=lambda each: (each.branch != branch, *_misses(each, priority)))
+            branch_there = str(self.branch_of(q))
+            found.append(projected(self.chain, q, T, branch_there, state.priority))
+        return _best(found, branch, state.priority)
+
+    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
+        """Return the posture on ``branch`` nearest to ``target``."""
+        pose, priority, found = _pose(target), state.priority, []
+        T = np.array(pose.T)
+        T[:3, :3] = self._pan(state.goal) @ T[:3, :3]
+        for start in self._starts(state, T, branch):
+            q = self._descended(start, pose, priority)
+            found.append(self._projected(q, pose, str(self.branch_of(q)), priority))
+        return _best(found, branch, priority)
+
+    def _starts(self, state: State, T: FloatArray, branch: AnyBranch) -> list[FloatArray]:
+        """Return postures (n,) [rad] from which the one nearest to `T` (4, 4) is searched."""
+        closed = self._branches.on_branch(T, str(branch), state.goal)
+        if closed is None:
+            closed = nearest_posture(kinematics_of(self.chain), T, q_hint=state.goal).q
+        starts = [self.chain.clamp(closed)]
+        if branch == state.branch:
+            starts.append(self.chain.clamp(state.goal))
+        return starts
+
+    def _descended(self, q: FloatArray, pose: ToolPose, priority: Priority) -> FloatArray:
+        descent = self._tracker.descent
+        end = descent.run(descent.goal(pose), tuple(q.tolist()), priority, SEARCH_EFFORT)
+        return np.array(end.q)
 
     def _seen(self, T: FloatArray, q: FloatArray) -> ToolPose:
         """Return the pose `T` (4, 4) as a target with axis 1 as at `q` (n,) [rad]."""
         return ToolPose(frozen(T[:3, 3]), frozen(self._pan(q).T @ T[:3, :3]))
-
-    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
-        """Return the posture on ``branch`` nearest to ``target``."""
-        pose, pan = _pose(target), self._pan(state.goal)
-        T = np.array(pose.T)
-        T[:3, :3] = pan @ T[:3, :3]
-        return self.project(state, T, branch)
 
     def losses(
         self,
@@ -254,5 +262,6 @@ def _misses(found: Projection, priority: Priority) -> tuple[float, ...]:
     return (rotation, position) if priority is Priority.ORIENTATION else (position, rotation)
 
 
-def _is_exact(found: Projection, priority: Priority) -> bool:
-    return max(_misses(found, priority)) == 0.0
+def _best(found: Sequence[Projection], branch: AnyBranch, priority: Priority) -> Projection:
+    """Return the nearest of ``found``, on ``branch`` if one is."""
+    return min(found, key=lambda each: (each.branch != branch, *_misses(each, priority)))

@@ -17,6 +17,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.places import MAX_JOINTS
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.scope import Scope
 from katana450.extensions.programs.script_context import ScriptContext
@@ -189,7 +190,7 @@ class JointAngle:
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read {axis, at_least, at_most}. Raises ScriptError."""
         fields = Fields(value, "a joint")
-        axis = fields.need("axis", read.whole(1, 5), 1)
+        axis = fields.need("axis", read.whole(1, MAX_JOINTS), 1)
         found = cls(axis - 1, ValueBounds.read(fields, read.degrees(-720.0, 720.0)))
         fields.done()
         return found

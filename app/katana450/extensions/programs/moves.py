@@ -54,19 +54,19 @@ class Move:
         place = self.place
         if self.by is not None:
             by = builder.direction(self.by, in_base=place.in_base)
-            place = replace(place, position=builder.at.position + by, in_base=False)
+            place = replace(place, position=builder.tool_point + by, in_base=False)
         builder.move_to(builder.joints_at(place), "move")
 
 
 @dataclass(frozen=True)
 class Joints:
-    """Move to the joint angles ``q`` (5,) [rad] on a free path round obstacles."""
+    """Move to the joint angles ``q`` (n,) [rad] on a free path round obstacles."""
 
     q: FloatArray
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read five joint angles. Raises ScriptError."""
+        """Read the joint angles. Raises ScriptError."""
         return cls(places.joints(value))
 
     def build(self, builder: PlanBuilder) -> None:
@@ -85,7 +85,7 @@ class Nudge:
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read {axis, by}. Raises ScriptError."""
         fields = Fields(value, "a nudge")
-        axis = fields.need("axis", read.whole(1, 5), 1)
+        axis = fields.need("axis", read.whole(1, places.MAX_JOINTS), 1)
         found = cls(axis - 1, fields.need("by", read.degrees(-720.0, 720.0), 0.0))
         fields.done()
         return found

@@ -17,6 +17,9 @@ from katana450.maths.kinematics.branch import BRANCHES, Branch
 ROOMIEST = "roomiest"
 """The word for the pitch that keeps the joints farthest from their limits along an arc."""
 
+LEAST_JOINTS, MAX_JOINTS = 3, 32
+"""Numbers of joints of an arm."""
+
 
 def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
     """Read the name of a pose, {joints: [...]}, or {x, y, z, pitch, roll, branch}.
@@ -72,8 +75,8 @@ def pose(value: YamlValue, setting: ScriptContext) -> StepTarget:
 
 
 def joints(value: YamlValue) -> FloatArray:
-    """Read five angles (5,) in degrees; returns [rad]. Raises ScriptError."""
-    return np.array(read.listed(read.degrees(-720.0, 720.0), 5, 5)(value))
+    """Read the angles (n,) of all joints in degrees; returns [rad]. Raises ScriptError."""
+    return np.array(read.listed(read.degrees(-720.0, 720.0), LEAST_JOINTS, MAX_JOINTS)(value))
 
 
 def pitch(value: YamlValue) -> float | str | None:

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands import Command
+from katana450.arm.control.commands import Command, SetJoints
 from katana450.arm.control.modes import IDLE
 from katana450.arm.control.plans import path_to, plan_along
 from katana450.arm.control.scene_objects import SceneObject, named
@@ -17,6 +17,12 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.other_arms import (
+    OF_FIVE_AXES,
+    has_five_axes,
+    joints_at_point,
+    need_five_axes,
+)
 from katana450.extensions.programs.out_of_reach import unreached
 from katana450.extensions.programs.reaching import branches_near, reaching
 from katana450.extensions.programs.script_frame import ScriptFrame
@@ -25,6 +31,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
@@ -208,8 +215,14 @@ class PlanBuilder:
 
     @property
     def at(self) -> ToolTarget:
-        """The present tool pose."""
+        """The present tool pose. Raises InputError for an arm outside the five-axis family."""
+        need_five_axes(self.plan_context.arm)
         return ToolTarget.at(self.chain, self.q)
+
+    @property
+    def tool_point(self) -> FloatArray:
+        """The present tool point (3,) [m] in {S}."""
+        return forward(self.chain, self.q)[:3, 3]
 
     def point(self, p: FloatArray, *, in_base: bool) -> FloatArray:
         """Return the point ``p`` (3,) [m] in {S}; ``in_base``: it is given in the base frame."""
@@ -236,6 +249,7 @@ class PlanBuilder:
 
     def lead(self, curves: Sequence[Curve], name: str) -> None:
         """Append the tool's motion along ``curves``, from its present pose, on the same branch."""
+        need_five_axes(self.plan_context.arm)
         paths: list[Path] = []
         made: dict[int, Path] = {}
         q = self.q
@@ -320,7 +334,7 @@ class PlanBuilder:
 
     def standing(self, q: FloatArray) -> State:
         """Return the state of the arm at rest at ``q`` (5,) [rad]."""
-        q, branch = frozen(q), branch_of(self.plan_context.arm.chain, q)
+        q, branch = frozen(q), self.plan_context.arm.kinematics.branch_of(q)
         return self._with_still_water(
             replace(self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE)
         )
@@ -355,7 +369,13 @@ class PlanBuilder:
     def joints_at(self, place: StepTarget) -> FloatArray:
         """Return the joints (5,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
+            self.plan_context.session.check(SetJoints(place.joints))
             return self.plan_context.arm.chain.check_q(place.joints)
+        if not has_five_axes(self.plan_context.arm):
+            if place.position is None or (place.pitch, place.roll, place.branch) != (None,) * 3:
+                raise InputError(OF_FIVE_AXES)
+            p = self.point(place.position, in_base=place.in_base)
+            return joints_at_point(self.plan_context.arm, self.state, p)
         return self.joints_of(self.target_at(place), place.branch)
 
     def target_at(self, place: StepTarget, now: ToolTarget | None = None) -> ToolTarget:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from katana450.extensions.programs.fields import MAX_ANGLE, MAX_COORDINATE, XYZ
+from katana450.extensions.programs.places import MAX_JOINTS
 from katana450.maths.kinematics.branch import BRANCHES
 
 Schema = dict[str, Any]
@@ -93,7 +94,7 @@ CONDITION_FIELDS: dict[str, Schema] = {
     "joint": mapping(
         "Angle of a joint, deg",
         "axis",
-        {"axis": number_or_text(1, 5, "Number of the joint, 1 to 5"), **BOUNDS_OF},
+        {"axis": number_or_text(1, MAX_JOINTS, "Number of the joint, from 1"), **BOUNDS_OF},
     ),
     "gripper": mapping(
         "Angle of the fingers, deg, or their place, mm, if they slide", "", BOUNDS_OF

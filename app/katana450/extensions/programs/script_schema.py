@@ -10,6 +10,7 @@ from katana450.extensions.programs.grasp import ABOVE, FRONT
 from katana450.extensions.programs.grip_until import MAX_FORCE, MIN_FORCE
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.moves import MAX_VIAS
+from katana450.extensions.programs.places import LEAST_JOINTS, MAX_JOINTS
 from katana450.extensions.programs.scene_schema import SCENE
 from katana450.extensions.programs.schema_parts import (
     ARC_PITCH,
@@ -76,7 +77,7 @@ DEFINITIONS: dict[str, Schema] = {
         list_of(LENGTH, 3, 3),
         mapping("x, y, z", "", POINT_FIELDS),
     ),
-    "joints": any_of("Angles of the five joints, deg", list_of(TURN, 5, 5), TEXT),
+    "joints": any_of("Angles of all joints, deg", list_of(TURN, LEAST_JOINTS, MAX_JOINTS), TEXT),
     "place": any_of(
         "A place: the name of a pose, the angles of the joints, or a point with its orientation",
         TEXT,
@@ -111,7 +112,7 @@ STEP_VALUES: dict[str, Schema] = {
     "nudge": mapping(
         "Turn one joint by an angle",
         "axis by",
-        {"axis": number_or_text(1, 5, "Number of the joint, 1 to 5"), "by": TURN},
+        {"axis": number_or_text(1, MAX_JOINTS, "Number of the joint, from 1"), "by": TURN},
     ),
     "via": mapping(
         "Move the joints through places, with rounded corners",
