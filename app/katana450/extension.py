@@ -31,15 +31,14 @@ if TYPE_CHECKING:
     from katana450.arm.control.grip_model import GripModel
     from katana450.arm.control.scene_objects import Environment, Hand
     from katana450.arm.control.session import Session
-    from katana450.arm.control.tool_kinematics import ArmKinematics
     from katana450.arm.drivers.driver import Driver
+    from katana450.arm.robot.arm_reader import FindArm
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
     from katana450.arm.runtime.arm_listener import ArmAddress, Greeting
     from katana450.arm.runtime.tick import TickRecord
     from katana450.maths.collision.world import CollisionWorld
     from katana450.maths.geometry.arrays import FloatArray
-    from katana450.maths.kinematics.chain import Chain
     from katana450.server.service.nodes import Nodes
     from katana450.server.service.recorder import Recorder
     from katana450.server.service.runner import Runner
@@ -214,7 +213,7 @@ class Extension:
             it leaves out. Of the first extension that has it.
         grip_model: Returns the model of the forces in the hand of a robot with its collision world;
             None if the pads of that hand are not known. Called for each session of an arm.
-        kinematics: Returns the kinematics of the chain of an arm outside the five-axis family, or
+        find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or
             None. Called when a robot is read for ``serve``.
         gizmo: Returns the class of the gizmo of a tool with so many freedoms, or None. Called in
             the process of the view.
@@ -226,7 +225,7 @@ class Extension:
     grip_model: Callable[[CollisionWorld, Hand], GripModel | None] | None = None
     prepare: Callable[[Namespace], None] | None = None
     world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
-    kinematics: Callable[[Chain], ArmKinematics | None] | None = None
+    find_arm: FindArm | None = None
     gizmo: Callable[[int], type[Gizmo] | None] | None = None
 
 

@@ -9,18 +9,17 @@ from typing import NamedTuple
 from katana450.arm.control.messages import UNCHECKED
 from katana450.arm.control.scene_objects import Hand, SceneObject
 from katana450.arm.control.session import Session
-from katana450.arm.control.tool_kinematics import ArmKinematics
-from katana450.arm.robot.arm_reader import FindKinematics
+from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.urdf import Urdf
 from katana450.arm.robot.water import water_environment
 from katana450.errors import RobotDescriptionError
 from katana450.extension import extensions
 from katana450.maths.collision.world import CollisionWorld
-from katana450.maths.kinematics.chain import Chain
 from katana450.settings import Settings
 
 
@@ -33,7 +32,7 @@ class DescribedRobot(NamedTuple):
 
 
 def describe_robot(
-    settings: Settings, urdf: Path, tool: str | None, find: FindKinematics | None = None
+    settings: Settings, urdf: Path, tool: str | None, find: FindArm | None = None
 ) -> DescribedRobot:
     """Return the robot with an arm in the file ``urdf``.
 
@@ -43,9 +42,9 @@ def describe_robot(
     return arm_session(settings, load(urdf, tool, find))
 
 
-def find_kinematics(chain: Chain) -> ArmKinematics | None:
-    """Return the kinematics that an extension has for ``chain``; None if none has."""
-    found = (each.kinematics(chain) for each in extensions() if each.kinematics is not None)
+def find_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
+    """Return the arm outside the five-axis family that an extension finds; None if none does."""
+    found = (each.find_arm(urdf, path, tool) for each in extensions() if each.find_arm is not None)
     return next(found, None)
 
 
@@ -55,7 +54,7 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
     Raises RobotDescriptionError for a robot that is neither. A robot without an arm also raises it
     if a ``tool`` or an arm without gripper is requested.
     """
-    robot = load(urdf, tool, find_kinematics)
+    robot = load(urdf, tool, find_arm)
     try:
         return arm_session(settings, robot)
     except RobotDescriptionError as error:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from katana450.arm.control.state import Finding, State
 from katana450.arm.control.tool_commands import StepTool, TurnCommand
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
-from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
@@ -99,17 +98,3 @@ class ToolKinematics(Kinematics, Protocol):
         ``posture`` (5,) [rad] is that of the canonical five-axis arm. ``T_base_shoulder`` (4, 4) is
         {S} in the base frame.
         """
-
-
-class ArmKinematics(NamedTuple):
-    """The kinematics that an extension finds for the chain of an arm outside the five-axis family.
-
-    Attributes:
-        chain: the chain with exact axes.
-        to_tool: returns the kinematics of the same chain with another tool.
-        notes: sentences for a person.
-    """
-
-    chain: Chain
-    to_tool: Callable[[Chain], ToolKinematics]
-    notes: tuple[str, ...]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from katana450.arm.control.five_axis_tool import FiveAxisTool
-from katana450.arm.control.tool_kinematics import ArmKinematics, ToolKinematics
+from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.arm.robot.conduit import Hinge, read_stretches
 from katana450.arm.robot.gripper import Fingers, fingers_of
 from katana450.arm.robot.link import SLOW_TURN, Link
@@ -31,8 +31,26 @@ CONDUITS = "conduits.json"
 """File beside the URDF that describes where the conduit is held."""
 
 
-FindKinematics = Callable[[Chain], ArmKinematics | None]
-"""Returns the kinematics of a chain outside the five-axis family; None if it has none."""
+class OtherArm(NamedTuple):
+    """An arm outside the five-axis family, as an extension finds it.
+
+    Attributes:
+        structure: its joints and tools.
+        T_base_shoulder: (4, 4) frame {S} in the root link [m].
+        chain: the chain with exact axes.
+        to_tool: returns the kinematics of the same chain with another tool.
+        notes: sentences for a person.
+    """
+
+    structure: Structure
+    T_base_shoulder: FloatArray
+    chain: Chain
+    to_tool: Callable[[Chain], ToolKinematics]
+    notes: tuple[str, ...]
+
+
+FindArm = Callable[[Urdf, Path, str | None], OtherArm | None]
+"""Returns the arm with a tool, or any, in a URDF at a path; None if there is none."""
 
 
 def arm_in(
@@ -40,7 +58,7 @@ def arm_in(
     links: Sequence[Link],
     path: Path,
     tool: str | None,
-    find: FindKinematics | None = None,
+    find: FindArm | None = None,
 ) -> MountedArm:
     """Return the arm that ``urdf`` describes.
 
@@ -69,10 +87,10 @@ def arm_in(
             for link in structure.tools
         }
     except RobotDescriptionError:
-        other = None if find is None else _other_arm(urdf, frames, path, tool, find)
+        other = None if find is None else find(urdf, path, tool)
         if other is None:
             raise
-        structure, T_base_shoulder, (chain, to_tool, [*notes]) = other
+        structure, T_base_shoulder, chain, to_tool, [*notes] = other
         T_shoulder_base = se3.inverse(T_base_shoulder)
         tools = {link: frozen(T_shoulder_base @ frames[link]) for link in structure.tools}
     fingers = fingers_of(structure.hand, structure.others, frames)
@@ -94,26 +112,6 @@ def arm_in(
         ),
         notes=tuple(notes),
     )
-
-
-def _other_arm(
-    urdf: Urdf,
-    frames: Mapping[str, FloatArray],
-    path: Path,
-    tool: str | None,
-    find: FindKinematics,
-) -> tuple[Structure, FloatArray, ArmKinematics] | None:
-    """Return structure, {S} (4, 4) in the root, and kinematics of an arm outside the family.
-
-    None if there is no such arm, or if joints beside it could then no longer be driven.
-    """
-    with suppress(RobotDescriptionError):
-        structure = structure_of(urdf, path, tool, count=None)
-        described, T_base_shoulder = described_chain(frames, structure)
-        if tool is not None or all(joint.mimic is not None for joint in structure.others):
-            found = find(described)
-            return None if found is None else (structure, T_base_shoulder, found)
-    return None
 
 
 def described_chain(

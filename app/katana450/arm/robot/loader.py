@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.robot.arm_reader import FindKinematics, arm_in
+from katana450.arm.robot.arm_reader import FindArm, arm_in
 from katana450.arm.robot.description import checked, explained, refuse_loops
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
@@ -23,9 +23,7 @@ MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
 """Supported types of movable joints, and whether each slides."""
 
 
-def load(
-    path: Path = URDF_PATH, tool: str | None = None, find: FindKinematics | None = None
-) -> Robot:
+def load(path: Path = URDF_PATH, tool: str | None = None, find: FindArm | None = None) -> Robot:
     """Read the robot in a URDF file.
 
     A link without shapes that has child links is drawn as thin rods. Meshes are read on first use.

@@ -7,27 +7,20 @@ from typing import TYPE_CHECKING
 from katana450.extension import Extension
 
 if TYPE_CHECKING:
-    from katana450.arm.control.tool_kinematics import ArmKinematics
-    from katana450.maths.kinematics.chain import Chain
+    from pathlib import Path
+
+    from katana450.arm.robot.arm_reader import OtherArm
+    from katana450.arm.robot.urdf import Urdf
     from katana450.server.view.gizmo import Gizmo
 
 ALL_FREEDOMS = 6
 """Number of freedoms of a tool that can have every orientation."""
 
-LEAST_AXES = 3
-"""Minimum number of axes of an arm that is driven by its tool: fewer reach no volume."""
 
+def _find_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
+    from katana450.extensions.general_arms.found_arm import found_arm
 
-def _kinematics(chain: Chain) -> ArmKinematics | None:
-    from katana450.arm.control.tool_kinematics import ArmKinematics
-    from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
-    from katana450.extensions.general_arms.driven_tool import DrivenTool
-
-    if chain.n < LEAST_AXES:
-        return None
-    exact, notes = exact_arm(chain)
-    method = f"The kinematics are {kinematics_of(exact).method}."
-    return ArmKinematics(exact, DrivenTool, (*notes, method))
+    return found_arm(urdf, path, tool)
 
 
 def _gizmo(freedoms: int) -> type[Gizmo] | None:
@@ -36,4 +29,4 @@ def _gizmo(freedoms: int) -> type[Gizmo] | None:
     return PoseGizmo if freedoms == ALL_FREEDOMS else None
 
 
-EXTENSION = Extension("general_arms", kinematics=_kinematics, gizmo=_gizmo)
+EXTENSION = Extension("general_arms", find_arm=_find_arm, gizmo=_gizmo)
