@@ -40,6 +40,19 @@ class _Split(NamedTuple):
     other: npt.NDArray[np.int64]
 
 
+class _Mesh:
+    """Vertices (n, 3) [m] without duplicates, and triangles (m, 3) of their indices."""
+
+    def __init__(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> None:
+        self._vertices = vertices
+        self._faces = faces
+        self.middles = vertices[faces].mean(axis=1)
+
+    def points(self, numbers: npt.NDArray[np.int64]) -> FloatArray:
+        """Return the vertices (k, 3) of some triangles."""
+        return self._vertices[np.unique(self._faces[numbers])]
+
+
 def pieces(shape: Visual) -> Sequence[FloatArray]:
     """Return the corners (k, 3) [m] of the convex bodies that stand for ``shape``.
 
@@ -62,27 +75,28 @@ def divided_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> list[Flo
     """
     if not len(faces):
         return [convex_body(vertices).corners]
-    triangles = vertices[faces]
-    whole = np.arange(len(triangles))
-    least = max(MIN_GAIN, MIN_GAIN_FRACTION * _volume(triangles[whole].reshape(-1, 3)))
-    found = [_best_split(triangles, whole)]
-    numbers = [whole]
-    while len(numbers) < MAX_PIECES:
+    # Files in STL repeat each vertex in every triangle.
+    merged, numbers = np.unique(vertices, axis=0, return_inverse=True)
+    mesh = _Mesh(merged, numbers.reshape(-1)[faces])
+    whole = np.arange(len(faces))
+    least = max(MIN_GAIN, MIN_GAIN_FRACTION * _volume(mesh.points(whole)))
+    found = [_best_split(mesh, whole)]
+    parts = [whole]
+    while len(parts) < MAX_PIECES:
         best = int(np.argmax([each.gain for each in found]))
         if found[best].gain < least:
             break
         halves = found[best].one, found[best].other
-        numbers[best : best + 1] = halves
-        found[best : best + 1] = [_best_split(triangles, half) for half in halves]
-    return [convex_body(triangles[each].reshape(-1, 3)).corners for each in numbers]
+        parts[best : best + 1] = halves
+        found[best : best + 1] = [_best_split(mesh, half) for half in halves]
+    return [convex_body(mesh.points(part)).corners for part in parts]
 
 
-def _best_split(triangles: FloatArray, numbers: npt.NDArray[np.int64]) -> _Split:
+def _best_split(mesh: _Mesh, numbers: npt.NDArray[np.int64]) -> _Split:
     """Return the division of the triangles ``numbers`` that saves most volume."""
     sample = numbers[:: max(1, len(numbers) // SAMPLED)]
-    middles = triangles[numbers].mean(axis=1)
-    sampled = triangles[sample].mean(axis=1)
-    volume = _volume(triangles[sample].reshape(-1, 3))
+    middles, sampled = mesh.middles[numbers], mesh.middles[sample]
+    volume = _volume(mesh.points(sample))
     low, high = middles.min(axis=0), middles.max(axis=0)
     best, place = 0.0, None
     for axis in range(3):
@@ -90,8 +104,7 @@ def _best_split(triangles: FloatArray, numbers: npt.NDArray[np.int64]) -> _Split
             side = sampled[:, axis] < at
             if side.all() or not side.any():
                 continue
-            parts = (triangles[sample[each]].reshape(-1, 3) for each in (side, ~side))
-            gain = volume - sum(map(_volume, parts))
+            gain = volume - sum(_volume(mesh.points(sample[each])) for each in (side, ~side))
             if gain > best:
                 best, place = gain, (axis, at)
     if place is None:
@@ -100,12 +113,12 @@ def _best_split(triangles: FloatArray, numbers: npt.NDArray[np.int64]) -> _Split
     return _Split(best, numbers[side], numbers[~side])
 
 
-def _volume(points: FloatArray) -> float:
-    """Return the volume [m^3] of the hull of ``points`` (n, 3), 0 if they lie in a plane."""
-    corners = np.unique(points, axis=0)
-    spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
+def _volume(corners: FloatArray) -> float:
+    """Return the volume [m^3] of the hull of ``corners`` (n, 3), 0 if they lie in a plane."""
+    centred = corners - corners.mean(axis=0)
+    spread = np.sqrt(max(float(np.linalg.eigvalsh(centred.T @ centred)[0]), 0.0))
     # The engine ends the process when it is given points without a volume.
-    if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
+    if len(corners) < 4 or spread < FLAT * np.sqrt(len(corners)):
         return 0.0
-    a, b, c = (engine().triangles(corners) - corners.mean(axis=0)).transpose(1, 0, 2)
+    a, b, c = engine().triangles(centred).transpose(1, 0, 2)
     return float(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))).sum()) / 6.0
