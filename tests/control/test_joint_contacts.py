@@ -193,6 +193,7 @@ def test_fingers_that_stand_closer_than_5_mm_keep_half_of_their_distance(make: M
     near = world.gap(state.x_setpoint, "finger1_link3", "finger2_link3")
     assert min(free, near) >= 1.5e-3 - DISTANCE_ROUNDING
     assert state.blocked
+    assert sentence(state).endswith("mm apart: they must not come nearer.")
     # Each finger alone bends past its neighbours.
     bent = after(session, begun(session), 3.0, made.move(finger2_bend1=1.4))
     assert bent.setpoint[made.joints.names.index("finger2_bend1")] == 1.4

@@ -68,10 +68,13 @@ def part(name: str) -> str:
 
 def _contact(finding: Finding) -> str:
     one, other = finding.parts or ("a link", "another")
-    return (
-        f"{part(one)} and {part(other)} are {_short(1e3 * finding.amount)} mm apart: "
+    # Parts that stand close at rest keep less, and parts in a contact may only part.
+    why = (
         f"the arm stops at {_short(1e3 * STOP)} mm"
+        if finding.amount >= STOP
+        else "they must not come nearer"
     )
+    return f"{part(one)} and {part(other)} are {_short(1e3 * finding.amount)} mm apart: {why}"
 
 
 def _within(finding: Finding) -> str:
