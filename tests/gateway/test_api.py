@@ -15,7 +15,7 @@ from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.extensions.api_description.messages import kinds
-from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask
@@ -31,7 +31,7 @@ def test_every_query_is_answered(program: Client) -> None:
         requests.Home(), requests.Jog(rates=(0.0, 0.0, 0.05, 0.0, 0.0)),
         requests.Servo(q=READY.tolist()), requests.Fill(ml=150.0), requests.Query(at="loop"),
         requests.Branch(shoulder="front", elbow="up"), requests.Watch(hz=0.0),
-        *(requests.SetPriority(priority=each) for each in reversed(Priority)),
+        *(requests.SetPriority(priority=each) for each in reversed(FIVE_AXIS_PRIORITIES)),
     ]  # fmt: skip
     for request in asked:
         answer = program.ask(request)
