@@ -88,6 +88,9 @@ def test_step_has_six_numbers_and_undo_takes_it_back(arm: Client) -> None:
     np.testing.assert_allclose(moved[:3, :3], so3.rotation_z(0.1) @ T[:3, :3], atol=1e-6)
     arm.ask(requests.Undo(wait=30))
     np.testing.assert_allclose(pose(arm), T, atol=1e-6)
+    arm.ask(requests.Orient(R=rows(so3.rotation_z(0.2) @ T[:3, :3]), wait=30))
+    arm.ask(requests.Undo(wait=30))
+    np.testing.assert_allclose(pose(arm), T, atol=1e-6)
 
 
 @pytest.mark.parametrize(

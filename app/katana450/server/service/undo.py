@@ -24,6 +24,7 @@ SAME_GESTURE = 1.0
 GOALS: dict[type[cmd.BaseCommand], str] = {
     cmd.MoveTool: "drag",
     cmd.TurnTool: "drag",
+    cmd.OrientTool: "drag",
     cmd.EndDrag: "drag",
     cmd.SetPose: "pose",
     cmd.SetJoint: "joint",
