@@ -105,7 +105,7 @@ def test_simulation_takes_conditions_for_true(stage: Stage) -> None:
         ("{held: cup, timeout: 0}", "not between"),
         ("{volume: {of: jug, at_least: 3}}", "one of cup, basin"),
         ("{volume: {of: cup}}", "A volume needs `at_least`, `at_most` or both"),
-        ("{joint: {axis: 6, at_most: 3}}", "not between 1 and 5"),
+        ("{joint: {axis: 33, at_most: 3}}", "not between 1 and 32"),
         ("{placed: {object: cup}}", "needs 'at'"),
         ("held", "mapping of names to values"),
     ],
@@ -121,6 +121,7 @@ def test_mistake_is_refused_with_its_place(value: str, said: str) -> None:
     [
         ("{held: jug}", "no object 'jug'"),
         ("{joint: {axis: 1, at_least: 400}}", "Axis 1 never gets there: its range is"),
+        ("{joint: {axis: 6, at_most: 3}}", "There is no axis 6: the robot has 5 axes"),
         ("{volume: {of: cup, at_least: 3}}", "There is no water"),
     ],
 )

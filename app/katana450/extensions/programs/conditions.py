@@ -201,8 +201,10 @@ class JointAngle:
         return f"axis {self.axis + 1}"
 
     def checked(self, builder: PlanBuilder) -> Self:
-        """Return itself. Raises InputError if the limits of the joint exclude it."""
+        """Return itself. Raises InputError if the arm or the limits of the joint exclude it."""
         chain = builder.plan_context.arm.chain
+        if self.axis >= chain.n:
+            raise InputError(f"There is no axis {self.axis + 1}: the robot has {chain.n} axes.")
         lower, upper = float(chain.lower[self.axis]), float(chain.upper[self.axis])
         if self.bounds.at_least > upper or self.bounds.at_most < lower:
             raise InputError(
