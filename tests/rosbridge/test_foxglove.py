@@ -1,4 +1,4 @@
-"""A client of Foxglove's protocol receives frames and joints, and stops the arm."""
+"""A client of Foxglove's protocol receives frames and joints, and can only stop the arm."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import struct
 from typing import Any
 
 import pytest
-from websockets.asyncio.client import connect
-from websockets.typing import Subprotocol
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.typing import Origin, Subprotocol
 
 from tests.browser.server import APP, AppServer
 from tests.exchange.tools import FOXGLOVE, needs_package
@@ -21,10 +21,27 @@ MESSAGE_DATA, CALL_SERVICE, SERVICE_RESPONSE = 1, 2, 3
 """Codes of binary messages: of the server, of the client, of the server."""
 
 
+Offers = dict[str, dict[str, Any]]
+"""Descriptions by their names."""
+
+
 def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+async def offers(client: ClientConnection) -> tuple[Offers, Offers, list[str]]:
+    """Return the topics and services by their names, and the capabilities of the server."""
+    topics: Offers = {}
+    services: Offers = {}
+    capabilities: list[str] = []
+    while len(topics) < 3 or not services:
+        told = json.loads(await client.recv())
+        capabilities += told.get("capabilities", [])
+        topics |= {each["topic"]: each for each in told.get("channels", [])}
+        services |= {each["name"]: each for each in told.get("services", [])}
+    return topics, services, capabilities
 
 
 @pytest.mark.long
@@ -37,20 +54,18 @@ def test_foxglove_sees_and_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> Non
     async def act() -> None:
         with AppServer((*APP, "--foxglove", str(port))) as server:
             protocols = [Subprotocol("foxglove.sdk.v1")]
-            async with (
-                asyncio.timeout(30.0),
-                connect(f"ws://127.0.0.1:{port}", subprotocols=protocols) as client,
-            ):
-                topics: dict[str, dict[str, Any]] = {}
-                stop = None
-                while len(topics) < 3 or stop is None:
-                    text = await client.recv()
-                    told = json.loads(text)
-                    for channel in told.get("channels", []):
-                        topics[channel["topic"]] = channel
-                    for service in told.get("services", []):
-                        stop = service
-                assert stop["name"] == "/stop"
+            # As a page of any site connects: the library does not check its origin.
+            page = connect(
+                f"ws://127.0.0.1:{port}",
+                subprotocols=protocols,
+                origin=Origin("https://elsewhere.example"),
+            )
+            async with asyncio.timeout(30.0), page as client:
+                topics, services, capabilities = await offers(client)
+                # Nothing but the STOP is accepted: no topics and parameters of clients.
+                assert set(services) == {"/stop"}
+                assert capabilities == ["services"]
+                stop = services["/stop"]
                 assert topics["/tf"]["schemaName"] == "foxglove.FrameTransforms"
                 assert topics["/joint_states"]["schemaName"] == "foxglove.JointStates"
                 wanted = {k: topics[each]["id"] for k, each in enumerate(topics)}
