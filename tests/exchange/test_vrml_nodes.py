@@ -139,6 +139,26 @@ def absolute_poses(world: World) -> dict[str, Any]:
     return found
 
 
+def test_fields_that_can_be_set_say_so(nodes: VrmlNodes, state: State, robot: Robot) -> None:
+    """A field is settable if `set` takes its present value; that of a tool while it is in use."""
+    tools = robot.require_arm().tools
+    for node in nodes.world(state).nodes:
+        for field in node.fields:
+            used = replace(state, tool=node.node) if node.node in tools else state
+            try:
+                nodes.command(used, [setting(node.node, field.field, field.value)])
+            except InputError:
+                assert not field.settable, (node.node, field.field)
+            else:
+                assert field.settable, (node.node, field.field)
+    settable = {
+        node.node for node in nodes.world(state).nodes if node.kind == "Transform"
+        for field in node.fields if field.settable
+    }  # fmt: skip
+    joints = {*THERE, "finger_right_joint"}
+    assert settable == {*joints, *tools, "left_cube", "pan_link_look_2"}
+
+
 def test_tool_is_set_by_its_name(nodes: VrmlNodes, state: State, robot: Robot) -> None:
     """A position alone keeps the target of the rotation, as the handle does."""
     place, offset = [0.3, 0.1, 0.25], robot.require_arm().T_base_shoulder[:3, 3]

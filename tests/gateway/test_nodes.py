@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
+from katana450.extensions.importers.vrml_reader import read_world
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.exchange.joint_rotations import THERE, rotation
@@ -111,6 +114,46 @@ def test_appearance_and_objects_are_set_and_watched_by_name(server: AppServer) -
                 watcher.ask(requests.Set(node="pan_link_look", field="whichChoice", value=-1))
             assert not painted(watcher)
         lines.answer(do="set", node="cup", field="translation", value=CUP)
+        lines.answer(do="release_lease")
+
+
+def test_server_and_exported_file_have_the_same_names(server: AppServer, tmp_path: Path) -> None:
+    """The file is written by the command; what the server can set in it has the same kind."""
+    assert main(["export", "vrml", "--out", str(tmp_path)]) == 0
+    file = read_world((tmp_path / "katana450.wrl").read_text(encoding="utf-8")).named()
+    world = {
+        node["node"]: node for node in json.loads(ask(f"{server.url}/api/v1/world")[2])["nodes"]
+    }
+    kinds = ("Transform", "Switch", "Material")
+    in_file = {name: node.kind for name, node in file.items() if node.kind in kinds}
+    on_server = {name: node["kind"] for name, node in world.items() if node["kind"] in kinds}
+    assert {"cup", "basin", "tcp", "flange", "axis_1"} <= on_server.keys()
+    assert in_file == on_server
+    for name in ("cup", "basin", "tcp", "flange"):
+        fields = {each["field"]: each for each in world[name]["fields"]}
+        assert {"translation", "rotation"} == fields.keys()
+        assert all(each["settable"] for each in fields.values())
+
+
+@pytest.mark.parametrize("tool", ["flange", "tcp"])
+def test_each_frame_of_the_tool_is_read_and_set_by_name(server: AppServer, tool: str) -> None:
+    """The frame in use is set; another one is refused, with the name of the one in use."""
+    with speaking(server, "VR Sink") as lines:
+        arrived(lines, lines.answer(do="tool", name=tool)["ticket"])
+        (now,) = lines.answer(do="get", node=tool, field="translation")["values"]
+        place = [*now["value"][:2], now["value"][2] + 0.01]
+        done = lines.answer(do="set", node=tool, field="translation", value=place)
+        arrived(lines, done["ticket"])
+        (now,) = lines.answer(do="get", node=tool, field="translation")["values"]
+        np.testing.assert_allclose(now["value"], place, rtol=0, atol=1e-6)
+        other = "tcp" if tool == "flange" else "flange"
+        refused = lines.answer(do="set", node=other, field="translation", value=place)
+        assert (
+            f"{other} is not the tool frame of the arm and cannot be set. Set {tool}."
+            in (refused["why"])
+        )
+        arrived(lines, lines.answer(do="tool", name="tcp")["ticket"])
+        arrived(lines, lines.answer(do="home")["ticket"])
         lines.answer(do="release_lease")
 
 

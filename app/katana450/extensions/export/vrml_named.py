@@ -36,11 +36,19 @@ class FieldOrders:
 
 @dataclass(frozen=True, eq=False)
 class NamedField:
-    """A field: its type, the function that reads it, and one that sets it if that is possible."""
+    """A field of a node.
+
+    Attributes:
+        type: its type.
+        read: function that returns its value.
+        put: function that sets it; None if it can only be read.
+        why: reason why it can only be read, with what to do; empty if there is nothing to say.
+    """
 
     type: Type
     read: Callable[[State], FieldValue]
     put: Callable[[FieldOrders, FieldValue | None], None] | None = None
+    why: str = ""
 
 
 @dataclass(frozen=True, eq=False)

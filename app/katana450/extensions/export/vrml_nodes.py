@@ -97,7 +97,7 @@ class VrmlNodes(Nodes):
             name = f"{each.node}.{each.field}"
             field = self._field(state, each.node, each.field)
             if field.put is None:
-                raise InputError(f"{name} can be read but not set.")
+                raise InputError(field.why or f"{name} can be read but not set.")
             field.put(orders, None if each.value is None else _fitting(name, field, each.value))
         self._check_carried(orders)
         commands = (*self._motion(orders), *orders.others)
@@ -175,24 +175,26 @@ class VrmlNodes(Nodes):
 
         def put(orders: FieldOrders, value: FieldValue | None) -> None:
             given = _given(name, value)
-            if joint.leader != name:
-                raise InputError(f"{name} follows {joint.leader}. Set that joint.")
             amount = _along(name, axis, given) if joint.slides else _about(name, axis, given)
             if name in self._axes:
                 orders.axes[self._axes[name]] = amount
-            elif name == self._gripper:
-                orders.others.append(cmd.SetGripper(amount))
-            elif name in self._fingers:
-                raise InputError(f"{name} is driven together with {self._gripper}. Set that joint.")
             else:
-                raise InputError(f"{name} cannot move: it is not a joint of the arm.")
+                orders.others.append(cmd.SetGripper(amount))
 
+        why = ""
+        if joint.leader != name:
+            why = f"{name} follows {joint.leader}. Set that joint."
+        elif name not in self._axes and name != self._gripper:
+            why = f"{name} cannot move: it is not a joint of the arm."
+            if name in self._fingers:
+                why = f"{name} is driven together with {self._gripper}. Set that joint."
         moved = "translation" if joint.slides else "rotation"
         kind = Type.VECTOR if joint.slides else Type.ROTATION
-        return NamedNode("Transform", f"joint {name}", {moved: NamedField(kind, read, put)})
+        field = NamedField(kind, read, None if why else put, why)
+        return NamedNode("Transform", f"joint {name}", {moved: field})
 
     def _link(self, link: str) -> NamedNode:
-        """Return the node of a link with its pose in the root's frame; that of the tool is set."""
+        """Return the node of a link with its pose in the root's frame; a tool can be set."""
 
         def translation(state: State) -> FieldValue:
             return [*self._pose(state, link)[:3, 3].tolist()]
@@ -200,12 +202,12 @@ class VrmlNodes(Nodes):
         def rotation(state: State) -> FieldValue:
             return _axis_angle(self._pose(state, link)[:3, :3])
 
+        arm = self._robot.arm
+        other = f"{link} is not the tool frame of the arm and cannot be set. Set "
+
         def check_tool(orders: FieldOrders) -> None:
-            if self._robot.arm is None or link != orders.state.tool:
-                raise InputError(
-                    f"{link} is not the tool frame of the arm and cannot be set. Set "
-                    f"{orders.state.tool or 'a joint'}."
-                )
+            if link != orders.state.tool:
+                raise InputError(f"{other}{orders.state.tool}.")
 
         def move(orders: FieldOrders, value: FieldValue | None) -> None:
             check_tool(orders)
@@ -215,12 +217,14 @@ class VrmlNodes(Nodes):
             check_tool(orders)
             orders.R = _rotation(link, _given(link, value))
 
+        tool = arm is not None and link in arm.tools
+        why = other + ("a joint." if arm is None else f"{' or '.join(arm.tools)}.")
         return NamedNode(
             "Transform",
             f"link {link}",
             {
-                "translation": NamedField(Type.VECTOR, translation, move),
-                "rotation": NamedField(Type.ROTATION, rotation, turn),
+                "translation": NamedField(Type.VECTOR, translation, move if tool else None, why),
+                "rotation": NamedField(Type.ROTATION, rotation, turn if tool else None, why),
             },
         )
 
