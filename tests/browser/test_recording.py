@@ -91,11 +91,13 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
             t = float(page.evaluate(NOW))
             assert t == pytest.approx(fraction * SECONDS, abs=0.15)
             assert pan(page) == pytest.approx(TURN * t / SECONDS, abs=0.02)
-        # A seek while it plays does not pause it.
+        # A seek while it plays does not pause it, also backwards.
         page.get_by_role("button", name="Play").click()
+        page.wait_for_function(f"() => ({NOW})() > {0.55 * SECONDS}")
         box = page.locator(TRACK).bounding_box()
         assert box is not None
-        page.mouse.click(box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"])
+        page.mouse.click(box["x"] + 0.1 * box["width"], box["y"] + 0.5 * box["height"])
+        page.wait_for_function(f"() => ({NOW})() < {0.3 * SECONDS}")
         page.wait_for_function(f"() => ({NOW})() > {0.5 * SECONDS}")
         page.get_by_role("button", name="Pause").wait_for()
         assert not errors

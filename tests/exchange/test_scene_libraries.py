@@ -77,6 +77,29 @@ action.apply(world)
 numbers.tofile(open(sys.argv[2], "wb"))
 """
 
+PLACES = """\
+import json, sys
+from pivy import coin
+source = coin.SoInput()
+assert source.openFile(sys.argv[1])
+world = coin.SoDB.readAll(source)
+world.ref()
+found = {}
+for name in sys.argv[2:]:
+    node = coin.SoNode.getByName(name)
+    # The matrix of a path includes the Transforms above its last node.
+    mark = coin.SoInfo()
+    node.addChild(mark)
+    search = coin.SoSearchAction()
+    search.setSearchingAll(True)
+    search.setNode(mark)
+    search.apply(world)
+    action = coin.SoGetMatrixAction(coin.SbViewportRegion(100, 100))
+    action.apply(search.getPath())
+    found[name] = action.getMatrix().getValue()
+print(json.dumps(found))
+"""
+
 PYTHON = "/usr/bin/python3"
 """The Python of the system, which has the packages of the system."""
 
@@ -171,3 +194,23 @@ def test_coin_places_every_triangle(tmp_path: Path, katana: Robot, pose: tuple[f
     assert len(points) == len(expected)
     for some, others in ((points, expected), (expected, points)):
         assert cKDTree(others).query(some)[0].max() < 2e-5
+
+
+@pytest.mark.long
+@needs(PIVY)
+@pytest.mark.parametrize("pose", POSES)
+def test_coin_places_the_tool_and_every_link_by_name(
+    tmp_path: Path, katana: Robot, pose: tuple[float, ...]
+) -> None:
+    """Read absolute poses as Simulink's VR Source does by `tcp.translation_abs`."""
+    (tmp_path / "places.py").write_text(PLACES)
+    links = [link.name for link in katana.links]
+    assert {"tcp", "flange"} < set(links)
+    printed = run(PYTHON, tmp_path / "places.py", exported(tmp_path, pose), *links)
+    found = json.loads(printed.splitlines()[-1])
+    upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    for link, T in katana.frames(katana.values(pose)).items():
+        # Coin multiplies rows by matrices, in single precision.
+        theirs = np.array(found[link]).T
+        np.testing.assert_allclose(theirs[:3, 3], upright @ T[:3, 3], atol=2e-6, err_msg=link)
+        np.testing.assert_allclose(theirs[:3, :3], upright @ T[:3, :3], atol=5e-6, err_msg=link)
