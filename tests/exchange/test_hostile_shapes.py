@@ -28,6 +28,7 @@ from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 from tests.exchange.test_several_files import ARTICULATED
 from tests.exchange.test_vrml_prototypes import JOINT
+from tests.exchange.test_x3dv import SETS
 
 resource = pytest.importorskip("resource")
 
@@ -45,6 +46,7 @@ SEEDS = {
     "gmsh.wrl": (FOREIGN / "gmsh.wrl").read_bytes(),
     "joint.wrl": f"{HEADER}\n{JOINT} Joint {{ children Joint {{ }} }}".encode(),
     "robot.zip": packed("robot.wrl", {name: each.encode() for name, each in ARTICULATED.items()}),
+    "sets.x3dv": SETS.encode(),
     "draco.glb": draco_glb(),
     "meshopt.glb": meshopt_glb(),
 }

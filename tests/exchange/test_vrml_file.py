@@ -295,6 +295,17 @@ def test_invalid_vrml_is_refused(data: bytes, said: str) -> None:
         read_shape(data, Format.WRL, "a.wrl")
 
 
+def test_other_nodes_in_the_place_of_points_and_colours_are_left_out() -> None:
+    square = SQUARE % "coordIndex [ 0 1 2 ] color IndexedFaceSet { color Color { color 1 0 0 } }"
+    shape = shown(square)
+    assert shape.colours is None
+    assert "colours that do not match the faces" in shape.text
+    with pytest.raises(InputError, match="faces whose vertices are missing"):
+        shown(
+            "IndexedFaceSet { coord TextureCoordinate { point [ 0 0, 1 1 ] } coordIndex [ 0 1 2 ] }"
+        )
+
+
 def test_contradictions_in_a_world_are_left_out() -> None:
     shape = world(f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 2 ] color Color { }'} }}")
     assert shape.colours is None

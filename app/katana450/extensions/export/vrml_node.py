@@ -28,6 +28,7 @@ class Type(Enum):
     VECTOR_LIST = "MFVec3f"
     COLOR = "SFColor"
     COLOR_LIST = "MFColor"
+    RGBA_LIST = "MFColorRGBA"
     ROTATION = "SFRotation"
     ROTATION_LIST = "MFRotation"
     STRING = "SFString"
@@ -49,6 +50,7 @@ WIDTHS: Mapping[Type, int] = MappingProxyType(
         Type.VECTOR_LIST: 3,
         Type.COLOR: 3,
         Type.COLOR_LIST: 3,
+        Type.RGBA_LIST: 4,
         Type.ROTATION: 4,
         Type.ROTATION_LIST: 4,
     }

@@ -75,10 +75,11 @@ class Format(Enum):
     def of(cls, file: str) -> Format:
         """Return the format of a file by its name. Raises InputError.
 
-        .wrz is a compressed .wrl, .zae a .zip with a .dae.
+        .wrz is a compressed .wrl, .x3dv is X3D in the same encoding, .zae a .zip with a .dae.
         """
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
-        known = {each.value: each for each in cls} | {"wrz": cls.WRL, "zae": cls.ZIP}
+        others = {"wrz": cls.WRL, "x3dv": cls.WRL, "zae": cls.ZIP}
+        known = {each.value: each for each in cls} | others
         if suffix not in known:
             raise InputError(
                 f"{label(file)} has an unknown format. Use a file that ends in "
@@ -87,7 +88,7 @@ class Format(Enum):
         return known[suffix]
 
 
-SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz")
+SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz", "x3dv")
 """Suffixes of files with a shape."""
 
 Y_UP = (Format.WRL, Format.GLB, Format.GLTF)

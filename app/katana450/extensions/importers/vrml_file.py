@@ -1,8 +1,9 @@
 """VRML worlds of other programs, flattened to one surface.
 
-Sources: ISO/IEC 14772-1:1997; The Virtual Reality Modeling Language, version 1.0 (1996). These
-readers are more tolerant than the one for our own files: nodes that are not of the standard are
-left out and reported. A world shows other files of the same upload, and no script is executed.
+Sources: ISO/IEC 14772-1:1997; ISO/IEC 19776-2 (X3D in the same encoding); The Virtual Reality
+Modeling Language, version 1.0 (1996). These readers are more tolerant than the one for our own
+files: nodes that are not of the standard are left out and reported. A world shows other files of
+the same upload, and no script is executed.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import re
 import zlib
 from collections import Counter
 from contextlib import suppress
+
+import numpy as np
 
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node
@@ -28,7 +31,7 @@ from katana450.extensions.importers.vrml_standard import STANDARD
 GZIP = b"\x1f\x8b"
 """First bytes of a gzip file."""
 
-SUFFIXES = (".wrl", ".wrz")
+SUFFIXES = (".wrl", ".wrz", ".x3dv")
 """Suffixes of worlds."""
 
 BUILT_IN = "urn:"
@@ -45,7 +48,8 @@ def read_wrl(
     """
     worlds = _Worlds(name, maximum, companions or Companions())
     surface = worlds.read(data, "")
-    return MeshReading(surface, tuple(worlds.left_out), note=worlds.note)
+    unit = worlds.lengths.get("")
+    return MeshReading(surface, tuple(worlds.left_out), unit=unit, note=worlds.note)
 
 
 class _Worlds:
@@ -55,6 +59,8 @@ class _Worlds:
         self._name, self._maximum, self._companions = name, maximum, companions
         self.left_out: Counter[str] = Counter()
         self.note = ""
+        # Units of length [m] of the worlds that state one.
+        self.lengths: dict[str, float] = {}
         self._surfaces: dict[str, MeshSurface] = {}
         self._prototypes: dict[str, ForeignReader] = {}
         self._open: list[str] = []
@@ -70,6 +76,8 @@ class _Worlds:
                 return Traversal(name, self.left_out, self._shown).surface(nodes)
             found, reader = self._parsed(text, name)
             self.left_out += reader.left_out
+            if reader.length is not None:
+                self.lengths[path] = reader.length
             expansion = PrototypeExpansion(name, lambda prototype: self._external(prototype, path))
             world = tuple(map(expansion.expanded, found))
             surface = Flattening(name, self.left_out, self._shown).surface(world)
@@ -123,7 +131,9 @@ class _Worlds:
             return None
         if path not in self._surfaces:
             self._surfaces[path] = self.read(data, path)
-        return self._surfaces[path]
+        own, other = (self.lengths.get(each, 1.0) for each in (self._open[-1], path))
+        surface = self._surfaces[path]
+        return surface if own == other else surface.moved(np.diag([*[other / own] * 3, 1.0]))
 
     def _external(self, prototype: Prototype, path: str) -> Prototype | None:
         """Return a prototype that is in another file; None if that is not there."""
@@ -144,7 +154,7 @@ class _Worlds:
         return data.decode("utf-8", "replace").removeprefix("\ufeff")
 
     def _parsed(self, text: str, name: str) -> tuple[tuple[Node, ...], ForeignReader]:
-        if re.match("#(VRML V2.0|X3D V3)", text):
+        if re.match("#(VRML V2.0|X3D V[34])", text):
             return parsed(text, name)
         # Parts of robots are often saved without the first line.
         with suppress(InputError):

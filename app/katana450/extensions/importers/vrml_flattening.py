@@ -22,6 +22,13 @@ from katana450.extensions.importers.vrml_standard import IGNORED_NODES, TEXTURES
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
+BASE_COLOURS = {
+    "Material": ("diffuseColor", 0.8),
+    "PhysicalMaterial": ("baseColor", 1.0),
+    "UnlitMaterial": ("emissiveColor", 1.0),
+}
+"""Field of the colour of each kind of material, and its default in all channels."""
+
 Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 """A function that returns the surface of the first of several addresses that is there."""
 
@@ -76,10 +83,11 @@ class Flattening:
             case "Switch":
                 chosen = int(number(node, "whichChoice", -1.0))
                 chosen = max(chosen, 0) if self._hidden else chosen
-                choice = _nodes(node.get("choice"))
+                choice = _nodes(node.get("choice")) or _nodes(node.get("children"))
                 return [(choice[chosen], T)] if 0 <= chosen < len(choice) else []
             case "LOD":
-                return [(child, T) for child in _nodes(node.get("level"))[:1]]
+                levels = _nodes(node.get("level")) or _nodes(node.get("children"))
+                return [(child, T) for child in levels[:1]]
             case "Shape" | "Inline":
                 pass
             case kind if kind in MAKERS:
@@ -135,9 +143,10 @@ def _colour(shape: Node) -> tuple[float, ...] | None:
     """Return the colour (4,) 0..1 of its material; None without a material."""
     appearance = part(shape, "appearance")
     material = None if appearance is None else part(appearance, "material")
-    if material is None or material.kind != "Material":
+    if material is None or material.kind not in BASE_COLOURS:
         return None
-    diffuse = numbers(material, "diffuseColor", (0.8, 0.8, 0.8))[:, 0]
+    field, default = BASE_COLOURS[material.kind]
+    diffuse = numbers(material, field, (default,) * 3)[:, 0]
     glow = numbers(material, "emissiveColor", (0.0, 0.0, 0.0))[:, 0]
     shown = diffuse if diffuse.any() else glow
     return (*shown.tolist(), 1.0 - number(material, "transparency", 0.0))

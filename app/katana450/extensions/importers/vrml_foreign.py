@@ -1,4 +1,4 @@
-"""Tolerant parser of VRML97 for worlds of other programs, with their prototypes."""
+"""Tolerant parser of VRML97, and of X3D in its encoding, for worlds of other programs."""
 
 from __future__ import annotations
 
@@ -19,8 +19,11 @@ EVENT_ACCESS = ("eventIn", "eventOut", "inputOnly", "outputOnly")
 FIELD_ACCESS = ("field", "exposedField", "initializeOnly", "inputOutput")
 """Words before a part of an interface that has a value."""
 
-X3D_STATEMENTS = {"PROFILE": 1, "COMPONENT": 1, "META": 2, "UNIT": 3, "EXPORT": 1}
+X3D_STATEMENTS = {"PROFILE": 1, "COMPONENT": 1, "META": 2, "IMPORT": 1, "EXPORT": 1}
 """Statements of X3D files with this number of words after them, which change no surface."""
+
+LENGTHS = (1e-9, 1e9)
+"""[m] Bounds of a unit of length."""
 
 NOT_NUMBERS = ("nan", "inf", "1.#")
 """Beginnings of words that programs write for what is no number."""
@@ -45,6 +48,8 @@ class ForeignReader(Reader):
         super().__init__(text, name)
         self.left_out: Counter[str] = Counter()
         self.prototypes: dict[str, Prototype] = {}
+        # Unit of length [m], if the file states one.
+        self.length: float | None = None
 
     def _define(self, name: str) -> None:
         # The standard allows a name to be defined again.
@@ -114,6 +119,12 @@ class ForeignReader(Reader):
         if kind in X3D_STATEMENTS:
             for _ in range(X3D_STATEMENTS[kind]):
                 self._take()
+            if self._ahead == "AS":
+                self._take()
+                self._take()
+            return Node("NULL")
+        if kind == "UNIT":
+            self._unit()
             return Node("NULL")
         if kind == "ROUTE":
             self._ends()
@@ -123,6 +134,16 @@ class ForeignReader(Reader):
         if kind in TEXTURES:
             self.left_out["pictures on the surface"] += 1
         return Node(kind, (), name)
+
+    def _unit(self) -> None:
+        """Parse the category, name and factor of a unit of X3D."""
+        category, name, factor = self._take(), self._take(), self._float()
+        if category == "length":
+            if not LENGTHS[0] < factor < LENGTHS[1]:
+                raise self._error(f"the unit {name!r} of {factor:g} m is not possible")
+            self.length = factor
+        elif category == "angle" and factor != 1.0:
+            self.left_out["the unit of angles"] += 1
 
     def _prototype(self, kind: str, depth: int) -> None:
         """Parse a declaration after its first word."""
@@ -222,7 +243,7 @@ class ForeignReader(Reader):
             self.left_out[f"{field} in {kind}"] += 1
         elif field[0] in '"[]{}' or not self._skip_value(depth):
             return super()._stray(kind, field, depth)
-        else:
+        elif field != "metadata":
             self.left_out[f"{field} of {kind}"] += 1
         return []
 

@@ -1,7 +1,7 @@
-"""Surfaces of VRML97 geometry nodes, in their own frames.
+"""Surfaces of the geometry nodes of VRML97 and X3D, in their own frames.
 
-Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGrid, 6.18 Extrusion,
-6.23 IndexedFaceSet, 6.42 Sphere.
+Sources: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGrid, 6.18 Extrusion,
+6.23 IndexedFaceSet, 6.42 Sphere; ISO/IEC 19775-1:2023, 11.4 and 32.4, sets of triangles and quads.
 """
 
 from __future__ import annotations
@@ -125,13 +125,11 @@ def _turned(
 
 
 def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
-    coord, color = part(node, "coord"), part(node, "color")
-    points = np.zeros((0, 3)) if coord is None else numbers(coord, "point", (), 3)
+    points, paint = _points(node), _paint(node, left_out)
     index = numbers(node, "coordIndex", ())[:, 0].astype(np.int64)
     corners, sizes = _split(index)
     face_colours = corner_colours = None
-    if color is not None:
-        paint = numbers(color, "color", (), 3)
+    if paint is not None:
         chosen = numbers(node, "colorIndex", ())[:, 0].astype(np.int64)
         if flag(node, "colorPerVertex"):
             places, their_sizes = _split(chosen) if len(chosen) else (corners, sizes)
@@ -141,18 +139,80 @@ def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
             places = chosen if len(chosen) else np.arange(len(sizes))
             fits = len(places) >= len(sizes)
             face_colours = _chosen(paint, places[: len(sizes)], fits, left_out)
-    turned = not flag(node, "ccw")
     if face_colours is not None:
         corner_colours = np.repeat(face_colours, sizes, axis=0)
+    surface = _of_whole_faces(points, corners, sizes, corner_colours, name, left_out)
+    return _facing(surface, not flag(node, "ccw"))
+
+
+def _set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
+    """Return the surface of a set of X3D: triangles, quadrangles, fans or strips."""
+    points, paint = _points(node), _paint(node, left_out)
+    kind = node.kind.removeprefix("Indexed")
+    indexed = kind != node.kind
+    index = numbers(node, "index", ())[:, 0].astype(np.int64) if indexed else np.arange(len(points))
+    if kind in ("TriangleSet", "QuadSet"):
+        size = 3 if kind == "TriangleSet" else 4
+        count = len(index) // size
+        corners, sizes = index[: count * size], np.full(count, size)
+    else:
+        fans = kind == "TriangleFanSet"
+        if indexed:
+            index, runs = _split(index)
+        else:
+            runs = numbers(node, "fanCount" if fans else "stripCount", ())[:, 0].astype(np.int64)
+            # Points that are not there belong to no run.
+            ends = np.minimum(np.cumsum(np.maximum(runs, 0)), len(points))
+            runs = np.diff(ends, prepend=0)
+        check_triangles(int(runs.sum()) - 2 * len(runs), name)
+        first = np.repeat(np.cumsum(runs) - runs, runs)
+        last = np.flatnonzero(np.arange(len(first)) - first >= 2)
+        first = first[last]
+        # Every second triangle of a strip has the other orientation.
+        odd = (last - first) % 2
+        places = (first, last - 1, last) if fans else (last - 2 + odd, last - 1 - odd, last)
+        corners, sizes = index[np.column_stack(places).ravel()], np.full(len(last), 3)
+    colours = None if paint is None else _chosen(paint, corners, True, left_out)
+    surface = _of_whole_faces(points, corners, sizes, colours, name, left_out)
+    return _facing(surface, not flag(node, "ccw"))
+
+
+def _of_whole_faces(
+    points: FloatArray,
+    corners: IntArray,
+    sizes: IntArray,
+    corner_colours: FloatArray | None,
+    name: str,
+    left_out: Counter[str],
+) -> MeshSurface:
+    """Return the surface of the faces whose vertices are all there."""
     owner = np.repeat(np.arange(len(sizes)), sizes)
     whole = np.ones(len(sizes), dtype=bool)
-    whole[owner[corners >= len(points)]] = False
+    whole[owner[(corners < 0) | (corners >= len(points))]] = False
     if not whole.all():
         left_out["faces whose vertices are missing"] += int((~whole).sum())
         corner_colours = None if corner_colours is None else corner_colours[whole[owner]]
         corners, sizes = corners[whole[owner]], sizes[whole]
-    surface = of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
-    return _facing(surface, turned)
+    return of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
+
+
+def _points(node: Node) -> FloatArray:
+    """Return the coordinates (n, 3) of a geometry."""
+    coord = part(node, "coord")
+    if coord is None or coord.kind not in ("Coordinate", "CoordinateDouble"):
+        return np.zeros((0, 3))
+    return numbers(coord, "point", (), 3)
+
+
+def _paint(node: Node, left_out: Counter[str]) -> FloatArray | None:
+    """Return the colours (c, 3 or 4) of a geometry; None if it has none."""
+    color = part(node, "color")
+    if color is None or color.kind == "NULL":
+        return None
+    if color.kind not in ("Color", "ColorRGBA"):
+        left_out["colours that do not match the faces"] += 1
+        return None
+    return numbers(color, "color", (), 4 if color.kind == "ColorRGBA" else 3)
 
 
 def _split(index: IntArray) -> tuple[IntArray, IntArray]:
@@ -166,14 +226,14 @@ def _split(index: IntArray) -> tuple[IntArray, IntArray]:
 def _chosen(
     paint: FloatArray, places: IntArray, fits: bool, left_out: Counter[str]
 ) -> FloatArray | None:
-    """Return the colours (k, 4) at ``places`` of the table ``paint`` (c, 3).
+    """Return the colours (k, 4) at ``places`` of the table ``paint`` (c, 3 or 4).
 
     None if they do not match.
     """
     if not fits or (places < 0).any() or (places >= len(paint)).any():
         left_out["colours that do not match the faces"] += 1
         return None
-    return np.column_stack((paint[places], np.ones(len(places))))
+    return np.column_stack((paint[places], np.ones(len(places))))[:, :4]
 
 
 def _facing(surface: MeshSurface, turned: bool) -> MeshSurface:
@@ -198,9 +258,8 @@ def _grid(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     corners = np.column_stack((first, first + columns, first + columns + 1, first + 1)).ravel()
     corner_colours = None
-    color = part(node, "color")
-    if color is not None:
-        paint = numbers(color, "color", (), 3)
+    paint = _paint(node, left_out)
+    if paint is not None:
         by_vertex = flag(node, "colorPerVertex")
         places = corners if by_vertex else np.repeat(np.arange(len(first)), 4)
         corner_colours = _chosen(paint, places, True, left_out)
@@ -311,6 +370,11 @@ MAKERS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
     "Cylinder": _cylinder,
     "Sphere": _sphere,
     "IndexedFaceSet": _face_set,
+    **{
+        f"{prefix}{kind}Set": _set
+        for prefix in ("", "Indexed")
+        for kind in ("Triangle", "TriangleFan", "TriangleStrip", "Quad")
+    },
     "ElevationGrid": _grid,
     "Extrusion": _extrusion,
 }

@@ -1,6 +1,7 @@
-"""Nodes of VRML97 that concern surfaces, and nodes that can be ignored.
+"""Nodes of VRML97 and X3D that concern surfaces, and nodes that can be ignored.
 
-Fields, types and defaults are those of ISO/IEC 14772-1:1997, chapter 6.
+Fields, types and defaults are those of ISO/IEC 14772-1:1997, chapter 6, and of ISO/IEC 19775-1:2023
+for the nodes of X3D that VRML97 does not have.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ _BOX = {"bboxCenter": Type.VECTOR, "bboxSize": Type.VECTOR}
 
 _CHILDREN = {"children": Type.NODE_LIST, **_BOX}
 
+_SOLID = {"solid": Type.BOOL}
+
 _PAINTED = {"color": Type.NODE, "colorPerVertex": Type.BOOL}
 
 _FACES = {
@@ -26,9 +29,26 @@ _FACES = {
     "texCoord": Type.NODE,
 }
 
+_SET = {**_FACES, "coord": Type.NODE}
+
+_INDEX = {"index": Type.INT_LIST}
+
+_SETS: Mapping[str, Mapping[str, Type]] = {
+    "TriangleSet": {},
+    "TriangleFanSet": {"fanCount": Type.INT_LIST},
+    "TriangleStripSet": {"stripCount": Type.INT_LIST},
+    "QuadSet": {},
+    "IndexedTriangleSet": _INDEX,
+    "IndexedTriangleFanSet": _INDEX,
+    "IndexedTriangleStripSet": _INDEX,
+    "IndexedQuadSet": _INDEX,
+}
+"""Own fields of the sets of triangles and quadrangles of X3D."""
+
 STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
     {
         "Group": _CHILDREN,
+        "StaticGroup": _CHILDREN,
         "Collision": {"collide": Type.BOOL, "proxy": Type.NODE, **_CHILDREN},
         "Anchor": {
             "description": Type.STRING,
@@ -43,8 +63,14 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "scaleOrientation": Type.ROTATION,
             **_BOX,
         },
-        "Switch": {"choice": Type.NODE_LIST, "whichChoice": Type.INT},
-        "LOD": {"level": Type.NODE_LIST, "range": Type.FLOAT_LIST, "center": Type.VECTOR},
+        # X3D has children in the place of choice and level.
+        "Switch": {"choice": Type.NODE_LIST, "whichChoice": Type.INT, **_CHILDREN},
+        "LOD": {
+            "level": Type.NODE_LIST,
+            "range": Type.FLOAT_LIST,
+            "center": Type.VECTOR,
+            **_CHILDREN,
+        },
         "Inline": {"url": Type.STRING_LIST, **_BOX},
         "Shape": FIELDS["Shape"],
         "Appearance": {
@@ -57,6 +83,15 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "emissiveColor": Type.COLOR,
             "transparency": Type.FLOAT,
         },
+        "PhysicalMaterial": {
+            "baseColor": Type.COLOR,
+            "emissiveColor": Type.COLOR,
+            "transparency": Type.FLOAT,
+            "metallic": Type.FLOAT,
+            "roughness": Type.FLOAT,
+        },
+        "UnlitMaterial": {"emissiveColor": Type.COLOR, "transparency": Type.FLOAT},
+        **{name: {**_SET, **own} for name, own in _SETS.items()},
         "IndexedFaceSet": {
             **_FACES,
             "coord": Type.NODE,
@@ -86,21 +121,23 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "scale": Type.PAIR_LIST,
             "spine": Type.VECTOR_LIST,
         },
-        "Box": {"size": Type.VECTOR},
+        "Box": {"size": Type.VECTOR, **_SOLID},
         "Cone": {
+            **_SOLID,
             "bottomRadius": Type.FLOAT,
             "height": Type.FLOAT,
             "side": Type.BOOL,
             "bottom": Type.BOOL,
         },
         "Cylinder": {
+            **_SOLID,
             "radius": Type.FLOAT,
             "height": Type.FLOAT,
             "side": Type.BOOL,
             "top": Type.BOOL,
             "bottom": Type.BOOL,
         },
-        "Sphere": {"radius": Type.FLOAT},
+        "Sphere": {"radius": Type.FLOAT, **_SOLID},
         "IndexedLineSet": {
             **_PAINTED,
             "coord": Type.NODE,
@@ -109,7 +146,9 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
         },
         "PointSet": {"coord": Type.NODE, "color": Type.NODE},
         "Coordinate": FIELDS["Coordinate"],
+        "CoordinateDouble": FIELDS["Coordinate"],
         "Color": {"color": Type.COLOR_LIST},
+        "ColorRGBA": {"color": Type.RGBA_LIST},
         "Normal": FIELDS["Normal"],
         "TextureCoordinate": {"point": Type.PAIR_LIST},
     }
@@ -127,7 +166,10 @@ IGNORED_NODES = frozenset(
         *("Appearance", "Material", "TimeSensor", "TouchSensor", "PlaneSensor", "SphereSensor"),
         *("CylinderSensor", "ProximitySensor", "VisibilitySensor", "Script", "ColorInterpolator"),
         *("CoordinateInterpolator", "NormalInterpolator", "OrientationInterpolator"),
-        *("PositionInterpolator", "ScalarInterpolator"),
+        *("PositionInterpolator", "ScalarInterpolator", "CoordinateDouble", "ColorRGBA"),
+        *("PhysicalMaterial", "UnlitMaterial", "KeySensor", "StringSensor", "LoadSensor"),
+        *("BooleanFilter", "BooleanSequencer", "BooleanToggle", "BooleanTrigger", "TimeTrigger"),
+        *("IntegerSequencer", "IntegerTrigger", "ViewpointGroup", "TextureBackground"),
     ]
 )
 """Nodes without a surface of their own, which are not reported as left out."""
