@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -12,9 +16,12 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status, Verdict
 from katana450.arm.control.tool_targets import with_branch
 from katana450.errors import InputError
+from katana450.extensions.general_arms.described_arm import described_arm
+from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.recording.codec import Codec, json_form, json_text
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, joint_frames
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame, singular_values
 from tests.general_arms.driven import TICK, begun, pose, run, session_of, settled
@@ -43,6 +50,27 @@ def test_ready_posture_is_inside_the_limits_and_regular(chain: Chain) -> None:
     session = session_of(chain)
     assert chain.within_limits(session.ready)
     assert singular_values(chain, session.ready)[-1] > 0.1
+
+
+@pytest.mark.parametrize("name", ["px100", "ur5", "seven"])
+def test_ready_posture_stands_up_in_front_of_the_base(
+    name: str, urdf: Callable[[str], Path]
+) -> None:
+    arm = described_arm(urdf(name))
+    shoulder = arm.T_base_shoulder
+    chain = arm.chain
+    q = DrivenTool(chain).ready((), shoulder)
+    T = shoulder @ forward(chain, q)
+    # The elbow is over the shoulder, so that no link lies on the table.
+    elbow = 3 if name == "seven" else 2
+    w, v = np.split(chain.S[:, elbow], 2)
+    height = (shoulder @ joint_frames(chain, q)[elbow] @ [*np.cross(w, v), 1.0])[2]
+    assert height > shoulder[2, 3] + 0.08
+    assert T[2, 3] > 0.5 * shoulder[2, 3]
+    assert T[0, 3] > 2.0 * abs(T[1, 3])
+    # One axis of the tool is vertical.
+    assert np.abs(T[2, :3]).max() == pytest.approx(1.0, abs=1e-9)
+    np.testing.assert_allclose(q / math.radians(45.0), np.round(q / math.radians(45.0)), atol=1e-9)
 
 
 @every(SIX_AND_MORE)
