@@ -11,6 +11,7 @@ import pytest
 
 import katana450
 from katana450.maths.geometry import se3
+from tests.robot.public_arms import PX100, two_sided, written
 
 Urdf = Callable[[str], Path]
 NAMES = {"px100": 4, "vx300s": 8, "ur5": 8, "twisted": 1, "seven": 8}
@@ -82,6 +83,18 @@ def test_tool_is_chosen_by_its_link(urdf: Urdf) -> None:
     assert load(path, tool="l6").n == 6
     with pytest.raises(katana450.RobotDescriptionError, match="no link 'nose'; its links are"):
         katana450.load(path, tool="nose")
+
+
+def test_one_of_several_fingers_is_chosen_by_its_tip(tmp_path: Path) -> None:
+    path = written(tmp_path, "hand", two_sided(PX100[:4]))
+    with pytest.raises(katana450.RobotDescriptionError, match=r"2 arms of 4 joints .* --tool"):
+        katana450.load(path)
+    assert load(path, tool="right_hand").chain.names == (
+        "right_waist",
+        "right_shoulder",
+        "right_elbow",
+        "right_wrist_angle",
+    )
 
 
 def test_notes_say_how_poses_are_solved(urdf: Urdf) -> None:

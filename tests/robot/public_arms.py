@@ -236,6 +236,19 @@ SO101 = [
 """Joints with the rounding of the published file: angles of six digits."""
 
 
+def two_sided(joints: Sequence[J]) -> list[J]:
+    """Return two arms on one base, with ``left_`` and ``right_`` before their names."""
+    return [
+        each._replace(
+            name=f"{side}_{each.name}",
+            child=f"{side}_{each.child}",
+            parent=each.parent if each.parent == "base" else f"{side}_{each.parent}",
+        )
+        for side in ("left", "right")
+        for each in joints
+    ]
+
+
 def stewart() -> list[J]:
     """Return a Stewart platform: six legs of three joints each between a base and one plate."""
     return [

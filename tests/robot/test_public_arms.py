@@ -39,6 +39,7 @@ from tests.robot.public_arms import (
     Z1_WITH_JAW,
     J,
     stewart,
+    two_sided,
     written,
 )
 
@@ -141,10 +142,12 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
             r"has 6 axes \(shoulder_pan, .*, wrist_3\); the closed-form",
         ),
         (
-            [j._replace(name=f"{side}_{j.name}", child=f"{side}_{j.child}",
-                        parent=j.parent if j.parent == "base" else f"{side}_{j.parent}")
-             for side in ("left", "right") for j in PX150[:5]],
+            two_sided(PX150[:5]),
             r"has 2 arms of 5 joints each, which begin at left_waist, right_waist.* --tool",
+        ),
+        (
+            two_sided(PX100[:4]),
+            r"has 2 arms of 4 joints each, which begin at left_waist, right_waist.* --tool",
         ),
         (
             [*Z1, J("rh_r1", "revolute", "link06", "trigger", limits=(-3.14, 3.14))],
@@ -154,7 +157,8 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
         ([J("rail", "prismatic", "floor", "base"), *PX100], r"axes of .* are rail \(prismatic\)"),
     ],
     ids=["PincherX-100", "UR5", "Z1", "Z1 with a jaw", "ViperX-300 6DOF", "a sixth axis",
-         "a flange on six", "two arms", "a trigger", "six with a rail", "five with a rail"],
+         "a flange on six", "two arms", "two fingers", "a trigger", "six with a rail",
+         "five with a rail"],
 )  # fmt: skip
 def test_the_number_of_axes_is_the_first_reason(
     tmp_path: Path, joints: list[J], message: str

@@ -16,6 +16,7 @@ from katana450.arm.control.messages import (
     PRIORITY_HINTS,
     REASONS,
     STATUS,
+    axis_names,
     branch_cells,
     condition,
     degrees,
@@ -62,6 +63,17 @@ def test_texts_and_kinds_match() -> None:
     assert set(PRIORITIES) == set(PRIORITY_HINTS) == set(FIVE_AXIS_PRIORITIES)
     assert set(GHOST_COLOURS) == set(Status)
     assert len(AXIS_NAMES) == 5
+
+
+def test_joints_have_names_for_people() -> None:
+    for numbered in ("axis_{}", "axis{}", "{}"):
+        assert axis_names([numbered.format(number) for number in range(1, 6)]) == AXIS_NAMES
+    assert list(axis_names(["shoulder_pan_joint", "wrist_1_joint", "joint_8", "j2"])) == [
+        "shoulder pan",
+        "wrist 1",
+        "joint 8",
+        "j2",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,10 @@ def axis_names(names: Sequence[str]) -> Sequence[str]:
 
     Joints that the description only numbers have the names of a five-axis arm.
     """
-    numbered = all(re.fullmatch(r"axis_?\d+", name) for name in names)
-    return AXIS_NAMES if numbered and len(names) == len(AXIS_NAMES) else names
+    numbered = all(re.fullmatch(r"(axis_?)?\d+", name) for name in names)
+    if numbered and len(names) == len(AXIS_NAMES):
+        return AXIS_NAMES
+    return [name.removesuffix("_joint").replace("_", " ") for name in names]
 
 
 PARTS = {

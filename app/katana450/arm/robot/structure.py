@@ -178,13 +178,10 @@ def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
             depth = tree.depth(deepest)
             candidates = [joint.name for joint in branches if tree.depth(joint) == depth]
             if len(candidates) > 1 and depth >= MIN_ARM_DEPTH > len(axes):
-                hint = ""
-                if len(axes) + depth >= ARM_JOINTS:
-                    hint = " Name the link that is the tool of one of them with --tool."
                 raise RobotDescriptionError(
                     f"{path.name} has {len(candidates)} arms of {len(axes) + depth} joints each, "
-                    f"which begin at {', '.join(candidates)}; the closed-form kinematics need one "
-                    f"arm of five turning axes.{hint}"
+                    f"which begin at {', '.join(candidates)}; one of them can be driven by its "
+                    "tool. Name the link that is this tool with --tool."
                 )
             if len(candidates) > 1 or depth < MIN_ARM_DEPTH or len(axes) >= ARM_JOINTS:
                 break
