@@ -212,6 +212,22 @@ def test_command_of_five_axes_is_refused_with_what_works(
 
 
 @pytest.mark.parametrize(
+    "command",
+    [
+        cmd.MoveTool(np.array([1e308, -1e308, 0.0])),
+        cmd.SetPose(se3.from_rotation_translation(np.eye(3), np.array([1e160, 0.0, 0.0]))),
+        cmd.StepTool(np.full(6, 1e200)),
+        cmd.Jog(np.full(6, -1e308)),
+    ],
+    ids=lambda command: type(command).__name__,
+)
+def test_number_whose_square_overflows_is_refused(command: cmd.Command) -> None:
+    session = session_of(PANDA)
+    with pytest.raises(InputError, match=r"give numbers up to 1e\+06"):
+        session.step(begun(session), [command], TICK)
+
+
+@pytest.mark.parametrize(
     ("command", "message"),
     [
         (cmd.Jog(np.zeros(6)), "5 numbers: x, y, z, pitch and roll"),

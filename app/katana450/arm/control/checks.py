@@ -12,6 +12,7 @@ from katana450.arm.control.pouring import CUP, Pouring
 from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray
 
 NUMBERS = {
     5: "A jog or step of this arm has 5 numbers: x, y, z, pitch and roll.",
@@ -24,6 +25,11 @@ TURNS = {
     6: "Only a five-axis arm has a pitch and a roll: give this tool a pose or a rotation.",
 }
 """Refusals of a command that turns the tool of other arms."""
+
+FARTHEST_TARGET = 1e6
+"""[m, m/s, rad, rad/s] Maximum size of a number in a target, a step or a jog of the tool. A larger
+one is a mistake, and its square can overflow in a search.
+"""
 
 NO_HAND = "This arm has no collision checking, so nothing can be fixed to its hand."
 
@@ -69,7 +75,12 @@ def check(
 def _check_tool(arm: ArmModel, command: cmd.Command) -> None:
     kinematics = arm.kinematics
     match command:
+        case cmd.MoveTool(position=position):
+            _check_size("The position", position)
+        case cmd.SetPose(T=T):
+            _check_size("The position of the pose", T[:3, 3])
         case cmd.Jog(rates=numbers) | cmd.StepTool(by=numbers):
+            _check_size("The jog or step", numbers)
             if numbers.size != kinematics.freedoms:
                 raise InputError(f"{NUMBERS[kinematics.freedoms]} The command has {numbers.size}.")
         case cmd.TurnTool() | cmd.OrientTool() if not isinstance(command, kinematics.turn):
@@ -81,6 +92,14 @@ def _check_tool(arm: ArmModel, command: cmd.Command) -> None:
             )
         case cmd.TakeBranch(branch=branch):
             branch_named(arm, str(branch))
+
+
+def _check_size(what: str, numbers: FloatArray) -> None:
+    largest = float(np.abs(numbers).max())
+    if largest > FARTHEST_TARGET:
+        raise InputError(
+            f"{what} has the number {largest:.2g}; give numbers up to {FARTHEST_TARGET:.0e}."
+        )
 
 
 def _check_objects(pouring: Pouring | None, environment: Environment, command: cmd.Command) -> None:
