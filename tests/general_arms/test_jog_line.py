@@ -9,7 +9,7 @@ from katana450.arm.control import commands as cmd
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.chain import Chain
 from tests.general_arms.driven import begun, pose, run, session_of
-from tests.general_arms.published_arms import FOUR, PANDA, UR5E
+from tests.general_arms.published_arms import FOUR, KR_6, PANDA, UR5E
 
 SPEED, TICKS = 0.05, 80
 ARMS = {**FOUR, "UR5e": UR5E, "Panda": PANDA}
@@ -38,3 +38,21 @@ def test_tool_stays_on_its_line_and_keeps_its_orientation(
     assert deviation < 1e-4
     if chain.n >= 6:
         assert turn < np.radians(0.05)
+
+
+@pytest.mark.parametrize(
+    ("chain", "rates"),
+    [
+        pytest.param(PANDA, (0.3, 0.0, -0.4, 1.1, 2.2, -1.6), id="Panda"),
+        pytest.param(KR_6, (0.0, 0.0, -0.5, 0.0, 0.0, 0.0), id="KR 6"),
+    ],
+)
+def test_no_joint_is_too_fast_where_the_twist_needs_more_and_more_speed(
+    chain: Chain, rates: tuple[float, ...]
+) -> None:
+    session = session_of(chain)
+    state, fastest = begun(session), 0.0
+    for _ in range(120):
+        state = run(session, state, [cmd.Jog(np.array(rates))])
+        fastest = max(fastest, float(np.max(np.abs(state.motion.qd) / chain.speed)))
+    assert 0.99 < fastest <= 1.0 + 1e-9

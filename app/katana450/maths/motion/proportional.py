@@ -73,10 +73,12 @@ def in_proportion(
     )
     if not qd.any() and max(np.abs(motion.qd).max(), np.abs(motion.qdd).max()) <= STILL:
         motion = JointMotion.rest(q)
+    # Acceleration that is left raises the speed further while it ends.
+    fastest = limiter.fastest(motion)
     ends = np.array((q, limiter.stopping_point(motion)))
     possible = (
         ((ends >= limits.lower) & (ends <= limits.upper)).all()
-        and (np.abs(motion.qd) <= limits.speed + LIMIT_TOLERANCE).all()
+        and (fastest <= limits.speed + LIMIT_TOLERANCE).all()
         and (np.abs(motion.qdd) <= A + LIMIT_TOLERANCE).all()
     )
     return motion if possible else None
