@@ -177,6 +177,13 @@ def test_the_number_of_axes_is_the_first_reason(
         assert found.robot.require_arm().kinematics.freedoms == 6
 
 
+def test_limit_that_is_wrong_is_the_reason_not_the_number_of_axes(tmp_path: Path) -> None:
+    joints = [*PX150[:5], J("sixth", "revolute", "hand", "link6", limits=(2.0, 1.0))]
+    found = find_robot(Settings(), written(tmp_path, "arm", joints), None)
+    assert found.robot.arm is None
+    assert "The limits of axis 6 (sixth) are 2 to 1 rad" in found.notes[-1]
+
+
 @pytest.mark.parametrize(
     "jaw",
     [

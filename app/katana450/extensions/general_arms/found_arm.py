@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -20,14 +19,17 @@ LEAST_AXES: Final = 3
 def found_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
     """Return the arm with ``tool``, or any, in the description ``urdf`` of the file ``path``.
 
-    None if there is no such arm, or if joints beside it could then no longer be driven.
+    None if there is no such arm, or if joints beside it could then no longer be driven. Raises
+    RobotDescriptionError if there is one, and its axes or limits are described wrongly.
     """
-    with suppress(RobotDescriptionError):
+    try:
         structure = structure_of(urdf, path, tool, count=None)
-        beside = any(joint.mimic is None for joint in structure.others)
-        if len(structure.axes) >= LEAST_AXES and (tool is not None or not beside):
-            described, T_base_shoulder = described_chain(urdf.frames(), structure)
-            chain, notes = exact_arm(described)
-            method = f"The kinematics are {kinematics_of(chain).method}."
-            return OtherArm(structure, T_base_shoulder, chain, DrivenTool, (*notes, method))
-    return None
+    except RobotDescriptionError:
+        return None
+    beside = any(joint.mimic is None for joint in structure.others)
+    if len(structure.axes) < LEAST_AXES or (tool is None and beside):
+        return None
+    described, T_base_shoulder = described_chain(urdf.frames(), structure)
+    chain, notes = exact_arm(described)
+    method = f"The kinematics are {kinematics_of(chain).method}."
+    return OtherArm(structure, T_base_shoulder, chain, DrivenTool, (*notes, method))
