@@ -12,7 +12,10 @@ def add_arm_options(parser: argparse.ArgumentParser, *, names: bool = True) -> N
     """Add ``--urdf`` and ``--tool`` to ``parser``, and with ``names`` also ``--arm``."""
     if names:
         parser.add_argument(
-            "--arm", metavar="NAME", help="a robot of the gallery; `katana450 arms` lists them"
+            "--arm",
+            type=_name,
+            metavar="NAME",
+            help="a robot of the gallery; `katana450 arms` lists them",
         )
     parser.add_argument(
         "--urdf",
@@ -25,3 +28,12 @@ def add_arm_options(parser: argparse.ArgumentParser, *, names: bool = True) -> N
     parser.add_argument(
         "--tool", metavar="LINK", help="link to which targets refer (default: the last one)"
     )
+
+
+def _name(text: str) -> str:
+    """Return the name of a robot. Raises ArgumentTypeError for the address of a real arm."""
+    if "://" in text:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is the address of a real arm; this command takes the name of a robot"
+        )
+    return text
