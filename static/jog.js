@@ -174,6 +174,8 @@ const Jog = (() => {
     Object.values(pads).forEach(add);
     add(pad);
     if (!parked.mouse && performance.now() - mouse.at < MOUSE_FRESH) add(mouse.rates);
+    // A yaw that the arm does not have must not end its motion by a jog of zero rates.
+    if (steps?.freedoms !== 6) sum[5] = 0;
     return sum.map((value, i) => Math.max(-1, Math.min(1, value)) * (i < 3 ? LINEAR : ANGULAR));
   }
 

@@ -189,3 +189,28 @@ def test_steps_fit_a_finger_on_a_phone(
     assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
     sheet = page.page.locator("#jog")
     assert sheet.evaluate("(each) => each.scrollWidth <= each.clientWidth")
+
+
+def test_yaw_that_the_arm_does_not_have_is_not_sent(page: ViserPage, truth: Truth) -> None:
+    page.page.click("#jog-button")
+    page.page.evaluate(
+        """() => {
+          window.said = [];
+          const post = Worker.prototype.postMessage;
+          Worker.prototype.postMessage = function (...all) {
+            said.push(JSON.stringify(all));
+            return post.apply(this, all);
+          };
+        }"""
+    )
+
+    def jogs(key: str) -> int:
+        page.page.evaluate("() => { said.length = 0 }")
+        page.page.keyboard.down(key)
+        page.page.wait_for_timeout(300)
+        page.page.keyboard.up(key)
+        truth.wait(moving=False)
+        return int(page.page.evaluate("() => said.filter((each) => each.includes('jog')).length"))
+
+    assert jogs("KeyQ") == 0
+    assert jogs("KeyA") > 0
