@@ -8,7 +8,8 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.errors import InputError
 from katana450.extensions.programs.moves import Home, Joints, Move, Nudge, Via
-from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, StepTarget
+from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.chain import Chain
 from tests.general_arms.driven import begun, pose, session_of, settled

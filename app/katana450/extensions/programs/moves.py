@@ -12,10 +12,11 @@ from katana450.arm.control import commands as cmd
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.plan_builder import PlanBuilder, StepTarget
+from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step, nothing
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.joint_path import JointPath
 

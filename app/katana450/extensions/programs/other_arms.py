@@ -8,6 +8,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import State
 from katana450.errors import InputError
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.maths.geometry.arrays import FloatArray
 
 FIVE: Final = 5
@@ -29,6 +30,13 @@ def need_five_axes(arm: ArmModel) -> None:
     """Raise InputError for an arm outside the five-axis family."""
     if not has_five_axes(arm):
         raise InputError(OF_FIVE_AXES)
+
+
+def point_of(place: StepTarget) -> FloatArray:
+    """Return the position (3,) [m] of ``place``. Raises InputError if it has more or none."""
+    if place.position is None or (place.pitch, place.roll, place.branch) != (None,) * 3:
+        raise InputError(OF_FIVE_AXES)
+    return place.position
 
 
 def joints_at_point(arm: ArmModel, state: State, p: FloatArray) -> FloatArray:

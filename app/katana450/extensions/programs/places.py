@@ -8,9 +8,9 @@ import numpy as np
 
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.plan_builder import StepTarget
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 

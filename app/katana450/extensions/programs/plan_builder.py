@@ -16,16 +16,12 @@ from katana450.arm.control.scene_objects import SceneObject, named
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
+from katana450.extensions.programs import other_arms
 from katana450.extensions.programs.actions import Action, FollowPlan
-from katana450.extensions.programs.other_arms import (
-    OF_FIVE_AXES,
-    has_five_axes,
-    joints_at_point,
-    need_five_axes,
-)
 from katana450.extensions.programs.out_of_reach import unreached
 from katana450.extensions.programs.reaching import branches_near, reaching
 from katana450.extensions.programs.script_frame import ScriptFrame
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -83,27 +79,6 @@ class PlanContext:
     def ready(self) -> FloatArray:
         """The ready posture (5,) [rad], the target of ``home``."""
         return self.session.ready
-
-
-@dataclass(frozen=True, eq=False)
-class StepTarget:
-    """The target of a step, by joints or by the pose of the tool.
-
-    Attributes:
-        joints: (5,) [rad]; None if the target is a pose.
-        position: (3,) [m], in {S} or, with ``in_base``, in the base frame; None to keep it.
-        pitch: [rad]; None to keep it.
-        roll: [rad]; None to keep it.
-        branch: None for any, the present one first.
-        in_base: whether ``position`` is in the base frame.
-    """
-
-    joints: FloatArray | None = None
-    position: FloatArray | None = None
-    pitch: float | None = None
-    roll: float | None = None
-    branch: Branch | None = None
-    in_base: bool = False
 
 
 class Approach(NamedTuple):
@@ -216,7 +191,7 @@ class PlanBuilder:
     @property
     def at(self) -> ToolTarget:
         """The present tool pose. Raises InputError for an arm outside the five-axis family."""
-        need_five_axes(self.plan_context.arm)
+        other_arms.need_five_axes(self.plan_context.arm)
         return ToolTarget.at(self.chain, self.q)
 
     @property
@@ -249,7 +224,7 @@ class PlanBuilder:
 
     def lead(self, curves: Sequence[Curve], name: str) -> None:
         """Append the tool's motion along ``curves``, from its present pose, on the same branch."""
-        need_five_axes(self.plan_context.arm)
+        other_arms.need_five_axes(self.plan_context.arm)
         paths: list[Path] = []
         made: dict[int, Path] = {}
         q = self.q
@@ -371,12 +346,10 @@ class PlanBuilder:
         if place.joints is not None:
             self.plan_context.session.check(SetJoints(place.joints))
             return self.plan_context.arm.chain.check_q(place.joints)
-        if not has_five_axes(self.plan_context.arm):
-            if place.position is None or (place.pitch, place.roll, place.branch) != (None,) * 3:
-                raise InputError(OF_FIVE_AXES)
-            p = self.point(place.position, in_base=place.in_base)
-            return joints_at_point(self.plan_context.arm, self.state, p)
-        return self.joints_of(self.target_at(place), place.branch)
+        if other_arms.has_five_axes(self.plan_context.arm):
+            return self.joints_of(self.target_at(place), place.branch)
+        p = self.point(other_arms.point_of(place), in_base=place.in_base)
+        return other_arms.joints_at_point(self.plan_context.arm, self.state, p)
 
     def target_at(self, place: StepTarget, now: ToolTarget | None = None) -> ToolTarget:
         """Return the tool pose at ``place``, which has no joints; ``now`` gives absent values."""

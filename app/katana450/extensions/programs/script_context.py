@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from katana450.extensions.programs.plan_builder import StepTarget
+from katana450.extensions.programs.step_target import StepTarget
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,13 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.moves import through
-from katana450.extensions.programs.plan_builder import PlanBuilder, StepTarget
+from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.reaching import reaching
 from katana450.extensions.programs.roomiest_pitch import roomiest
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.extensions.programs.tool_curves import ToolLines, ToolScrew
 from katana450.extensions.programs.unfollowed import arc_remedies, line_remedies, unfollowed
 from katana450.maths.geometry.arrays import FloatArray

@@ -10,11 +10,11 @@ from katana450.extensions.programs.attached_files import MAX_FILES, AttachedFile
 from katana450.extensions.programs.blocks import Definition, StepReader
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.places import place
-from katana450.extensions.programs.plan_builder import StepTarget
 from katana450.extensions.programs.scope import Scope
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.extensions.programs.source import read as read_text
+from katana450.extensions.programs.step_target import StepTarget
 
 FRAMES = ("shoulder", "base")
 """The frames of points."""
