@@ -93,7 +93,7 @@ def test_arm_answer_gives_the_reason_for_joints_only(
         None,
         None,
     )
-    assert "need five turning axes. Its joints are j1 (prismatic)" in description.joints_only
+    assert "carries a tool. Its joints are j1 (prismatic)" in description.joints_only
     state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))

@@ -22,8 +22,8 @@ def add_arm_options(parser: argparse.ArgumentParser, *, names: bool = True) -> N
         type=Path,
         default=URDF_PATH,
         metavar="FILE",
-        help="another arm: pan, three parallel axes, roll; `serve` drives any other tree joint "
-        "by joint (default: the Katana450)",
+        help="another robot; `serve` drives the tool of an arm, and any other tree joint by joint "
+        "(default: the Katana450)",
     )
     parser.add_argument(
         "--tool", metavar="LINK", help="link to which targets refer (default: the last one)"

@@ -194,8 +194,8 @@ def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
     _refuse_followers(axes, "the tool")
     if not axes:
         raise RobotDescriptionError(
-            f"{path.name} has no series of joints that carries a tool; the closed-form kinematics "
-            f"need five turning axes. Its joints are {_listed(tree.joints.values()) or 'none'}."
+            f"{path.name} has no series of joints that carries a tool. "
+            f"Its joints are {_listed(tree.joints.values()) or 'none'}."
         )
     if count is not None and len(axes) != count:
         hint = ""
