@@ -41,17 +41,27 @@ def test_tool_stays_on_its_line_and_keeps_its_orientation(
 
 
 @pytest.mark.parametrize(
-    ("chain", "rates"),
+    ("chain", "q", "rates"),
     [
-        pytest.param(PANDA, (0.3, 0.0, -0.4, 1.1, 2.2, -1.6), id="Panda"),
-        pytest.param(KR_6, (0.0, 0.0, -0.5, 0.0, 0.0, 0.0), id="KR 6"),
+        pytest.param(
+            PANDA,
+            (0.0, -0.785, 0.785, -2.356, 0.0, 1.8675, 0.0),
+            (0.3, 0.0, -0.4, 1.1, 2.2, -1.6),
+            id="Panda",
+        ),
+        pytest.param(
+            KR_6,
+            (0.0, -1.265, 1.885, -0.785, 0.785, 0.0),
+            (0.0, 0.0, -0.5, 0.0, 0.0, 0.0),
+            id="KR 6",
+        ),
     ],
 )
 def test_no_joint_is_too_fast_where_the_twist_needs_more_and_more_speed(
-    chain: Chain, rates: tuple[float, ...]
+    chain: Chain, q: tuple[float, ...], rates: tuple[float, ...]
 ) -> None:
     session = session_of(chain)
-    state, fastest = begun(session), 0.0
+    state, fastest = session.begin(np.array(q), 0.0, 0.0), 0.0
     for _ in range(120):
         state = run(session, state, [cmd.Jog(np.array(rates))])
         fastest = max(fastest, float(np.max(np.abs(state.motion.qd) / chain.speed)))
