@@ -149,17 +149,23 @@ def test_without_the_package_the_command_says_what_to_install(
     assert "pip install 'katana450[gallery]'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("address", ["tcp://192.0.2.1", "192.0.2.1", "ur5e.urdf"])
 def test_address_of_a_real_arm_is_refused_where_only_names_are_possible(
-    capsys: pytest.CaptureFixture[str],
+    address: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
-        main(["fk", "--arm", "tcp://192.0.2.1"])
-    assert "'tcp://192.0.2.1' is the address of a real arm" in capsys.readouterr().err
+        main(["fk", "--arm", address])
+    assert f"{address!r} is an address or a file" in capsys.readouterr().err
 
 
-def test_the_address_of_a_real_arm_is_no_name(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["serve", "--port", "0", "--arm", "http://nowhere"]) == 1
-    assert "gallery" not in capsys.readouterr().err
+@pytest.mark.parametrize("address", ["http://nowhere", "192.0.2.1"])
+def test_the_address_of_a_real_arm_is_no_name(
+    address: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["serve", "--port", "0", "--arm", address]) == 1
+    said = capsys.readouterr().err
+    assert "is not the address of an arm" in said
+    assert "gallery" not in said
 
 
 @pytest.mark.long

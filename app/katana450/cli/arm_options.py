@@ -31,9 +31,10 @@ def add_arm_options(parser: argparse.ArgumentParser, *, names: bool = True) -> N
 
 
 def _name(text: str) -> str:
-    """Return the name of a robot. Raises ArgumentTypeError for the address of a real arm."""
-    if "://" in text:
+    """Return the name of a robot. Raises ArgumentTypeError for an address or a file."""
+    if "." in text or ":" in text:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is the address of a real arm; this command takes the name of a robot"
+            f"{text!r} is an address or a file; this command takes the name of a robot, and a file "
+            "by --urdf"
         )
     return text

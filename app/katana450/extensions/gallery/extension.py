@@ -24,8 +24,8 @@ def _arms(options: Namespace) -> int:
 
 def _named(options: Namespace) -> None:
     name = getattr(options, "arm", None)
-    # An address is that of a real arm.
-    if name is None or "://" in name:
+    # No robot has a dot or a colon in its name: this is the address of a real arm.
+    if name is None or "." in name or ":" in name:
         return
     from katana450.extensions.gallery.arms_command import choose
 
