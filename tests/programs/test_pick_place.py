@@ -159,7 +159,7 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
             "cannot be placed there: .*low",
             marks=pytest.mark.long,
         ),
-        ("- pick: {object: part, side: front}\n", "its sides are skew, so the fingers"),
+        ("- pick: {object: part, side: front}\n", "its sides are turned too far, seen from"),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_its_reason(

@@ -121,15 +121,18 @@ def _sum(function: Callable[[float, float], float]) -> Callable[[Quantity, Quant
 def _product(a: Quantity, b: Quantity) -> Quantity:
     if PLAIN not in (a.kind, b.kind):
         raise ExpressionError(
-            f"{with_article(a.kind)} times {with_article(b.kind)} has no unit here"
+            f"{with_article(a.kind)} times {with_article(b.kind)} has no unit here: one of them "
+            "must be without a unit"
         )
     return Quantity(a.value * b.value, b.kind if a.kind == PLAIN else a.kind)
 
 
 def _quotient(a: Quantity, b: Quantity) -> Quantity:
     if b.kind not in (PLAIN, a.kind):
+        same = "" if a.kind == PLAIN else f" or by {with_article(a.kind)}"
         raise ExpressionError(
-            f"{with_article(a.kind)} divided by {with_article(b.kind)} has no unit here"
+            f"{with_article(a.kind)} divided by {with_article(b.kind)} has no unit here: divide by "
+            f"a number{same}"
         )
     return Quantity(a.value / b.value, PLAIN if a.kind == b.kind else a.kind)
 
@@ -177,7 +180,8 @@ def _call(name: str, values: list[Quantity]) -> Quantity:
         _common(*values)
         return Quantity(math.degrees(math.atan2(*numbers)), ANGLE)
     if len(values) != 1 or name in (*OF_MANY, "atan2"):
-        raise ExpressionError(f"{name} takes another number of values")
+        wanted = {"atan2": "two values"}.get(name, "values" if name in OF_MANY else "one value")
+        raise ExpressionError(f"{name} takes {wanted}, not {len(values)}")
     (value,) = values
     if name in KEEPING:
         return Quantity(float(KEEPING[name](value.value)), value.kind)

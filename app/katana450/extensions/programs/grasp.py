@@ -68,11 +68,12 @@ MAX_SKEW = math.radians(15.0)
 """[rad] Maximum angle between the fingers and the sides of a box: the pads yield by as much."""
 
 MAX_DISTANCE, DISTANCE_STEP = 0.03, 0.002
-"""[m] Maximum and step of what the palm adds to the distance between tool frame and object."""
+"""[m] How far the tool moves away from an object, at most and by which steps, until the palm has
+room.
+"""
 
 PALM_CLEARANCE = MARGIN + 5e-4
 """[m] Minimum distance between the palm and the grasped object."""
-
 
 JOINT_ROOM = math.radians(2.0)
 """[rad] Distance to the joint limits that a grasp keeps, if one of its pitches can."""
@@ -320,8 +321,8 @@ def _no_approach(scene_object: SceneObject, side: str) -> str:
     if scene_object.name == CUP:
         return "the cup is grasped from the front, because from above the wrist could not pour it."
     return (
-        f"seen from the arm its sides are skew, so the fingers cannot hold it from the {side}. "
-        "Grasp it from above, or turn it."
+        "its sides are turned too far, seen from the arm, so the fingers cannot hold it from the "
+        f"{side}. Grasp it from above, or turn it."
     )
 
 
