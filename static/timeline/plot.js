@@ -33,7 +33,7 @@ export class Plot {
     this.#box.replaceChildren(html("p", {}, ...legend), picture);
   }
 
-  // Mark the time [s] since the begin of both runs.
+  // Mark the time [s] since the start of both runs.
   mark(t) {
     const x = (WIDTH * Math.max(0, Math.min(t, this.#length))) / (this.#length || 1);
     for (const end of ["x1", "x2"]) this.#cursor.setAttribute(end, x);

@@ -33,7 +33,7 @@ export class Timeline {
   #t = null; // the moment that is shown [s since the epoch]; null while the window is live
   #playing = null; // time of the last frame [ms]
   #ends = [null, null]; // begin and end of the selection; null: that of the recording
-  #second = null; // {of, begin, mine}: second run, its begin, and that of the first one
+  #second = null; // {of, begin, mine}: second run, its start, and that of the first one
   #busy = false; // whether a moment is requested
   #timer = 0;
   #failed = false; // whether the last look at the recording failed
@@ -120,7 +120,7 @@ export class Timeline {
       play: button("Play", () => this.#play(this.#playing === null), icon(ICONS.play)),
       clock: html("output", { class: "clock" }, "Live"),
       marks: html("div", { class: "marks" }),
-      begin: range("end", "Begin of the selection"),
+      begin: range("end", "Start of the selection"),
       end: range("end", "End of the selection"),
       now: range("now", "Moment that is shown"),
       speed: html("select", { "aria-label": "Speed of playing back" }, ...SPEEDS.map((each) => option(each, `${each}×`))),

@@ -191,7 +191,7 @@ def test_selection_is_saved_opened_and_compared(
     opened(page)
     # The last motion; the arm rests at first.
     length = float(page.page.get_by_label(NOW).get_attribute("max") or 0.0)
-    ends = {"Begin of the selection": length - 1.9, "End of the selection": length - 0.4}
+    ends = {"Start of the selection": length - 1.9, "End of the selection": length - 0.4}
     for name, value in ends.items():
         page.page.get_by_label(name).evaluate(
             "(each, value) => { each.value = value; each.dispatchEvent(new Event('input')); }",
@@ -290,7 +290,7 @@ def test_timeline_covers_nothing(
     timeline = page.page.locator("#timeline").bounding_box()
     assert timeline is not None
     for name in ("#stop", "header", "#scene", "nav"):
-        # In landscape the buttons stand at the left, in the empty begin of the timeline.
+        # In landscape the buttons stand at the left, in the empty start of the timeline.
         box = page.page.locator(name).bounding_box()
         assert box is not None
         assert not overlap(timeline, **box) or (name, size) in EXEMPT, name
@@ -325,5 +325,5 @@ def test_selected_motion_runs_again_as_a_program(
     run.update()
     times = np.linspace(run.spans[-1].start, run.spans[-1].end, 200).tolist()
     turns = [found.row.q[0] for t in times if (found := run.at(t)) is not None]
-    # It went back to the begin, and through both turns.
+    # It went back to the start, and through both turns.
     assert max(turns) > TURNS[0] - 0.01

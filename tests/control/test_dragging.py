@@ -42,7 +42,7 @@ DRAGS_OF_OTHER_ARMS = 500
 """Number of drags of each other arm, with the priorities in turn."""
 
 GRABS = (1, 5, 25)
-"""Number of moves between the begin and the end of a drag. In every fourth trip the drag also turns
+"""Number of moves between the start and the end of a drag. In every fourth trip the drag also turns
 the rings."""
 
 CAUSES = {Reason.ACROSS_GAP, Reason.AXIS_LIMIT, Reason.AXIS_1, Reason.LINKS}

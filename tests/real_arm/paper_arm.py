@@ -48,7 +48,7 @@ class PaperArm:
         refusals: Errors for the next requests of a class, each used once.
         starved: Whether its buffer ran empty before the end of a motion.
         buffers: Segments that waited at the arrival of each packet.
-        largest_jump: Largest distance from the arm to the begin of a polynomial [encoders].
+        largest_jump: Largest distance from the arm to the start of a polynomial [encoders].
     """
 
     def __init__(self) -> None:

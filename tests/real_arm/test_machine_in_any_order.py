@@ -26,7 +26,7 @@ EXAMPLES = 400 if LONG else 15
 
 REFUSABLE = (CommandMotor, ReadAxis, ReadPositions, ReadStates, SendSplines, SetCollisionDetection)
 MAX_JUMP = 2
-"""[encoders] Distance from the arm to the begin of a motion: positions are whole numbers."""
+"""[encoders] Distance from the arm to the start of a motion: positions are whole numbers."""
 
 MOVING_FLAGS = (MotorFlag.MOVE, MotorFlag.CALIBRATE, MotorFlag.OFF)
 

@@ -13,7 +13,7 @@ from katana450.extensions.recording.topics import COMMANDS, EPISODES
 from tests.recording.recorded import Commands, random_commands, record
 
 BEGIN = 0.25
-"""[s] Begin of the episodes after that of their recordings."""
+"""[s] Start of the episodes after that of their recordings."""
 
 BY = {"name": "Ada", "role": "operator", "key": "0a1b2c3d4e5f"}
 
@@ -33,7 +33,7 @@ def write_copy(
         out: the copy.
         episodes: messages to add.
         metadata: metadata to change.
-        gap: time after the begin at which ticks are missing [s].
+        gap: time after the start at which ticks are missing [s].
         change: changes each message.
     """
     with RecordingFile.open(source) as file, out.open("wb") as target:

@@ -83,7 +83,7 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
         if each.state.poured is not None and moment.water is not None:
             kept = each.state.poured.water.kept
             assert moment.water.cup == pytest.approx(kept, abs=1e3)
-    # Before the begin, the first state is shown.
+    # Before the start, the first state is shown.
     first = run.at(0.0)
     assert first is not None
     assert first.row.q == records[0].state.q.tolist()

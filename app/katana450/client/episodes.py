@@ -24,8 +24,8 @@ class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
         task: What is to be done.
         outcome: ``success``, ``failure``, ``unjudged``, or ``unfinished`` after a crash.
         note: Remarks.
-        start: First moment [s] after the begin of its file.
-        end: Last moment [s] after the begin of its file.
+        start: First moment [s] after the start of its file.
+        end: Last moment [s] after the start of its file.
         recorded: Length of its file [s], which bounds both.
         bytes: Length of its file [bytes].
         file: Name of its file.
@@ -130,7 +130,7 @@ class EpisodeClient:
         return self._number({"do": "describe", "number": number, "task": task, "note": note})
 
     def trim(self, number: int, start: float, end: float) -> int:
-        """Give the episode ``number`` another start and end [s after the begin of its file].
+        """Give the episode ``number`` another start and end [s after the start of its file].
 
         Nothing is deleted. Returns ``number``.
         """

@@ -29,12 +29,12 @@ class RecordedFrames:
     """Frames of a part of a recording, without water.
 
     Attributes:
-        t: (N,) times since the begin of the part [s].
+        t: (N,) times since the start of the part [s].
         points: (N, 3) the tool point in the base frame [m].
     """
 
     def __init__(self, path: Path, robot: DescribedRobot, start: float, end: float) -> None:
-        """Read the part from ``start`` to ``end`` [s] after the begin of the recording.
+        """Read the part from ``start`` to ``end`` [s] after the start of the recording.
 
         Raises InputError for a part without states, a robot without a tool, and a damaged file.
         """

@@ -129,7 +129,7 @@ class Recording:
 
     @cached_property
     def commands(self) -> tuple[RecordedCommand, ...]:
-        """All commands with their times and givers, in order. Raises InputError."""
+        """All commands in order, with their times and who gave them. Raises InputError."""
         reader, found = TickReader(), []
         with RecordingFile.open(self.path) as file:
             for message in file.messages(PLANS, SOLIDS, COMMANDS):
@@ -188,7 +188,7 @@ class Recording:
         """Return the script that runs this motion again, as ``katana450 record again`` does.
 
         Args:
-            start: begin of the part [s] after that of the recording; None for that of the episode
+            start: start of the part [s] after that of the recording; None for that of the episode
                 if the file is one, which may be trimmed, or else of the recording.
             end: its end [s]; None as for ``start``.
             urdf: file of the recorded robot, if it is not the Katana450 of this package.
@@ -217,7 +217,7 @@ class Recording:
 
         Args:
             client: a connection, from `katana450.connect`.
-            start: begin of the part [s] after that of the recording; None for that of the episode
+            start: start of the part [s] after that of the recording; None for that of the episode
                 if the file is one, which may be trimmed, or else of the recording.
             end: its end [s]; None as for ``start``.
             speed: fraction of the recorded speed, up to 1.
@@ -250,7 +250,7 @@ class Recording:
         of objects, and the ``tool`` point and its ``speed`` at the times ``t``.
 
         Args:
-            start: begin of the part [s] after that of the recording; None for that of the episode
+            start: start of the part [s] after that of the recording; None for that of the episode
                 if the file is one, which may be trimmed, or else of the recording.
             end: its end [s]; None as for ``start``.
             targets: places (3,) [m] in the base frame where objects should stand at the end, by
@@ -280,7 +280,7 @@ class Recording:
 
         Args:
             speed: factor on the recorded time, above 0.
-            start: begin of the part [s] after that of the recording; None for that of the episode
+            start: start of the part [s] after that of the recording; None for that of the episode
                 if the file is one, which may be trimmed, or else of the recording.
             end: its end [s]; None as for ``start``.
             port: TCP port of the scene, or the next free one above it.

@@ -10,7 +10,7 @@ from katana450.arm.control.state import Finding, Reason, State
 
 @dataclass(frozen=True)
 class LogEntry:
-    """The begin or the end of one finding, with the numbers it had then.
+    """The start or the end of one finding, with the numbers it had then.
 
     Attributes:
         t: time [s] on the clock of the states.

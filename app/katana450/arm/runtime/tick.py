@@ -36,7 +36,7 @@ class TickRecord(NamedTuple):
         t_before: time of the state that it stepped from [s]; that of the tick before, or later if
             the arm rested until a command came.
         t: time of the tick [s].
-        submissions: its commands with their givers, as drained from the mailbox.
+        submissions: its commands as taken from the mailbox, with who gave each.
         failed: whether an internal error made the arm hold.
         state: the state after it, with the driver's answer in ``q`` and ``gripper``.
     """

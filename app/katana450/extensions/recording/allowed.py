@@ -1,6 +1,7 @@
 """The types of values that a recording can hold: those that commands and states are made of.
 
-A form of any other type is refused, so that reading a file creates only values of these types.
+A value of any other type in a file is refused, so that reading it creates only values of these
+types.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ ROWS: Final[tuple[type, ...]] = (Liquid, Parcel, Puddle)
 """Named tuples, which are written as rows."""
 
 CLASSES: Final[tuple[type, ...]] = (
-    # The commands and their givers.
+    # Commands, and who gave them.
     *get_args(cmd.Command),
     *(Actor, Person, stop_cause.StopCause, Appearance, LinkAppearance),
     # The state and its mode.
@@ -96,7 +97,7 @@ MEMBERS: Final[Mapping[Any, Any]] = {
     Callable: PROFILES,
     DragTarget: ToolTarget | ToolPose,
 }
-"""Types that stand for a protocol in the fields of plans."""
+"""The types that a field may hold whose type is a protocol or a union, by that type."""
 
 SHARED: Final[tuple[type, ...]] = (Plan, solid.Solid)
 """Large values that are written once and then named by a key."""

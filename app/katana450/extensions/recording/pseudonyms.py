@@ -1,8 +1,8 @@
 """Records without the identities of people: a file that is passed on must not tell them.
 
 The key of a person names the session of a browser. It is replaced by a pseudonym, the same within
-one file, and the network address is left out. Names and roles stay. The rules of the arm only
-carry keys along, so a simulation with pseudonyms gives the same states with pseudonyms.
+one file, and the network address is left out. Names and roles stay. Keys do
+not influence the motion, so a simulation of these records gives the same motion.
 """
 
 from __future__ import annotations

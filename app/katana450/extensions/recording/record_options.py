@@ -121,7 +121,7 @@ def add_part_options(parser: argparse.ArgumentParser, *, episode: bool = False) 
         type=_seconds,
         default=None if episode else 0.0,
         metavar="S",
-        help=f"begin of the part, in seconds after the begin of the recording (default: {whole})",
+        help=f"start of the part, in seconds after the start of the recording (default: {whole})",
     )
     parser.add_argument(
         "--to",
@@ -129,7 +129,7 @@ def add_part_options(parser: argparse.ArgumentParser, *, episode: bool = False) 
         type=_seconds,
         default=None if episode else math.inf,
         metavar="S",
-        help=f"end of the part, in seconds after the begin of the recording (default: {whole})",
+        help=f"end of the part, in seconds after the start of the recording (default: {whole})",
     )
 
 

@@ -39,7 +39,7 @@ class TickInput:
     Attributes:
         t: time of the tick [s].
         t_before: time of the state that it steps from [s]; None for that of the tick before.
-        submissions: its commands with their givers.
+        submissions: its commands, with who gave each.
         sent: the answer of the driver; None if it is the setpoint.
         failed: whether an internal error made the arm hold.
         digest: digest of the state after it.

@@ -68,7 +68,7 @@ TOPICS: Final = (
         COMMANDS,
         "katana450.Tick",
         _object(
-            "one tick of the control loop: its commands with their givers, as drained",
+            "one tick of the control loop: its commands as the loop took them, with who gave each",
             ("t",),
             t=T,
             t_before=_number("time [s] of the state before it, unless that of the last tick"),

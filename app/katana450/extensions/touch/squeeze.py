@@ -43,7 +43,7 @@ MARGIN = 1e-3
 """
 
 FIRST_SQUEEZE, GROWTH = 0.02, 2.0
-"""[rad, 1] Begin of the search for a force, and the growth of its steps."""
+"""[rad, 1] Start of the search for a force, and the growth of its steps."""
 
 POWER = 2.0 / 3.0
 """[1] Power of the force that grows about as the squeeze does."""

@@ -24,7 +24,7 @@ MAX_FAILURES = 2
 """Failures in a row after which the path counts as missing."""
 
 WELL, WITHOUT_ARM = b"HTTP/1.1 200", b"HTTP/1.1 503"
-"""Begin of an answer of a healthy server, and of one that has no answer from the arm."""
+"""Start of an answer of a healthy server, and of one that has no answer from the arm."""
 
 REQUEST = b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
@@ -71,7 +71,7 @@ async def watch_stop_path(
 
 
 async def _answer(host: str, port: int, tls: ssl.SSLContext | None) -> bytes:
-    """Return the begin of the answer, up to its status."""
+    """Return the start of the answer, up to its status."""
     reader, writer = await asyncio.open_connection(host, port, ssl=tls)
     try:
         writer.write(REQUEST)

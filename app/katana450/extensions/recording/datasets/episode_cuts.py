@@ -72,7 +72,7 @@ def cuts_in(
         file: the recording.
         task: task of an episode that has none.
         outcomes: outcomes of the episodes to return; a recording without episodes has none.
-        part: begin and end of an episode that is the recording, in seconds after its begin.
+        part: begin and end of an episode that is the recording, in seconds after its start.
 
     Raises:
         InputError: an episode has no task, or a part is asked for of a recording with episodes.

@@ -48,7 +48,7 @@ class LerobotOptions:
         fps: frames per second.
         task: task of episodes that have none.
         outcomes: outcomes of the episodes to take.
-        part: part of a recording without episodes, in seconds after its begin.
+        part: part of a recording without episodes, in seconds after its start.
         views: names of the cameras.
         size: width and height of their pictures [px].
     """

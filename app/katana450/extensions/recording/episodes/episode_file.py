@@ -47,7 +47,7 @@ def only_episode(file: RecordingFile) -> Episode:
 
 
 def shown_part(file: RecordingFile, start: float | None, end: float | None) -> tuple[float, float]:
-    """Return begin and end of a part of ``file``, in seconds after its begin. Raises InputError.
+    """Return begin and end of a part of ``file``, in seconds after its start. Raises InputError.
 
     Each is ``start`` or ``end`` if that is given. Else it is that of the episode, which may be
     trimmed, if the file was cut out as that of one episode; else it is that of the file.

@@ -46,7 +46,7 @@ def add_episode_options(parser: argparse.ArgumentParser) -> None:
             type=float,
             required=True,
             metavar="S",
-            help="seconds after the begin of its file",
+            help="seconds after the start of its file",
         )
     recover = acts.add_parser(
         "recover", help="finish the episode that ran when a server ended, without that server"

@@ -123,8 +123,8 @@ class TrimEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="trim"):
 
     Attributes:
         number: The episode.
-        start: First moment, in seconds after the begin of its file.
-        end: Last moment, in seconds after the begin of its file.
+        start: First moment, in seconds after the start of its file.
+        end: Last moment, in seconds after the start of its file.
     """
 
     number: Number

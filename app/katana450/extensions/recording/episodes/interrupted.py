@@ -111,7 +111,7 @@ def _run_of(path: Path) -> str | None:
 
 
 def _extent(sources: list[Path]) -> tuple[float, float, int]:
-    """Return the begin and the end [s] of ``sources``, and the number of their states."""
+    """Return the start and the end [s] of ``sources``, and the number of their states."""
     starts, ends, states = [], [], 0
     for path in sources:
         with RecordingFile.open(path) as file:

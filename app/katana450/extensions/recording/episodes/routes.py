@@ -131,7 +131,7 @@ def giver_of(actor: Actor) -> EpisodeGiver:
 
 
 def described(kept: KeptEpisode) -> dict[str, Any]:
-    """Return an episode for a list, with times in seconds after the begin of its file."""
+    """Return an episode for a list, with times in seconds after the start of its file."""
     episode = kept.episode
     end = kept.end if episode.end is None else episode.end
     return {

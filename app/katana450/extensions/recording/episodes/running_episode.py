@@ -1,4 +1,4 @@
-"""The episode that runs, from its begin to its file."""
+"""The episode that runs, from its start to its file."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ MAX_RECORD_BYTES = 256_000_000
 """Maximum size of a record; only an attachment is that large."""
 
 PART_START: Final = "part_start_s"
-"""Name of the metadata with the begin of a part that was cut out of a recording [s]."""
+"""Name of the metadata with the start of a part that was cut out of a recording [s]."""
 
 WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
 """Pattern of a whole number of nanoseconds."""
@@ -207,7 +207,7 @@ class RecordingFile:
     def start(self) -> float:
         """Time at which the recording begins [s]; 0 if it is empty.
 
-        Ticks before the begin of a part that was cut out serve its simulation only.
+        Ticks before the start of a part that was cut out serve its simulation only.
         """
         first = min((each.message_start_time for each in self._chunks), default=0) / NANO
         try:

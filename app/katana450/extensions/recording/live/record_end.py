@@ -132,7 +132,7 @@ def lost_message(count: int, until: float) -> bytes:
 
 
 LOST = b"lost "
-"""Begin of the message about lost records; that of a record begins with another byte."""
+"""Start of the message about lost records; that of a record begins with another byte."""
 
 
 def lost_records(message: bytes) -> tuple[int, float] | None:

@@ -95,7 +95,7 @@ def _command(store: RecordingStore, query: Mapping[str, str]) -> tuple[str, ...]
         run = store.run(name)
         if name != RING:
             file = store.file(name)
-            # The command counts from the begin of the file.
+            # The command counts from the start of the file.
             begin = run.spans[0].start
             part = {end: max(t - begin, 0.0) for end, t in times.items() if end != "last"}
             return ("trim", str(file), *_options(part))

@@ -39,10 +39,10 @@ MAGIC_BYTES: Final = 8
 HEAD: Final = struct.Struct("<BQ")
 """Operation code and length of a record."""
 TIMES: Final = struct.Struct("<QQQ")
-"""Begin of a chunk: its first and last time [ns], and its unpacked size [bytes]."""
+"""Start of a chunk: its first and last time [ns], and its unpacked size [bytes]."""
 CHANNEL: Final = struct.Struct("<H")
 MESSAGE: Final = struct.Struct("<HIQQ")
-"""Begin of a message: channel, number of the tick, log time and publish time [ns]."""
+"""Start of a message: channel, number of the tick, log time and publish time [ns]."""
 
 METADATA_CODE, MESSAGE_CODE, CHUNK_CODE, INDEX_CODE, END_CODE = 0x0C, 0x05, 0x06, 0x07, 0x0F
 

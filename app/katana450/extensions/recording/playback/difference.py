@@ -15,7 +15,7 @@ MAX_POINTS = 200
 
 
 class RunDifference(NamedTuple):
-    """Differences at times ``t`` [s] since the begin of both runs.
+    """Differences at times ``t`` [s] since the start of both runs.
 
     Attributes:
         t: the times [s].

@@ -42,7 +42,7 @@ def at_place(spans: Sequence[Span], place: float) -> float:
 
 
 def place_of(spans: Sequence[Span], t: float) -> float:
-    """Return the place [s] of ``t`` [s] on the axis; inside a rest, that of its begin."""
+    """Return the place [s] of ``t`` [s] on the axis; inside a rest, that of its start."""
     place = 0.0
     for span in spans:
         if t < span.start:

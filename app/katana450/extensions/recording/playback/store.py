@@ -27,7 +27,7 @@ MAX_FILE_BYTES = 200_000_000
 """Maximum size of a file: three hours of motion without a pause."""
 
 PREFIX = "katana450-opened-"
-"""Begin of the names of the temporary folders of servers."""
+"""Start of the names of the temporary folders of servers."""
 
 AnyRun = PlaybackRun | OpenedRun
 """The last minutes, or an opened file."""

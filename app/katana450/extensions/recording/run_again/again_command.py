@@ -63,7 +63,7 @@ def again(options: Namespace) -> int:
 def part_and_script(
     file: RecordingFile, found: DescribedRobot, start: float | None, end: float | None
 ) -> tuple[RecordedPart, str]:
-    """Return the part of ``file`` from ``start`` to ``end`` [s] after its begin, and its script.
+    """Return the part of ``file`` from ``start`` to ``end`` [s] after its start, and its script.
 
     None: see ``shown_part``. Raises InputError as ``read_part`` and ``again_script``.
     """

@@ -32,7 +32,7 @@ class RecordedPart:
     """The N states of a part of a recording.
 
     Attributes:
-        t: (N,) times since the begin of the recording [s], rising.
+        t: (N,) times since the start of the recording [s], rising.
         setpoint: (N, 5) setpoints of the joints [rad].
         fingers: (N,) setpoint of the finger joint [rad or m].
         waiting: (N,) whether the arm was paused or stopped from this state on.
@@ -75,7 +75,7 @@ class RecordedPart:
 def read_part(
     file: RecordingFile, start: float = 0.0, end: float = math.inf, *, name: str = "recording"
 ) -> RecordedPart:
-    """Return the part of ``file`` from ``start`` to ``end`` [s] after its begin.
+    """Return the part of ``file`` from ``start`` to ``end`` [s] after its start.
 
     Raises InputError for a robot without a tool, a part without motion or with a gap, and a damaged
     file.

@@ -61,9 +61,16 @@ def score_file(
     targets: Mapping[str, np.ndarray] | Places | None = None,
     urdf: Path | None = None,
 ) -> Scored:
-    """Return the score of the recording at ``path``; see ``scored``, and for None ``shown_part``.
+    """Return the score of the recording at ``path``.
 
-    ``urdf``: file of the recorded robot, if it is not that of this program. Raises InputError.
+    Args:
+        path: file of the recording.
+        start: [s] start of the part that counts; None: as ``shown_part`` says.
+        end: [s] its end; None: as ``shown_part`` says.
+        targets: places (3,) [m] where objects should end, by name; see ``scored``.
+        urdf: file of the recorded robot, if it is not that of this program.
+
+    Raises InputError.
     """
     with RecordingFile.open(path) as file:
         robot = session_for(file, urdf)

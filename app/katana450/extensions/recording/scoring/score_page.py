@@ -41,7 +41,7 @@ def score_page(board: Leaderboard, written: datetime) -> str:
     half = 0.5 * (WIDTH - 20.0)
     views = [
         _figure(
-            f"Path of the tool from {side}",
+            f"Path of the tool seen from {side}",
             [(1e3 * each.tool[:, 0], 1e3 * each.tool[:, up]) for each in board.rows],
             "x, mm",
             f"{'xyz'[up]}, mm",
@@ -51,7 +51,7 @@ def score_page(board: Leaderboard, written: datetime) -> str:
                 (1e3 * each.measured[:, 0], 1e3 * each.measured[:, up]) for each in board.rows
             ],
         )
-        for side, up in (("above", 1), ("aside", 2))
+        for side, up in (("above", 1), ("the side", 2))
     ]
     names = ", ".join(each.name for each in board.rows)
     return PAGE.format(
@@ -230,7 +230,7 @@ polyline:nth-of-type(even) {{ stroke-dasharray: 7 5; }}
 </table></div>
 <p class="legend">{legend}</p>
 <div class="figures">{speed}{views}</div>
-<footer>A dot marks the begin of a path.{dotted} Made by katana450, {written}.</footer>
+<footer>A dot marks the beginning of a path.{dotted} Made by katana450, {written}.</footer>
 </html>
 """
 """Template of the page."""

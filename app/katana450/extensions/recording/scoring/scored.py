@@ -121,14 +121,14 @@ def scored(
     *,
     name: str = "recording",
 ) -> Scored:
-    """Return the score of ``file`` from ``start`` to ``end`` [s] after its begin.
+    """Return the score of ``file`` from ``start`` to ``end`` [s] after its start.
 
     The recorded commands are simulated again, so that every state is complete.
 
     Args:
         file: the recording.
         robot: the recorded robot and its rules.
-        start: begin of the part [s].
+        start: start of the part [s].
         end: end of the part [s].
         targets: places at which objects should stand at the end.
         name: name of the recording.
