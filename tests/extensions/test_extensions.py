@@ -173,7 +173,7 @@ def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:
     blocked = "katana450.extensions.importers"
     output = katana450("serve", "--scene", "scene.yaml", folder=blocking, blocked=blocked)
     assert output.startswith("2 ")
-    assert "unrecognized arguments: --scene" in output
+    assert "katana450 serve: error: unrecognized arguments: --scene" in output
 
 
 @pytest.mark.long

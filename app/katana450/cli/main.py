@@ -19,7 +19,12 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit status: 0 done, 1 failed, 2 wrong arguments."""
-    options = _parser().parse_args(arguments)
+    options, unknown = _parser().parse_known_args(arguments)
+    # The options are sent to other processes, which cannot receive a parser.
+    parser: argparse.ArgumentParser = vars(options).pop("parser")
+    if unknown:
+        # The parser of the command shows the usage of the command, and not that of all.
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     command: CliCommand = options.command
     try:
         for each in extensions():
@@ -64,5 +69,5 @@ def _parser() -> argparse.ArgumentParser:
             continue
         options = commands.add_parser(command.name, help=command.help)
         command.add_options(options)
-        options.set_defaults(command=command)
+        options.set_defaults(command=command, parser=options)
     return parser
