@@ -125,11 +125,11 @@ def composed(text: str, what: str, file: str) -> yaml.Node | None:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
-        problem = f"This cannot be read: {error.problem or error.context or 'this is not YAML'}."
+        problem = f"This is not valid YAML: {error.problem or error.context or 'unknown syntax'}."
         raise ScriptError((Problem(line, column, problem, file),)) from error
     except yaml.YAMLError as error:
         # The text has a character that YAML does not allow.
-        problem = f"This cannot be read: {str(error).splitlines()[0]}."
+        problem = f"This is not valid YAML: {str(error).splitlines()[0]}."
         line = text[: getattr(error, "position", 0) or 0].count("\n") + 1
         raise ScriptError((Problem(line, 1, problem, file),)) from error
 
