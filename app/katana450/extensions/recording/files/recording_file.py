@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, Final, NamedTuple, Self
 
 import zstandard
-from mcap.exceptions import McapError
+from mcap.exceptions import InvalidMagic, McapError
 from mcap.reader import SeekingReader
 from mcap.records import Chunk, ChunkIndex
 from mcap.records import Message as McapMessage
@@ -48,6 +48,13 @@ FAULTS: Final = (
     EOFError,
 )
 """Errors that reading a damaged file raises."""
+
+
+def unreadable(path: Path, error: Exception) -> InputError:
+    """Return why the file at ``path`` cannot be read, for one of FAULTS."""
+    if isinstance(error, InvalidMagic):
+        return InputError(f"{path} is not a recording: it does not begin as MCAP files do.")
+    return InputError(f"{path} is not a recording, or is damaged: {error or type(error).__name__}.")
 
 
 class Message(NamedTuple):
@@ -197,9 +204,7 @@ class RecordingFile:
         except InputError:
             raise
         except FAULTS as error:
-            raise InputError(
-                f"{self.path} is not a recording, or is damaged: {error or type(error).__name__}."
-            ) from error
+            raise unreadable(self.path, error) from error
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
 

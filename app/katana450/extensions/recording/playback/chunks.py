@@ -25,6 +25,7 @@ from katana450.extensions.recording.files.recording_file import (
     checked_size,
     records_at,
     unpacked,
+    unreadable,
     utc_offset_of,
 )
 from katana450.extensions.recording.state_message import NANO
@@ -92,8 +93,7 @@ class ChunkIndex:
             with self.path.open("rb") as file:
                 self._scan(file)
         except FAULTS as error:
-            why = str(error) or type(error).__name__
-            raise InputError(f"{self.path} is not a recording, or is damaged: {why}.") from error
+            raise unreadable(self.path, error) from error
         except OSError as error:
             raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
 
