@@ -8,8 +8,10 @@ from pathlib import Path
 from katana450.resources import URDF_PATH
 
 
-def add_arm_options(parser: argparse.ArgumentParser, *, names: bool = True) -> None:
-    """Add ``--urdf`` and ``--tool`` to ``parser``, and with ``names`` also ``--arm``."""
+def add_arm_options(
+    parser: argparse.ArgumentParser, *, names: bool = True, tool: bool = True
+) -> None:
+    """Add ``--urdf`` to ``parser``, with ``names`` also ``--arm``, and with ``tool`` ``--tool``."""
     if names:
         parser.add_argument(
             "--arm",
@@ -25,9 +27,10 @@ def add_arm_options(parser: argparse.ArgumentParser, *, names: bool = True) -> N
         help="another robot; `serve` drives the tool of an arm, and any other tree joint by joint "
         "(default: the Katana450)",
     )
-    parser.add_argument(
-        "--tool", metavar="LINK", help="link to which targets refer (default: the last one)"
-    )
+    if tool:
+        parser.add_argument(
+            "--tool", metavar="LINK", help="link to which targets refer (default: the last one)"
+        )
 
 
 def _name(text: str) -> str:

@@ -1,4 +1,4 @@
-"""The initial camera of the exported files of a robot."""
+"""Cameras that see a whole robot, whatever its size."""
 
 from __future__ import annotations
 
@@ -22,6 +22,10 @@ DISTANCE_FACTOR = 0.7
 ball."""
 
 
+MARGIN = 1.06
+"""Ratio of the picture's size to that of the robot in it."""
+
+
 class InitialCamera(NamedTuple):
     """A camera: eye and target (3,) in the root's frame [m]; z is up."""
 
@@ -38,3 +42,32 @@ def camera(robot: Robot) -> InitialCamera:
     return InitialCamera(
         target - direction * DISTANCE_FACTOR * radius / math.sin(FIELD_OF_VIEW / 2.0), target
     )
+
+
+def fitted(points: FloatArray, direction: FloatArray) -> InitialCamera:
+    """Return the nearest camera along ``direction`` (3,) whose square picture has all ``points``.
+
+    ``points``: (n, 3) [m] in the root's frame.
+    """
+    R = looking(direction)
+    seen = points @ R
+    tangent = math.tan(FIELD_OF_VIEW / 2.0) / MARGIN
+    # A point at depth z (towards the camera) is in the picture if |x - eye_x| is at most
+    # (eye_z - z) tan: two bounds for each of x and y, which meet at the nearest camera.
+    right = (seen[:, :2] + seen[:, 2:] * tangent).max(axis=0)
+    left = (seen[:, :2] - seen[:, 2:] * tangent).min(axis=0)
+    middle = (right + left) / 2.0
+    depth = float(np.max(right - left)) / 2.0 / tangent + 1e-3
+    return InitialCamera(R @ (*middle, depth), R @ (*middle, float(seen[:, 2].mean())))
+
+
+def looking(direction: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) in the root of a camera along ``direction`` (3,).
+
+    Its x points right, y up and -z ahead. Seen from above, y of the root is up.
+    """
+    back = -direction / np.linalg.norm(direction)
+    right = np.cross((0.0, 0.0, 1.0), back)
+    size = float(np.linalg.norm(right))
+    right = right / size if size > 1e-9 else np.array([1.0, 0.0, 0.0])
+    return np.column_stack((right, np.cross(back, right), back))

@@ -7,10 +7,10 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from katana450.cli.arm_options import add_arm_options
 from katana450.errors import InputError
 from katana450.extension import CliCommand, Extension, ServeExtension
 from katana450.extensions.export.formats import FORMATS, named
-from katana450.resources import URDF_PATH
 
 if TYPE_CHECKING:
     from katana450.arm.control.scene_objects import Environment
@@ -72,14 +72,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         metavar="SCRIPT",
         help="html: run that the page plays: circle, pour or the file of a script",
     )
-    parser.add_argument(
-        "--urdf",
-        type=Path,
-        default=URDF_PATH,
-        metavar="FILE",
-        help="another mechanism: any tree of revolute, prismatic and mimic joints "
-        "(default: the Katana450)",
-    )
+    add_arm_options(parser, tool=False)
 
 
 def _export(options: argparse.Namespace) -> int:

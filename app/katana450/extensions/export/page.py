@@ -21,7 +21,7 @@ def write_page(options: argparse.Namespace) -> int:
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path} must end in .html.")
     check_writable(path)
-    shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
+    shown = chosen(options)
     title = f"{shown.robot.name}: {_shown(options.run, options.trajectory)}"
     count = int(shown.duration * FPS) + 1
     states = [shown.at(number / FPS) for number in range(count)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import numpy as np
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import describe_robot
+from katana450.assembly.robot_session import find_robot
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.settings import Settings
@@ -45,13 +46,13 @@ class Playback(NamedTuple):
         return (len(self.states) - 1) / self.rate
 
 
-def chosen(run: str | None, trajectory: Path | None, pose: Sequence[float], urdf: Path) -> Playback:
-    """Return the playback of a script or demo, else of a table, else of a pose."""
-    if run is not None:
-        return of_script(run, urdf)
-    if trajectory is not None:
-        return of_trajectory(trajectory, urdf)
-    return of_pose(pose, urdf)
+def chosen(options: Namespace) -> Playback:
+    """Return the playback of ``options.run``, else of ``options.trajectory``, else of a pose."""
+    if options.run is not None:
+        return of_script(options.run, options.urdf)
+    if options.trajectory is not None:
+        return of_trajectory(options.trajectory, options.urdf)
+    return of_pose(options.pose, options.urdf)
 
 
 def of_script(name: str, urdf: Path) -> Playback:
@@ -80,8 +81,8 @@ def of_script(name: str, urdf: Path) -> Playback:
 
 
 def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
-    """Return the arm at rest at ``pose``, values of the driven joints [rad]; ready if empty."""
-    robot, session, _ = _described(urdf)
+    """Return the robot at rest with its driven joints at ``pose`` [rad, m]; ready if empty."""
+    robot, session = _described(urdf)
     if not pose:
         return Playback(robot, session, [_at_rest(session)], 1.0)
     return Playback(robot, session, [_standing(robot, session, robot.values(pose))], 1.0)
@@ -89,7 +90,7 @@ def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
 
 def of_trajectory(path: Path, urdf: Path) -> Playback:
     """Return the motion of a table of joint values. Raises InputError for an invalid file."""
-    robot, session, _ = _described(urdf)
+    robot, session = _described(urdf)
     motion, rate = load_motion(path, robot), Settings().rate
     t = np.arange(int(motion.t[-1] * rate) + 1) / rate
     rows = {name: np.interp(t, motion.t, values) for name, values in motion.values.items()}
@@ -100,20 +101,22 @@ def of_trajectory(path: Path, urdf: Path) -> Playback:
     return Playback(robot, session, states, rate)
 
 
-def _described(urdf: Path) -> tuple[Robot, Session, tuple[str, ...]]:
-    robot, session, notes = describe_robot(Settings(), urdf, None)
+def _described(urdf: Path) -> tuple[Robot, Session]:
+    robot, session, notes = find_robot(Settings(), urdf, None)
     for note in notes:
         print(f"katana450: {note}", file=sys.stderr)
-    return robot, session, notes
+    return robot, session
 
 
 def _at_rest(session: Session) -> State:
     """Return the state of an arm at rest in its ready posture."""
-    return session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
+    gripper = 0.0 if session.arm is None else session.arm.gripper.clamp(0.0)
+    return session.begin(session.ready, gripper, 0.0)
 
 
 def _standing(robot: Robot, session: Session, values: dict[str, float], t: float = 0.0) -> State:
-    arm = robot.require_arm()
-    q = np.array([values[name] for name in arm.chain.names])
-    driven = [name for name, follows in arm.fingers.items() if follows == (1.0, 0.0)]
+    names = robot.driven if robot.arm is None else robot.arm.chain.names
+    q = np.array([values[name] for name in names])
+    fingers = {} if robot.arm is None else robot.arm.fingers
+    driven = [name for name, follows in fingers.items() if follows == (1.0, 0.0)]
     return session.begin(q, values[driven[0]] if driven else 0.0, t)

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+
+import viser
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
+from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
+from katana450.server.view.machine_nodes import MachineNodes
+from katana450.server.view.room import set_up_room
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.traces import Traces
+from katana450.server.viser_bridge.presets import Preset
 from katana450.server.viser_bridge.recording_page import titled
 from katana450.server.viser_bridge.viser_server import close_server, open_server
 
@@ -27,16 +33,32 @@ def recorded(
     # The key is secret, so no client connects: only the messages of the server are used.
     server = open_server(secrets.token_hex())
     try:
-        scenery = Scenery(server, robot, session, load_props(), NoGestures(), Meshes())
-        traces = Traces(server, robot.require_arm())
+        show = _scene(server, robot, session)
+        look, camera = fixed_pose(Preset.FREE, robot), server.initial_camera
+        camera.position, camera.look_at = look.position, look.target
         recording = server.get_scene_serializer()
         number = 0
         for number, state in enumerate(states):
             if number:
                 recording.insert_sleep(interval)
-            scenery.show(state)
-            traces.follow(state)
+            show(state)
         caption = f"{title}, {number * interval:.1f} s" if number else title
         return titled(recording.as_html(), title, caption)
     finally:
         close_server(server)
+
+
+def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callable[[State], None]:
+    """Build the scene of ``robot``; return what shows a state in it."""
+    if robot.arm is None:
+        set_up_room(server)
+        nodes = MachineNodes(server, robot)
+        return lambda state: nodes.move(robot.joint_values(state.q, state.gripper))
+    scenery = Scenery(server, robot, session, load_props(), NoGestures(), Meshes())
+    traces = Traces(server, robot.arm)
+
+    def show(state: State) -> None:
+        scenery.show(state)
+        traces.follow(state)
+
+    return show

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.robot.initial_camera import FIELD_OF_VIEW
+from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, looking
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
@@ -28,7 +28,7 @@ from katana450.extensions.export.trajectory_file import RecordedMotion
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
 from katana450.extensions.export.vrml_text import world_text
-from katana450.extensions.export.vrml_views import looking, views
+from katana450.extensions.export.vrml_views import views
 from katana450.extensions.export.x3d_text import x3d_text
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
 
-from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, VIEW_DIRECTION, InitialCamera
+from katana450.arm.robot.initial_camera import VIEW_DIRECTION, InitialCamera, fitted
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -21,9 +20,6 @@ DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
 
 TOOL = "Tool"
 """Name of the viewpoint of the links behind the last axis of an arm."""
-
-MARGIN = 1.06
-"""Ratio of the picture's size to that of the robot in it."""
 
 
 def views(robot: Robot, values: Mapping[str, float]) -> dict[str, InitialCamera]:
@@ -46,32 +42,3 @@ def views(robot: Robot, values: Mapping[str, float]) -> dict[str, InitialCamera]
         if behind:
             found[TOOL] = fitted(np.concatenate(behind), np.array(VIEW_DIRECTION))
     return found
-
-
-def fitted(points: FloatArray, direction: FloatArray) -> InitialCamera:
-    """Return the nearest camera along ``direction`` (3,) whose square picture has all ``points``.
-
-    ``points``: (n, 3) [m] in the root's frame.
-    """
-    R = looking(direction)
-    seen = points @ R
-    tangent = math.tan(FIELD_OF_VIEW / 2.0) / MARGIN
-    # A point at depth z (towards the camera) is in the picture if |x - eye_x| is at most
-    # (eye_z - z) tan: two bounds for each of x and y, which meet at the nearest camera.
-    right = (seen[:, :2] + seen[:, 2:] * tangent).max(axis=0)
-    left = (seen[:, :2] - seen[:, 2:] * tangent).min(axis=0)
-    middle = (right + left) / 2.0
-    depth = float(np.max(right - left)) / 2.0 / tangent + 1e-3
-    return InitialCamera(R @ (*middle, depth), R @ (*middle, float(seen[:, 2].mean())))
-
-
-def looking(direction: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) in the root of a camera along ``direction`` (3,).
-
-    Its x points right, y up and -z ahead. Seen from above, y of the root is up.
-    """
-    back = -direction / np.linalg.norm(direction)
-    right = np.cross((0.0, 0.0, 1.0), back)
-    size = float(np.linalg.norm(right))
-    right = right / size if size > 1e-9 else np.array([1.0, 0.0, 0.0])
-    return np.column_stack((right, np.cross(back, right), back))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from katana450.cli.arm_options import add_arm_options
 from katana450.extension import CliCommand, Extension
 from katana450.extensions.export.extension import joint_values
-from katana450.resources import URDF_PATH
 
 CAMERAS = ("free", "front", "side", "top", "tool")
 """Camera presets, as on the page; the first is its 3D view."""
@@ -66,13 +66,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         "--fps", type=float, default=25.0, help="pictures per second (default: %(default)g)"
     )
     parser.add_argument("--theme", choices=THEMES, default=THEMES[0])
-    parser.add_argument(
-        "--urdf",
-        type=Path,
-        default=URDF_PATH,
-        metavar="FILE",
-        help="another arm: pan, three parallel axes, roll (default: the Katana450)",
-    )
+    add_arm_options(parser, tool=False)
 
 
 def _size(text: str) -> tuple[int, int]:

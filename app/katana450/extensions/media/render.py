@@ -39,21 +39,22 @@ def render(options: argparse.Namespace) -> int:
     if kind == ".mp4":
         check_filmable(options.size, options.fps)
     shot = Shot(Preset[options.camera.upper()], options.size, options.theme.title())
-    shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
+    shown = chosen(options)
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)
         stage = RenderStage(shown.robot, shown.session, load_props())
         taken = shot.taken(stage, shown.robot, state, STILL)
         write_files({path: writer_of(taken.png)})
     else:
-        _film(path, shown, shot, options.fps, options.urdf)
+        _film(path, shown, shot, options)
     print(f"{path}: {path.stat().st_size} bytes")
     return 0
 
 
-def _film(path: Path, shown: Playback, shot: Shot, fps: float, urdf: Path) -> None:
+def _film(path: Path, shown: Playback, shot: Shot, options: argparse.Namespace) -> None:
+    fps: float = options.fps
     count = int(shown.duration * fps) + 1
     states = (shown.at(number / fps) for number in range(count))
-    with RenderingPool((shot,), urdf, shown.bare, count) as pool:
+    with RenderingPool((shot,), options.urdf, shown.bare, count) as pool:
         pictures = (taken for (taken,) in pool.pictures(states))
         write_film(path, progress(pictures, count, path.name), shot.size, fps)

@@ -23,7 +23,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import describe_robot
+from katana450.assembly.robot_session import find_robot
 from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.picture import MOVING, Picture, picture
 from katana450.extensions.media.stage import RenderStage
@@ -47,7 +47,7 @@ class Shot(NamedTuple):
 
     def taken(self, stage: RenderStage, robot: Robot, state: State, rays: int) -> Picture:
         """Return the picture of ``state`` with ``rays`` per pixel and kind of light."""
-        view = camera_pose(self.preset, robot.require_arm(), state)
+        view = camera_pose(self.preset, robot, state)
         camera = Camera(view.position, view.target, float(FOV), self.size)
         theme: Theme = THEMES[self.theme]
         return picture(stage.items(state), stage.water(state), camera, theme, rays)
@@ -56,7 +56,13 @@ class Shot(NamedTuple):
 class RenderingPool:
     """Processes that render pictures of states. A context: they end with it."""
 
-    def __init__(self, shots: Sequence[Shot], urdf: Path, bare: bool, count: int) -> None:
+    def __init__(
+        self,
+        shots: Sequence[Shot],
+        urdf: Path,
+        bare: bool,
+        count: int,
+    ) -> None:
         """Start when the first picture is taken.
 
         Args:
@@ -119,7 +125,7 @@ def _begin(shots: tuple[Shot, ...], urdf: Path, bare: bool) -> None:
     # Processes of a pool would wait for ever for work of a parent that was killed.
     threading.Thread(target=_end_with_parent, daemon=True).start()
     session: Session
-    robot, session, _ = describe_robot(replace(Settings(), bare=bare), urdf, None)
+    robot, session, _ = find_robot(replace(Settings(), bare=bare), urdf, None)
     _studios.append(_Studio(shots, robot, RenderStage(robot, session, load_props())))
 
 

@@ -33,12 +33,13 @@ class RenderStage:
 
     def __init__(self, robot: Robot, session: Session, props: Props) -> None:
         """Read the shapes. ``session`` gives the poses of objects and water."""
-        self._robot, arm = robot, robot.require_arm()
+        self._robot = robot
         self._session = session
         self._links = {link.name: link.shapes for link in robot.links}
         self._table = _in_file(props.table.mesh)
         self._known = {"cup": _in_file(props.cup.mesh), "basin": _in_file(props.basin.mesh)}
-        self._stretches = [_BendableStretch(stretch) for stretch in arm.stretches]
+        stretches = () if robot.arm is None else robot.arm.stretches
+        self._stretches = [_BendableStretch(stretch) for stretch in stretches]
 
     def items(self, state: State) -> list[Item]:
         """Return all opaque items."""

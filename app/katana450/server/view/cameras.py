@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 
 import numpy as np
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.initial_camera import fitted
+from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.viser_bridge.presets import CAMERA_POSES, CameraPose, Preset
 
 BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
-"""Offsets [m] of the tool camera.
+"""Offsets [m] of the tool camera, for a robot of the size of the Katana450.
 
 The camera is BEHIND and ABOVE the tool point and looks at the point AHEAD of it.
 """
 
 
+SIZE = 1.831
+"""[m] Diagonal of the bounds of the Katana450, for which the named views are made."""
+
+SIMILAR = 0.1
+"""[1] Difference in size below which a robot has the views of the Katana450 as they are."""
+
+
 class Cameras:
     """The cameras of all browsers. A camera on the tool follows it until another view is chosen."""
 
-    def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
-        self._arm = arm
+    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
+        self._robot = robot
         self._riding: dict[int, viser.ClientHandle] = {}
         self._lock = threading.Lock()
         server.on_client_disconnect(self._forget)
@@ -35,24 +44,28 @@ class Cameras:
             self._riding.pop(client.client_id, None)
             if preset is Preset.TOOL:
                 self._riding[client.client_id] = client
-        _turn(client, camera_pose(preset, self._arm, state))
+        _turn(client, camera_pose(preset, self._robot, state))
 
     def follow(self, state: State) -> None:
         """Move the cameras that are on the tool to where the tool of ``state`` is."""
         with self._lock:
             riding = list(self._riding.values())
         for client in riding:
-            _turn(client, camera_pose(Preset.TOOL, self._arm, state))
+            _turn(client, camera_pose(Preset.TOOL, self._robot, state))
 
     def _forget(self, client: viser.ClientHandle) -> None:
         with self._lock:
             self._riding.pop(client.client_id, None)
 
 
-def camera_pose(preset: Preset, arm: MountedArm, state: State) -> CameraPose:
-    """Return the camera pose of ``preset``; the tool camera depends on ``state``."""
-    if preset is not Preset.TOOL:
-        return CAMERA_POSES[preset]
+def camera_pose(preset: Preset, robot: Robot, state: State) -> CameraPose:
+    """Return the camera pose of ``preset`` for ``robot``.
+
+    The tool camera depends on ``state``. A robot without an arm has none: it is shown as by FREE.
+    """
+    if preset is not Preset.TOOL or robot.arm is None:
+        return fixed_pose(Preset.FREE if preset is Preset.TOOL else preset, robot)
+    arm = robot.arm
     chain = arm.chain_to(state.tool)
     T = arm.T_base_shoulder @ forward(chain, state.q)
     p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
@@ -60,7 +73,26 @@ def camera_pose(preset: Preset, arm: MountedArm, state: State) -> CameraPose:
     up = z - (z @ x) * x
     size = float(np.linalg.norm(up))
     up = up / size if size > MIN_UP_SINE else -T[:3, 2]
-    return CameraPose(_triple(p - BEHIND * x + ABOVE * up), _triple(p + AHEAD * x))
+    scale = scale_of(robot)
+    behind, above, ahead = scale * BEHIND, scale * ABOVE, scale * AHEAD
+    return CameraPose(_triple(p - behind * x + above * up), _triple(p + ahead * x))
+
+
+def fixed_pose(preset: Preset, robot: Robot) -> CameraPose:
+    """Return the pose of ``preset``, which is not TOOL, with all of a robot of another size."""
+    look = CAMERA_POSES[preset]
+    if scale_of(robot) == 1.0:
+        return look
+    corners = np.array(list(itertools.product(*np.transpose(robot.bounds).tolist())))
+    found = fitted(corners, np.subtract(look.target, look.position))
+    return CameraPose(_triple(found.eye), _triple(found.target))
+
+
+def scale_of(robot: Robot) -> float:
+    """Return the size of ``robot`` as a multiple of that of the Katana450; 1 for a similar one."""
+    low, high = robot.bounds
+    scale = float(np.linalg.norm(high - low)) / SIZE
+    return scale if abs(scale - 1.0) > SIMILAR else 1.0
 
 
 MIN_UP_SINE = 0.05

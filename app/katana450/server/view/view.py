@@ -124,9 +124,8 @@ class View(ViewUpdater):
         self._ellipsoid = EllipsoidNode(server, self._arm)
         for layer in view_options.layers:
             layer.attach(server, robot)
-        self._cameras = Cameras(server, self._arm)
+        self._cameras = Cameras(server, robot)
         if view_options.gizmo is not None:
-            # The named views are those of an arm of the size of the Katana.
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
         shows = DisplayOptions(

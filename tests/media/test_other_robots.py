@@ -1,0 +1,87 @@
+"""Pictures and pages of other robots: arms of other sizes, and robots without an arm."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from katana450.assembly.robot_session import find_robot
+from katana450.cli.main import main
+from katana450.extensions.export.playback import of_pose
+from katana450.resources import URDF_PATH
+from katana450.server.view.cameras import camera_pose
+from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
+from katana450.settings import Settings
+from tests.general_arms.links_of_arms import ur5e
+from tests.robot.hands import hand
+
+ASPECT = 16.0 / 9.0
+
+
+@pytest.fixture(params=[ur5e, hand])
+def urdf(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    path = tmp_path / f"{request.param.__name__}.urdf"
+    path.write_text(request.param())
+    return path
+
+
+@pytest.mark.parametrize("preset", CAMERA_POSES)
+def test_named_views_show_the_whole_robot(urdf: Path, preset: Preset) -> None:
+    robot, session, _ = find_robot(Settings(), urdf, None)
+    state = of_pose((), urdf).at(0.0)
+    look = camera_pose(preset, robot, state)
+    eye = np.array(look.position)
+    ahead = np.subtract(look.target, eye) / np.linalg.norm(np.subtract(look.target, eye))
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    frames = robot.frames(robot.joint_values(session.ready, 0.0))
+    corners = [
+        shape.corners @ frames[link.name][:3, :3].T + frames[link.name][:3, 3]
+        for link in robot.links
+        for shape in link.shapes
+    ]
+    seen = np.concatenate(corners) - eye
+    depth = seen @ ahead
+    assert depth.min() > 0.0
+    half = math.tan(FOV / 2.0)
+    assert np.abs(seen @ np.cross(right, ahead) / depth).max() < half
+    assert np.abs(seen @ right / depth).max() < half * ASPECT
+    # Not from far away either: it takes at least a sixth of the height or width.
+    sizes = [np.ptp(seen @ axis / depth) for axis in (right, np.cross(right, ahead))]
+    assert max(sizes) > half / 3.0
+
+
+def test_katana_keeps_its_views() -> None:
+    robot, _, _ = find_robot(Settings(), URDF_PATH, None)
+    state = of_pose((), URDF_PATH).at(0.0)
+    for preset, look in CAMERA_POSES.items():
+        assert camera_pose(preset, robot, state) == look
+
+
+def test_picture_shows_the_robot(urdf: Path, tmp_path: Path) -> None:
+    path = tmp_path / "one.png"
+    words = ["--urdf", str(urdf), "--pose=0.3,-0.3", "--size", "160x100", "--theme", "dark"]
+    assert main(["render", "--out", str(path), *words]) == 0
+    with Image.open(path) as picture:
+        assert picture.size == (160, 100)
+        middle = np.asarray(picture.convert("L"))[35:75, 60:100]
+    # The robot is lighter than the dark background.
+    assert np.count_nonzero(middle > 90) > 100
+
+
+def test_page_shows_the_robot(urdf: Path, tmp_path: Path) -> None:
+    path = tmp_path / "one.html"
+    assert main(["export", "html", "--urdf", str(urdf), "--out", str(path)]) == 0
+    assert f"{urdf.stem}: one pose" in path.read_text(encoding="utf-8")
+
+
+def test_name_of_a_robot_and_a_file_are_refused_together(
+    urdf: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--out", str(tmp_path / "one.png"), "--urdf", str(urdf)]
+    assert main(["render", *out, "--arm", "ur5e"]) == 1
+    assert "name two robots" in capsys.readouterr().err
