@@ -8,13 +8,13 @@ import pytest
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.vectors import Vector, vector
-from katana450.maths.kinematics.subproblems import (
+from katana450.maths.kinematics.turns import wrapped
+from tests.kinematics.subproblems import (
     subproblem1,
     subproblem2,
     subproblem3,
     subproblem4,
 )
-from katana450.maths.kinematics.turns import wrapped
 
 CASES = 60
 SCAN = np.linspace(-math.pi, math.pi, 7201)

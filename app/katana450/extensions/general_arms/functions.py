@@ -1,6 +1,6 @@
 """The steps that the closed forms share, for floats and for arrays of many poses.
 
-Each step is a Paden-Kahan subproblem (maths/kinematics/subproblems.py), written out for axes along
+Each step is a Paden-Kahan subproblem (tests/kinematics/subproblems.py), written out for axes along
 z of their own frames, where it needs no vectors. A step without an exact answer returns the nearest
 one, and a step that leaves an angle free returns the angle that the caller gives.
 """

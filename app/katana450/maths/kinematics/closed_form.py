@@ -1,6 +1,6 @@
 """The closed form of the canonical arm, for floats and for arrays.
 
-Each step is a Paden-Kahan subproblem (maths/kinematics/subproblems.py) written out for axes along
+Each step is a Paden-Kahan subproblem (tests/kinematics/subproblems.py) written out for axes along
 z, y, y, y and x, where it needs no vectors. The tool frame {K} is at p, its axes are the columns
 of R:
 
