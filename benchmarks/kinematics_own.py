@@ -14,13 +14,13 @@ import numpy as np
 
 from benchmarks.kinematics_task import FloatArray, Task
 from katana450 import tolerances
+from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.batch import inverse_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.solver import Solver

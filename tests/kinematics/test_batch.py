@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
+from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.batch import CHUNK, forward_batch, inverse_batch
+from katana450.maths.kinematics.batch import CHUNK, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.batch import forward_batch, inverse_batch
+from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward

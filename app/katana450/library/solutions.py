@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.errors import InputError
+from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of, validated_poses
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.batch import inverse_batch
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse import inverse

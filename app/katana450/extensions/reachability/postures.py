@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.batch import forward_batch, inverse_batch
+from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 
 

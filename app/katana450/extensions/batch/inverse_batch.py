@@ -1,0 +1,288 @@
+"""Inverse kinematics of many poses at once, in chunks that fit the cache.
+
+It runs the formulas of maths/kinematics/closed_form.py on arrays. The few poses with the
+tool point near axis 1, which need case distinctions, use the scalar `Solver`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450 import tolerances
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import CHUNK, chunks, forward_columns, number_array
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.closed_form import Functions, closed_form
+from katana450.maths.kinematics.solver import Solver
+
+BoolArray = npt.NDArray[np.bool_]
+
+_LAST_ROW: Final = np.array([[0.0], [0.0], [0.0], [1.0]])
+
+_SQUARES_HOLD: Final = 1e-150
+"""Minimum length whose square keeps its digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solutions:
+    """The solutions of `inverse_batch` for N poses; the branches are in the order of BRANCHES.
+
+    Attributes:
+        q: joint angles (N, 4, 5) [rad].
+        within_limits: True where the joint angles are inside the limits, (N, 4).
+        position_error, rotation_error: errors (N, 4) [m], [rad] of the forward kinematics of q
+            against the target poses; None unless residuals were requested.
+    """
+
+    q: FloatArray
+    within_limits: BoolArray
+    position_error: FloatArray | None = None
+    rotation_error: FloatArray | None = None
+
+
+def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) -> Solutions:
+    """Return the four solutions of each pose `T` (N, 4, 4) = T_S_tool [m], as `inverse` for each.
+
+    With `residuals`, the errors of each solution are measured by forward kinematics.
+
+    Raises InputError for the first invalid pose, RobotDescriptionError for an arm outside the
+    family.
+    """
+    made = _arm(chain)
+    T = number_array(T, (4, 4), "The poses")
+    q = np.empty((len(T), 4, 5))
+    inside = np.empty((len(T), 4), dtype=np.bool_)
+    position = np.empty((len(T), 4)) if residuals else None
+    rotation = np.empty((len(T), 4)) if residuals else None
+    # One block of memory: malloc reuses a block of the same size, so no page is cleared again.
+    work = np.empty(36 * min(len(T), CHUNK))
+    # Values that are not finite are rejected, or left to the scalar solver.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        for rows in chunks(len(T)):
+            canonical, angles = _arrays(work, rows.stop - rows.start)
+            np.copyto(canonical, T[rows].transpose(1, 2, 0))
+            _validate(canonical, rows.start, angles.reshape(20, -1))
+            _solve(made, canonical, angles, q[rows], inside[rows])
+            if position is not None and rotation is not None:
+                for branch in range(4):
+                    reached = forward_columns(chain, q[rows, branch].T)
+                    x, y, z = reached[:3, 3] - canonical[:3, 3]
+                    position[rows, branch] = np.hypot(np.hypot(x, y), z)
+                    rotation[rows, branch] = _angle(reached, canonical)
+    return Solutions(q, inside, position, rotation)
+
+
+def _arrays(work: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return views for poses (4, 4, count) and angles (2, 2, 5, count) in `work`."""
+    canonical, angles = work[: 16 * count], work[16 * count : 36 * count]
+    return canonical.reshape(4, 4, count), angles.reshape(2, 2, 5, count)
+
+
+def _validate(T: FloatArray, start: int, work: FloatArray) -> None:
+    """Make the poses `T` (4, 4, C) clean in place, or raise InputError as for single poses.
+
+    `start` is the number of the first pose. `work` (15, C) or larger is scratch memory.
+    """
+    x, y, z = T[:3, 0], T[:3, 1], T[:3, 2]
+    misfit, products = work[:6], work[12:15]
+    squares = work[6:12].reshape(3, 2, -1)
+    np.multiply(T[:3, :2], T[:3, :2], out=squares)
+    np.add(squares[0] + squares[1], squares[2], out=misfit[:2])
+    misfit[:2] -= 1.0
+    np.multiply(x, y, out=products)
+    np.add(products[0] + products[1], products[2], out=misfit[2])
+    # The third axis is right-handed: its unit length and orthogonality follow.
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        np.subtract(x[j] * y[k] - x[k] * y[j], z[i], out=misfit[3 + i])
+    # NaN and infinity fail every comparison.
+    if (
+        not np.abs(misfit, out=misfit).max() <= tolerances.ROTATION_EXACT
+        or (T[3] != _LAST_ROW).any()
+        or not np.abs(T[:3, 3], out=products).max() <= tolerances.FARTHEST
+    ):
+        _clean(T, start)
+
+
+def _clean(T: FloatArray, start: int) -> None:
+    """Replace each rotation in `T` by the nearest one, or raise InputError for an invalid pose."""
+    R, p = T[:3, :3].transpose(2, 0, 1), T[:3, 3]
+    misfit = np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max(axis=(1, 2))
+    last_row = np.abs(T[3] - _LAST_ROW).max(axis=0)
+    usable = (misfit <= tolerances.ROTATION_INPUT) & (np.linalg.det(R) > 0.0)
+    usable &= last_row <= tolerances.POSE_LAST_ROW
+    usable &= (np.abs(p) <= tolerances.FARTHEST).all(axis=0)
+    for i in np.flatnonzero(~usable):
+        T[:, :, i] = se3.validated(T[:, :, i], f"Pose {start + i}")
+    U, _, Vt = np.linalg.svd(R)
+    T[:3, :3] = (U @ Vt).transpose(1, 2, 0)
+    T[3] = _LAST_ROW
+
+
+def _angle(Ta: FloatArray, Tb: FloatArray) -> FloatArray:
+    """Return the angle [rad] between two rotations (4, 4, C), accurate at 0 and pi."""
+    Ra, Rb = Ta[:3, :3], Tb[:3, :3]
+
+    def entry(i: int, j: int) -> FloatArray:
+        product: FloatArray = Ra[0, i] * Rb[0, j] + Ra[1, i] * Rb[1, j] + Ra[2, i] * Rb[2, j]
+        return product
+
+    x, y, z = (entry(i, j) - entry(j, i) for i, j in ((2, 1), (0, 2), (1, 0)))
+    trace = entry(0, 0) + entry(1, 1) + entry(2, 2)
+    return np.asarray(np.atan2(np.sqrt(x * x + y * y + z * z), trace - 1.0))
+
+
+def _root(x: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(x, 0.0)))
+
+
+def _direction(y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    angle, length = np.atan2(y, x), np.sqrt(x * x + y * y)
+    # Computing sine and cosine would dominate the time of this function.
+    cosine, sine = x / length, y / length
+    if not np.minimum.reduce(length) > _SQUARES_HOLD:
+        short = ~(length > _SQUARES_HOLD)
+        cosine[short], sine[short] = np.cos(angle[short]), np.sin(angle[short])
+    return angle, cosine, sine
+
+
+_ARRAYS: Final = Functions(np.atan2, np.sqrt, _root, _direction)
+
+
+class _Arm(NamedTuple):
+    """Values that are computed once per chain.
+
+    Attributes:
+        solver: the scalar solver.
+        posture: the closed form on arrays.
+        turns: (joint, sign, shift, lower, upper) of the joints whose angle differs from that of the
+            canonical arm, or whose limits [rad] exceed half a turn.
+        lower, upper: limits (5, 1) [rad], with the slack.
+    """
+
+    solver: Solver
+    posture: Callable[..., Any]
+    turns: tuple[tuple[int, float, float, float, float], ...]
+    lower: FloatArray
+    upper: FloatArray
+
+
+@lru_cache(maxsize=64)
+def _arm(chain: Chain) -> _Arm:
+    solver = Solver.of(chain)
+    arm = solver.arm
+    lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
+    joints = zip(range(5), arm.signs, arm.shifts, lower.tolist(), upper.tolist(), strict=True)
+    turns = tuple(
+        (i, sign, shift, a, b)
+        for i, sign, shift, a, b in joints
+        if sign < 0.0 or shift or max(-a, b) > np.pi + tolerances.LIMIT_SLACK
+    )
+    return _Arm(solver, closed_form(arm, _ARRAYS), turns, lower[:, None], upper[:, None])
+
+
+def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray, inside: BoolArray) -> None:
+    """Fill `q` (C, 4, 5) and `inside` (C, 4) for the poses `T` (4, 4, C).
+
+    `angles` (2, 2, 5, C) is scratch memory.
+    """
+    solver, arm = made.solver, made.solver.arm
+    rows = T
+    if not arm.is_canonical:
+        # T_C_S T T_tool_K, the last product row by row.
+        rows = arm.T_tool_K.T @ (arm.T_C_S @ T.reshape(4, -1)).reshape(T.shape)
+    x, y = rows[0, 3], rows[1, 3]
+    rho = np.sqrt(x * x + y * y)
+    r = np.sqrt((rho - arm.d) * (rho + arm.d)) if arm.d else rho
+    # Both comparisons are false for an overflow and inside the cylinder of radius d.
+    beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
+    _canonical(made, rows, rho, r, angles)
+    _turn(made, angles)
+    inside[...] = _inside(made, angles).reshape(4, -1).T
+    q[...] = angles.reshape(4, 5, -1).transpose(2, 0, 1)
+    for i in beside.nonzero()[0]:
+        found = solver.solve(T[:, :, i].tolist())
+        q[i], inside[i] = found, [solver.inside(branch) for branch in found]
+
+
+def _canonical(
+    made: _Arm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
+) -> None:
+    """Fill `alpha` (2, 2, 5, C) (shoulder, elbow, joint) in [-pi, pi], for poses off axis 1."""
+    posture, arm = made.posture, made.solver.arm
+    x, y = rows[0, 3], rows[1, 3]
+
+    def fill_shoulder(side: FloatArray, c: FloatArray, s: FloatArray, u: FloatArray) -> None:
+        """Fill the angles of one shoulder `side` (2, 5, C), except alpha1."""
+        up, down = side
+        phi, up[1], down[1], up[2], side[:, 4] = posture(c, s, u, rows)
+        np.negative(up[2], out=down[2])
+        np.subtract(phi - side[:, 1], side[:, 2], out=side[:, 3])
+        _wrap(side[:, 1::2])
+
+    front, back = alpha
+    if arm.d:
+        square = 1.0 / (rho * rho)
+        for side, u in ((front, r), (back, -r)):
+            c, s = (x * u + y * arm.d) * square, (y * u - x * arm.d) * square
+            side[:, 0] = np.atan2(s, c)
+            fill_shoulder(side, c, s, u)
+        return
+    c, s, one = x / rho, y / rho, np.atan2(y, x)
+    front[:, 0], back[:, 0] = one, _behind(one)
+    fill_shoulder(front, c, s, rho)
+    if arm.is_mirrored:
+        np.negative(_behind(front[::-1, 1]), out=back[:, 1])
+        np.negative(front[::-1, 2:4], out=back[:, 2:4])
+        back[:, 4] = _behind(front[0, 4])
+    else:
+        fill_shoulder(back, -c, -s, -rho)
+
+
+def _behind(theta: FloatArray) -> FloatArray:
+    """Return `theta` plus or minus half a turn, in [-pi, pi] if `theta` is."""
+    return theta - np.copysign(np.pi, theta)
+
+
+def _wrap(theta: FloatArray) -> None:
+    """Wrap `theta` to [-pi, pi] in place."""
+    turns = theta * (0.5 / np.pi)
+    np.rint(turns, out=turns)
+    turns *= 2.0 * np.pi
+    theta -= turns
+
+
+def _turn(made: _Arm, angles: FloatArray) -> None:
+    """Convert alpha (2, 2, 5, C) to q in place, each angle in the turn inside its limits if any."""
+    for i, sign, shift, lower, upper in made.turns:
+        angle = angles[:, :, i]
+        if shift:
+            angle -= shift
+            _wrap(angle)
+        if sign < 0.0:
+            np.negative(angle, out=angle)
+        if max(-lower, upper) > np.pi + tolerances.LIMIT_SLACK:
+            below, above = angle < lower, angle > upper
+            # The first turn that is not beyond the violated limit.
+            turns = np.where(
+                below,
+                np.ceil((lower - angle) * (0.5 / np.pi)),
+                np.floor((upper - angle) * (0.5 / np.pi)),
+            )
+            other = angle + 2.0 * np.pi * turns
+            np.copyto(angle, other, where=(below | above) & (other >= lower) & (other <= upper))
+
+
+def _inside(made: _Arm, angles: FloatArray) -> BoolArray:
+    """Return True (2, 2, C) where all joint angles (2, 2, 5, C) are inside the limits."""
+    inside = angles >= made.lower
+    inside &= angles <= made.upper
+    one, two, three, four, five = inside.transpose(2, 0, 1, 3)
+    return np.asarray(one & two & three & four & five)
