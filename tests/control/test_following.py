@@ -18,6 +18,8 @@ from katana450.arm.control.plans import path_to, plan_along, plan_to
 from katana450.arm.control.session import TOOL_SPEED, Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import BlockedError, InputError
+from katana450.extensions.programs.curve import Linear, ToolArc, ToolLine
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
@@ -25,11 +27,9 @@ from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Linear, ToolArc, ToolLine
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.plan import Plan
-from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
 from tests.control.clearing import cleared
 

@@ -19,12 +19,12 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
+from katana450.extensions.programs.curve import ToolLine
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import ToolLine
-from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
 
 OPEN = 0.3

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.arm import ArmModel
+from katana450.extensions.programs.curve import Linear, ToolArc, ToolLine
 from katana450.extensions.programs.tool_curves import ToolLines
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Linear, ToolArc, ToolLine
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
-from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
 
 FRONT_UP = Branch("front", "up")

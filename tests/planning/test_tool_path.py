@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 
 from katana450.arm.control.arm import ArmModel
 from katana450.errors import InputError
+from katana450.extensions.programs.curve import Linear, ToolArc, ToolLine
 from katana450.extensions.programs.roomiest_pitch import roomiest
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
@@ -23,10 +25,8 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Linear, ToolArc, ToolLine
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
-from katana450.maths.planning.tool_path import ToolPath
 from tests.conftest import LONG
 from tests.kinematics.family import random_member
 

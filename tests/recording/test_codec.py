@@ -26,7 +26,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.stop_cause import pressed
+from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.recording.allowed import CLASSES
 from katana450.extensions.recording.codec import Codec, json_form, json_text
 from katana450.extensions.recording.digest import Digester
@@ -36,11 +38,9 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import plan
 from katana450.maths.planning.scaling import Bounds
-from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.control.test_session_machine import ArmRules, bounded

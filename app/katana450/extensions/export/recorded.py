@@ -12,12 +12,12 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scenery import Scenery
-from katana450.server.view.traces import Traces
 from katana450.server.viser_bridge.presets import Preset
 from katana450.server.viser_bridge.recording_page import titled
 from katana450.server.viser_bridge.viser_server import close_server, open_server
@@ -54,11 +54,5 @@ def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callabl
         set_up_room(server)
         nodes = MachineNodes(server, robot)
         return lambda state: nodes.move(robot.joint_values(state.q, state.gripper))
-    scenery = Scenery(server, robot, session, load_props(), NoGestures(), Meshes())
-    traces = Traces(server, robot.arm)
-
-    def show(state: State) -> None:
-        scenery.show(state)
-        traces.follow(state)
-
-    return show
+    layers = (TracesLayer(),)
+    return Scenery(server, robot, session, load_props(), NoGestures(), Meshes(), layers).show

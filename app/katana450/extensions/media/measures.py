@@ -15,19 +15,19 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.actions import FollowPlan, Task
+from katana450.extensions.programs.curve import ToolCoordinates
 from katana450.extensions.programs.motion_measures import motion_measures, water_measures
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.simulation import Trace
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import ToolCoordinates
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
-from katana450.maths.planning.tool_path import ToolPath
 
 PATH_SAMPLES = 2000
 """Number of intervals of each path at whose ends the kinematics are compared."""

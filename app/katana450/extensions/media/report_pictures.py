@@ -22,12 +22,12 @@ from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.server.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.extensions.programs.simulation import Trace
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives
-from katana450.maths.planning.tool_path import ToolPath
-from katana450.server.view.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.server.viser_bridge.themes import LIGHT
 
 SIZE = 880, 550

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.extensions.programs.plan_builder import Approach, PlanBuilder
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.maths.planning.plan import JOIN_TOLERANCE
 
 APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
     from katana450.server.service.runner import Runner
+    from katana450.server.view.layer import ViewLayer
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
 
@@ -81,6 +82,12 @@ def _folder(context: FolderContext) -> PanelFolder | None:
         )
 
 
+def _view_layer(_options: Namespace) -> ViewLayer:
+    from katana450.extensions.programs.server.traces import TracesLayer
+
+    return TracesLayer()
+
+
 def _routes(context: RouteContext) -> list[Any]:
     from katana450.extensions.programs.server.script_routes import routes
 
@@ -89,5 +96,7 @@ def _routes(context: RouteContext) -> list[Any]:
 
 EXTENSION = Extension(
     "programs",
-    serve=ServeExtension(add_serve_options, routes=_routes, runner=_runner, folder=_folder),
+    serve=ServeExtension(
+        add_serve_options, view_layer=_view_layer, routes=_routes, runner=_runner, folder=_folder
+    ),
 )

@@ -19,6 +19,7 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, UseTool
 from katana450.extensions.programs.carry import APPROACHES, before
 from katana450.extensions.programs.conditions import Held
+from katana450.extensions.programs.curve import ToolLine
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.located_step import Conditional
 from katana450.extensions.programs.plan_builder import Approach, GraspInfo, PlanBuilder
@@ -29,7 +30,6 @@ from katana450.extensions.programs.step import Step
 from katana450.maths.collision.contact import Contact
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.turns import wrapped
-from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import JOIN_TOLERANCE, MARGIN
 
 PITCHES = tuple(np.radians((30.0, 35.0, 25.0, 40.0, 20.0, 45.0)).tolist())

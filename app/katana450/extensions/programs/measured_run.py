@@ -12,10 +12,10 @@ import numpy as np
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.state import State
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.planning.path import point_derivatives
-from katana450.maths.planning.tool_path import ToolPath
 
 MAX_LAG = 1.0
 """[s] Maximum lag in the search."""

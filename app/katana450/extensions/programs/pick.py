@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.carry import UP
+from katana450.extensions.programs.curve import ToolLine
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.grasp import Grasp
 from katana450.extensions.programs.place import PlaceHeld
@@ -14,7 +15,6 @@ from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
-from katana450.maths.planning.curve import ToolLine
 
 LIFTS = (0.06, 0.04, 0.025, 0.015)
 """[m] Heights to which an object is lifted, tried from the highest."""

@@ -16,6 +16,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers
 from katana450.extensions.programs.carry import APPROACHES, UP, before, carry
+from katana450.extensions.programs.curve import ToolLine
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.grasp import DOWN
 from katana450.extensions.programs.places import point
@@ -29,7 +30,6 @@ from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import wrapped
-from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import MARGIN
 
 RELEASE_HEIGHT = MARGIN + 2e-4

@@ -18,10 +18,12 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import other_arms
 from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.curve import Curve
 from katana450.extensions.programs.out_of_reach import unreached
 from katana450.extensions.programs.reaching import branches_near, reaching
 from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.step_target import StepTarget
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -31,10 +33,8 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
-from katana450.maths.planning.curve import Curve
 from katana450.maths.planning.path import Path, joint_derivatives
 from katana450.maths.planning.plan import JOIN_TOLERANCE, check_clear
-from katana450.maths.planning.tool_path import ToolPath
 from katana450.maths.water.units import FEMTOLITRE
 
 W = TypeVar("W")

@@ -17,6 +17,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import SetSpeed, Wait
 from katana450.extensions.programs.carry import carry
+from katana450.extensions.programs.curve import ToolLine
 from katana450.extensions.programs.drain import Drain
 from katana450.extensions.programs.expression import PLAIN
 from katana450.extensions.programs.fields import Fields
@@ -29,7 +30,6 @@ from katana450.extensions.programs.step import Step
 from katana450.extensions.programs.tool_curves import ToolTurn
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import ToolLine
 from katana450.maths.water.flow import Water
 from katana450.maths.water.units import FEMTOLITRE, ML, counted
 

@@ -1,4 +1,4 @@
-"""Curves of the tool that only scripts use; see ``maths/planning/curve.py``."""
+"""Curves of the tool that only scripts use; see ``extensions/programs/curve.py``."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from katana450.errors import InputError
+from katana450.extensions.programs.curve import Linear, ToolArc, ToolCoordinates, ToolLine
+from katana450.extensions.programs.jet_posture import facing
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -16,10 +18,8 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Linear, ToolArc, ToolCoordinates, ToolLine
 from katana450.maths.planning.jet import Jet, atan2, sin_cos
 from katana450.maths.planning.polyline import Polyline
-from katana450.maths.planning.posture import facing
 
 TURN_LENGTH = 0.25
 """Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""

@@ -13,6 +13,7 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
+from katana450.extensions.programs.curve import Linear, ToolArc, ToolLine
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.moves import through
 from katana450.extensions.programs.plan_builder import PlanBuilder
@@ -23,12 +24,11 @@ from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.extensions.programs.step_target import StepTarget
 from katana450.extensions.programs.tool_curves import ToolLines, ToolScrew
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.programs.unfollowed import arc_remedies, line_remedies, unfollowed
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Linear, ToolArc, ToolLine
-from katana450.maths.planning.tool_path import ToolPath
 
 LEVEL_TOLERANCE = 1e-6
 """[1] Maximum horizontal component of the normal of a level circle."""

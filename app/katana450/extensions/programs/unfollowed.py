@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.errors import BlockedError, InputError, PathError
+from katana450.extensions.programs.curve import Curve, ToolLine
 from katana450.extensions.programs.out_of_reach import (
     NearestPlace,
     binding,
@@ -22,7 +23,6 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.checkpoint import checkpoint
-from katana450.maths.planning.curve import Curve, ToolLine
 from katana450.maths.planning.jet import Jet
 
 SAMPLES = 65

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import viser
 
-from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError
 from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.reachability_file import StoredMap, load_map
+from katana450.server.view.layer import LayerContext, ViewLayer
 
 FILL = 0.2
 """Ratio of a point's radius to its voxel's edge; the arm is visible between the points."""
@@ -31,7 +31,7 @@ class Cut(Enum):
     WHOLE = "Whole"
 
 
-class ReachabilityLayer:
+class ReachabilityLayer(ViewLayer):
     """A stored map as a layer of the scene, hidden until a person chooses a cut."""
 
     def __init__(self, path: Path) -> None:
@@ -43,20 +43,20 @@ class ReachabilityLayer:
         """The sentence that states why an arm is needed."""
         return f"{self._path} is a map of the points that a tool reaches."
 
-    def attach(self, server: viser.ViserServer, robot: Robot) -> None:
-        """Read the map and prepare to draw it in the scene of ``robot``.
+    def attach(self, context: LayerContext) -> None:
+        """Read the map and prepare to draw it in the scene of ``context``.
 
         Raises InputError if the file is not a map, and ConfigurationError if it is the map of
         another arm.
         """
-        stored = load_map(self._path)
+        stored, robot = load_map(self._path), context.robot
         if stored.robot != robot.name:
             raise ConfigurationError(
                 f"The map given with --workspace is of the arm {stored.robot!r}; this arm is "
                 f"{robot.name!r}. Make a map with: katana450 workspace --urdf ... --out map.npz"
             )
         middle = float(robot.require_arm().T_base_shoulder[1, 3])
-        self._cloud = ReachabilityCloud(server, stored, middle)
+        self._cloud = ReachabilityCloud(context.server, stored, middle)
 
     def add_controls(self, gui: viser.GuiApi) -> None:
         """Add the choice of a cut, and the legend that is shown with it."""

@@ -23,7 +23,9 @@ from katana450.arm.control.arm_report import ArmMode, ArmReport, MeasuredStop
 from katana450.arm.control.following import Following
 from katana450.arm.control.lease import Person, Role
 from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.programs.trajectory_path import TrajectoryPath
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import Fingerprint
@@ -35,12 +37,10 @@ from katana450.maths.kinematics.tool import DragTarget, ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
-from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import Nearest, Plan, Segment
 from katana450.maths.planning.scaling import Scaling
-from katana450.maths.planning.tool_path import ToolPath
 from katana450.maths.water.course import Course
 from katana450.maths.water.flow import Water
 from katana450.maths.water.liquid import Liquid

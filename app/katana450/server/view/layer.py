@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import viser
 
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 
 
-class ViewLayer(Protocol):
-    """Nodes of the scene with controls in the folder "Show" of the panel."""
+class LayerContext(NamedTuple):
+    """The scene to which a layer adds nodes.
+
+    Attributes:
+        server: viser's server.
+        robot: The robot, which has an arm.
+        session: The session, which has the environment of objects and the water model.
+        path: Path of the node of each link, by link name.
+    """
+
+    server: viser.ViserServer
+    robot: Robot
+    session: Session
+    path: Mapping[str, str]
+
+
+class ViewLayer:
+    """Nodes of the scene with controls in the folder "Show" of the panel. The base has none."""
 
     @property
     def what(self) -> str:
@@ -18,9 +37,13 @@ class ViewLayer(Protocol):
 
         If it is empty, the layer is left out for a robot without an arm.
         """
+        return ""
 
-    def attach(self, server: viser.ViserServer, robot: Robot) -> None:
-        """Prepare for the arm of ``robot`` on ``server``. Raises ConfigurationError."""
+    def attach(self, context: LayerContext) -> None:
+        """Prepare for the arm of ``context``. Raises ConfigurationError."""
 
     def add_controls(self, gui: viser.GuiApi) -> None:
         """Add the controls to the open folder of ``gui``. Called once, after ``attach``."""
+
+    def follow(self, state: State) -> None:
+        """Show ``state``. Called for each state that is shown, so only changes may be sent."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import viser
 
 from katana450.arm.control.session import Session
@@ -12,6 +14,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.server.view.conduit import Conduits
 from katana450.server.view.controls import GestureGate
+from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
@@ -30,6 +33,7 @@ class Scenery:
         props: Props,
         gestures: GestureGate,
         meshes: Meshes,
+        layers: Sequence[ViewLayer] = (),
     ) -> None:
         """Build the scene on ``server``.
 
@@ -40,6 +44,10 @@ class Scenery:
             props: Table, cup and basin.
             gestures: The path of gestures at the handles of objects.
             meshes: The meshes of objects.
+            layers: Layers of extensions.
+
+        Raises:
+            ConfigurationError: A layer cannot be shown.
         """
         self._server = server
         self._robot = robot
@@ -52,6 +60,9 @@ class Scenery:
         # Made on the first state with water.
         self._water: WaterNodes | None = None
         self._water_environment: WaterEnvironment | None = None
+        self._layers = layers
+        for layer in layers:
+            layer.attach(LayerContext(server, robot, session, self.arm.path))
 
     def show(self, state: State) -> None:
         """Show ``state``."""
@@ -60,6 +71,8 @@ class Scenery:
         self._conduits.move(angles)
         self.objects.follow(state)
         self._show_water(state)
+        for layer in self._layers:
+            layer.follow(state)
 
     def _show_water(self, state: State) -> None:
         pouring = self._session.pouring

@@ -35,7 +35,6 @@ from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scene_tab import SceneTab
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.tint import Tint
-from katana450.server.view.traces import Traces
 from katana450.server.view.view_updater import ViewUpdater
 from katana450.server.viser_bridge.presets import Preset
 
@@ -110,20 +109,19 @@ class View(ViewUpdater):
         self._robot, self._arm = robot, robot.require_arm()
         self._last_ticket = last_ticket
         props = load_props()
-        self._scenery = Scenery(server, robot, session, props, gestures, view_options.meshes)
+        self._scenery = Scenery(
+            server, robot, session, props, gestures, view_options.meshes, view_options.layers
+        )
         state = state_publisher.snapshot.state
         self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, robot, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, robot, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._setpoint: GhostNodes | None = None
         self._gap = Gap(server)
-        self._traces = Traces(server, self._arm)
         self._gizmo = (view_options.gizmo or Gizmo)(
             server, self._arm, gestures, lambda: state_publisher.snapshot.state
         )
         self._ellipsoid = EllipsoidNode(server, self._arm)
-        for layer in view_options.layers:
-            layer.attach(server, robot)
         self._cameras = Cameras(server, robot)
         if view_options.gizmo is not None:
             look = camera(robot)
@@ -164,7 +162,6 @@ class View(ViewUpdater):
             self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
-            self._traces.follow(state)
             self._cameras.follow(state)
             caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(state, time.perf_counter(), caught_up=caught_up)

@@ -11,6 +11,8 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.errors import PathError
+from katana450.extensions.programs.curve import Curve, ToolCoordinates
+from katana450.extensions.programs.jet_posture import posture
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
@@ -19,9 +21,8 @@ from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import nearest_posture
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Curve, ToolCoordinates
 from katana450.maths.planning.jet import Coefficient, Jet
-from katana450.maths.planning.posture import FiveJets, ThreeJets, posture
+from katana450.maths.planning.posture import FiveJets, ThreeJets
 
 KNOTS = 400
 """Number of intervals in which a path is checked when it is built."""

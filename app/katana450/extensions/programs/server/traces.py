@@ -8,12 +8,13 @@ import viser
 
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import point_derivatives
 from katana450.maths.planning.plan import Plan, Segment
-from katana450.maths.planning.tool_path import ToolPath
+from katana450.server.view.layer import LayerContext, ViewLayer
 
 DESIRED = (90, 100, 115)
 """Colour of the planned path."""
@@ -34,6 +35,18 @@ MAX_PIECES = 4000
 """Maximum number of pieces of a trace; the oldest half is then dropped."""
 
 Colours = npt.NDArray[np.uint8]
+
+
+class TracesLayer(ViewLayer):
+    """Path and trace as a layer of the scene, without controls."""
+
+    def attach(self, context: LayerContext) -> None:
+        """Add the hidden nodes."""
+        self._traces = Traces(context.server, context.robot.require_arm())
+
+    def follow(self, state: State) -> None:
+        """Extend the trace by ``state``."""
+        self._traces.follow(state)
 
 
 class Traces:
