@@ -72,6 +72,7 @@ BUILT_IN = (
     "gallery",
     "bodies",
     "loops",
+    "conduit",
     "general_arms",
 )
 """Built-in extensions, in the order of their commands in the help text."""

@@ -145,7 +145,10 @@ def test_command_of_a_missing_extension_reports_it(blocking: Path) -> None:
     assert "The extension media is needed but not installed." in output
 
 
-NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "media")
+NOT_NEEDED = (
+    *("importers", "scene", "reachability", "export", "experiments", "media"),
+    *("conduit",),
+)
 """Extensions that a server does not need."""
 
 

@@ -6,19 +6,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import viser
 
 from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.commands import Command, SetJoints
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.conduit import ConduitStretch
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import so3
 from katana450.server.view.branches import INTERVAL, BranchList
-from katana450.server.view.conduit import poses
 from katana450.server.view.controls import Clickable
 from katana450.server.view.scene import FrameTree
 from tests.viser_bridge.internals import nodes
@@ -37,25 +33,6 @@ def test_every_link_turns_with_its_joint(robot: Robot, server: viser.ViserServer
                 R = R @ so3.exp(link.joint.axis * angles[link.joint.name])
             shown = so3.from_quaternion(node[tree.path[link.name]].wxyz)
             np.testing.assert_allclose(shown, R, atol=1e-12)
-
-
-@pytest.mark.parametrize("number", range(4))
-def test_rings_are_square_to_the_conduit_also_between_computed_angles(
-    arm: MountedArm, number: int
-) -> None:
-    stretch: ConduitStretch = arm.stretches[number]
-    rings = poses(stretch, 30)
-    between = 0.5 * (rings[1:] + rings[:-1])
-    for angles, shown in (
-        (stretch.angles, rings),
-        (0.5 * (stretch.angles[1:] + stretch.angles[:-1]), between),
-    ):
-        points, tangents = stretch.courses(angles, 30)
-        np.testing.assert_allclose(shown[..., 4:], points, atol=1e-6)
-        # A deviation of the length scales a ring by less than one pixel.
-        np.testing.assert_allclose(np.linalg.norm(shown[..., :4], axis=2), 1.0, atol=6e-3)
-        for row, lead in zip(shown.reshape(-1, 7), tangents.reshape(-1, 3), strict=True):
-            assert so3.from_quaternion(row[:4])[:, 0] @ lead > 0.998
 
 
 def test_branches_are_computed_once_a_second_while_the_arm_moves(

@@ -1,8 +1,7 @@
-"""The arm in a URDF: its five axes as an exact chain, with tools, fingers and conduit."""
+"""The arm in a URDF: its five axes as an exact chain, with tools and fingers."""
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,9 +11,8 @@ import numpy as np
 
 from katana450.arm.control.five_axis_tool import FiveAxisTool
 from katana450.arm.control.tool_kinematics import ToolKinematics
-from katana450.arm.robot.conduit import Hinge, read_stretches
 from katana450.arm.robot.gripper import Fingers, fingers_of
-from katana450.arm.robot.link import SLOW_TURN, Link
+from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.structure import Structure, structure_of
 from katana450.arm.robot.urdf import Urdf, UrdfJoint
@@ -26,9 +24,6 @@ from katana450.maths.kinematics.exact_member import exact_member
 
 SHOULDER_FRAME = "shoulder_frame"
 """Name of the link whose frame is the paper's frame {S}."""
-
-CONDUITS = "conduits.json"
-"""File beside the URDF that describes where the conduit is held."""
 
 
 class OtherArm(NamedTuple):
@@ -55,7 +50,6 @@ FindArm = Callable[[Urdf, Path, str | None], OtherArm | None]
 
 def arm_in(
     urdf: Urdf,
-    links: Sequence[Link],
     path: Path,
     tool: str | None,
     find: FindArm | None = None,
@@ -64,15 +58,14 @@ def arm_in(
 
     Args:
         urdf: the robot description.
-        links: the tree made of it.
-        path: path of the file, for error messages; the file of its conduits is beside it.
+        path: path of the file, for error messages.
         tool: link to which targets refer by default; None for the first of TOOL_FRAMES that exists,
             else the outermost link that the arm carries.
         find: finds the kinematics of an arm outside the five-axis family; None to refuse it.
 
     Raises:
-        RobotDescriptionError: the kinematics do not support the arm, or its conduits are described
-            wrongly. The message says what is wrong.
+        RobotDescriptionError: the kinematics do not support the arm. The message says what is
+            wrong.
     """
     frames = urdf.frames()
     to_tool: Callable[[Chain], ToolKinematics] = FiveAxisTool
@@ -106,10 +99,6 @@ def arm_in(
         T_base_shoulder=frozen(T_base_shoulder),
         fingers=fingers.follow,
         resting=fingers.resting,
-        stretches=read_stretches(
-            path.parent / CONDUITS,
-            lambda start, end: _hinge(links, chain, fingers.resting, start, end),
-        ),
         notes=tuple(notes),
     )
 
@@ -185,31 +174,3 @@ def _limit(joint: UrdfJoint, which: str) -> float:
             f"Joint {joint.name!r} has no {which} limit. Add {which!r} to its <limit>."
         )
     return float(value)
-
-
-def _hinge(
-    links: Sequence[Link], chain: Chain, resting: Mapping[str, float], start: str, end: str
-) -> Hinge:
-    """Return the one joint between two links. Raises KeyError if there is not exactly one."""
-    by_name = {link.name: link for link in links}
-    path: list[Link] = []
-    name: str | None = end
-    while name != start:
-        if name is None:
-            raise KeyError(f"{end} is not a descendant of {start}")
-        path.insert(0, by_name[name])
-        name = path[0].parent
-    joints = [link.joint.name if link.joint is not None else "" for link in path]
-    driven = [i for i, joint in enumerate(joints) if joint in chain.names]
-    if len(driven) != 1:
-        raise KeyError(f"there are {len(driven)} driven joints between {start} and {end}, not one")
-    (at,) = driven
-    before, after = (
-        functools.reduce(np.matmul, (link.at_rest(resting) for link in some), np.eye(4))
-        for some in (path[: at + 1], path[at + 1 :])
-    )
-    joint = path[at].joint
-    assert joint is not None
-    number = chain.names.index(joint.name)
-    lower, upper = float(chain.lower[number]), float(chain.upper[number])
-    return Hinge(joint.name, joint.axis, lower, upper, before, after)

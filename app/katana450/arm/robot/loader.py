@@ -46,14 +46,14 @@ def load(path: Path = URDF_PATH, tool: str | None = None, find: FindArm | None =
     arm, why = None, ""
     try:
         with explained(path):
-            arm = arm_in(urdf, links, path, tool, find)
+            arm = arm_in(urdf, path, tool, find)
     except RobotDescriptionError as error:
         if tool is not None:
             raise
         why = str(error)
     missing = [mesh for link in urdf.links.values() for mesh in link.missing]
     notes = tuple(f"There is no mesh at {mesh}." for mesh in dict.fromkeys(missing))
-    return Robot(urdf.name, links, arm, why, notes, faults)
+    return Robot(urdf.name, links, arm, why, notes, faults, path)
 
 
 def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""The arm of a robot with its place in the robot: base, fingers and conduit."""
+"""The arm of a robot with its place in the robot: base and fingers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.robot.conduit import ConduitStretch
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -15,21 +14,19 @@ class MountedArm(ArmModel):
     """An arm as part of a robot.
 
     The control core uses it as an ``ArmModel``. ``ArmModel`` is a separate class because the core
-    knows neither base frames nor links nor conduits.
+    knows neither base frames nor links.
 
     Attributes:
         T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table [m].
         fingers: (factor, offset) of the finger joints, the driven one first:
             value = factor * driven + offset [rad or m].
         resting: value [rad or m] of every movable joint that the arm does not drive.
-        stretches: the free runs of the conduit, if it has one.
         notes: sentences for a person on assumptions about the file.
     """
 
     T_base_shoulder: FloatArray
     fingers: Mapping[str, tuple[float, float]]
     resting: Mapping[str, float]
-    stretches: tuple[ConduitStretch, ...] = ()
     notes: tuple[str, ...] = ()
 
     def moves(self, joint: str) -> bool:

@@ -7,6 +7,7 @@ import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class Robot:
         why: the reason for that as a sentence; empty if there is an arm.
         notes: sentences for a person on what is missing in its files.
         faults: sentences on joints that stay at zero because they cannot be moved.
+        path: its URDF file.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Robot:
     why: str = ""
     notes: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
+    path: Path | None = None
 
     def require_arm(self) -> MountedArm:
         """Return the arm. Raises RobotDescriptionError with the reason if there is none."""

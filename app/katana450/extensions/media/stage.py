@@ -11,17 +11,17 @@ import numpy as np
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.conduit import ConduitStretch
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual
+from katana450.extensions.conduit.rings import PITCH, poses, ring
+from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.extensions.media.picture import Translucent
 from katana450.extensions.media.scene import Item, smooth
 from katana450.extensions.media.water import translucents_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.conduit import PITCH, poses, ring
 from katana450.server.view.scene_objects import COLOUR, form
 
 CONDUIT, TABLE = "conduit", "table"
@@ -38,8 +38,7 @@ class RenderStage:
         self._links = {link.name: link.shapes for link in robot.links}
         self._table = _in_file(props.table.mesh)
         self._known = {"cup": _in_file(props.cup.mesh), "basin": _in_file(props.basin.mesh)}
-        stretches = () if robot.arm is None else robot.arm.stretches
-        self._stretches = [_BendableStretch(stretch) for stretch in stretches]
+        self._stretches = [_BendableStretch(stretch) for stretch in stretches_of(robot)]
 
     def items(self, state: State) -> list[Item]:
         """Return all opaque items."""

@@ -1,4 +1,4 @@
-"""The visible parts of a state apart from controls: arm, conduit, table, objects and water."""
+"""The visible parts of a state apart from controls: arm, table, objects and water."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.server.view.conduit import Conduits
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.room import set_up_room
@@ -23,7 +22,7 @@ from katana450.server.view.workcell import Workcell
 
 
 class Scenery:
-    """The nodes of arm, conduit, table, objects and water. Only changes are sent."""
+    """The nodes of arm, table, objects, water and layers. Only changes are sent."""
 
     def __init__(
         self,
@@ -56,7 +55,6 @@ class Scenery:
         Workcell(server, props)
         self.objects = SceneObjectNodes(server, props, session.environment, gestures, meshes)
         self.arm = ArmNodes(server, robot)
-        self._conduits = Conduits(server, robot.require_arm(), self.arm)
         # Made on the first state with water.
         self._water: WaterNodes | None = None
         self._water_environment: WaterEnvironment | None = None
@@ -66,9 +64,7 @@ class Scenery:
 
     def show(self, state: State) -> None:
         """Show ``state``."""
-        angles = self._robot.joint_values(state.q, state.gripper)
-        self.arm.move(angles)
-        self._conduits.move(angles)
+        self.arm.move(self._robot.joint_values(state.q, state.gripper))
         self.objects.follow(state)
         self._show_water(state)
         for layer in self._layers:

@@ -10,10 +10,10 @@ import viser
 
 from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError
+from katana450.extensions.conduit.rings import Conduits
 from katana450.extensions.real_arm.codec.axis_status import status_words
 from katana450.extensions.real_arm.emulator.posture import joints_at
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
-from katana450.server.view.conduit import Conduits
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
@@ -33,7 +33,6 @@ class ArmWindow:
         """Serve the page. Raises ConfigurationError if the port cannot be opened."""
         self._emulator = emulator
         self._robot = robot
-        arm = robot.require_arm()
         try:
             # viser's own messages on the terminal would hide ours.
             with contextlib.redirect_stdout(io.StringIO()):
@@ -48,7 +47,7 @@ class ArmWindow:
         camera.position, camera.look_at, camera.fov = look.position, look.target, FOV
         set_up_room(self._server)
         self._nodes = ArmNodes(self._server, robot)
-        self._conduit = Conduits(self._server, arm, self._nodes)
+        self._conduit = Conduits(self._server, robot, self._nodes.path)
         self._text = self._server.gui.add_markdown("")
         self._shown = ""
         self._ending = threading.Event()

@@ -6,6 +6,7 @@ joint's angle alone. It is computed once for a row of angles and interpolated li
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from collections.abc import Callable, Iterable
@@ -16,9 +17,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from katana450.arm.robot.link import Link
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
+
+CONDUITS = "conduits.json"
+"""File beside the URDF that describes where the conduit is held."""
 
 ANGLES = 49
 """Number of angles for which a stretch is computed, about five degrees apart."""
@@ -288,3 +294,40 @@ def _stretch(each: Any, find: Callable[[str, str], Hinge]) -> ConduitStretch:
     if not 0.0 < radius < length < math.inf:
         raise ValueError(f"the radius {radius} m is not between 0 and the length {length} m")
     return ConduitStretch(start, end, radius, length, hinge, winds=each["winds"] == hinge.joint)
+
+
+def stretches_of(robot: Robot) -> tuple[ConduitStretch, ...]:
+    """Return the stretches in the file CONDUITS beside that of ``robot``; none without such a file.
+
+    Raises RobotDescriptionError if the file is invalid or describes another arm.
+    """
+    if robot.path is None:
+        return ()
+    return read_stretches(robot.path.parent / CONDUITS, lambda *ends: _hinge(robot, *ends))
+
+
+def _hinge(robot: Robot, start: str, end: str) -> Hinge:
+    """Return the one joint between two links. Raises KeyError if there is not exactly one."""
+    arm, by_name = robot.require_arm(), {link.name: link for link in robot.links}
+    chain = arm.chain
+    path: list[Link] = []
+    name: str | None = end
+    while name != start:
+        if name is None:
+            raise KeyError(f"{end} is not a descendant of {start}")
+        path.insert(0, by_name[name])
+        name = path[0].parent
+    joints = [link.joint.name if link.joint is not None else "" for link in path]
+    driven = [i for i, joint in enumerate(joints) if joint in chain.names]
+    if len(driven) != 1:
+        raise KeyError(f"there are {len(driven)} driven joints between {start} and {end}, not one")
+    (at,) = driven
+    before, after = (
+        functools.reduce(np.matmul, (link.at_rest(arm.resting) for link in some), np.eye(4))
+        for some in (path[: at + 1], path[at + 1 :])
+    )
+    joint = path[at].joint
+    assert joint is not None
+    number = chain.names.index(joint.name)
+    lower, upper = float(chain.lower[number]), float(chain.upper[number])
+    return Hinge(joint.name, joint.axis, lower, upper, before, after)

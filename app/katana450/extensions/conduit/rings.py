@@ -10,11 +10,13 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from katana450.arm.robot.conduit import ConduitStretch
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.control.state import State
+from katana450.arm.robot.robot import Robot
+from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.view.scene import ArmNodes, Colour
+from katana450.server.view.layer import LayerContext, ViewLayer
+from katana450.server.view.scene import Colour
 from katana450.server.viser_bridge.posing import arrange
 
 Floats = npt.NDArray[np.float32]
@@ -74,16 +76,33 @@ class _StretchNode:
 class Conduits:
     """All stretches, each a child of the link it starts from. Only changed stretches are sent."""
 
-    def __init__(self, server: viser.ViserServer, arm: MountedArm, nodes: ArmNodes) -> None:
+    def __init__(self, server: viser.ViserServer, robot: Robot, path: Mapping[str, str]) -> None:
+        """Add the rings of ``robot``; ``path``: the scene node of each link.
+
+        Raises RobotDescriptionError for an invalid description of its conduit.
+        """
         self._stretches = [
-            _StretchNode(server, stretch, f"{nodes.path[stretch.start.link]}/conduit{number}")
-            for number, stretch in enumerate(arm.stretches)
+            _StretchNode(server, stretch, f"{path[stretch.start.link]}/conduit{number}")
+            for number, stretch in enumerate(stretches_of(robot))
         ]
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Show the conduit at the joint ``angles`` [rad], given by joint name."""
         for node in self._stretches:
             node.bend(angles[node.stretch.hinge.joint])
+
+
+class ConduitLayer(ViewLayer):
+    """The conduit as a layer of the scene, without controls."""
+
+    def attach(self, context: LayerContext) -> None:
+        """Add the rings. Raises RobotDescriptionError."""
+        self._robot = context.robot
+        self._conduits = Conduits(context.server, context.robot, context.path)
+
+    def follow(self, state: State) -> None:
+        """Bend the conduit as the joints of ``state`` do."""
+        self._conduits.move(self._robot.joint_values(state.q, state.gripper))
 
 
 def poses(stretch: ConduitStretch, count: int) -> Floats:

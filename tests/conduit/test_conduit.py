@@ -10,29 +10,40 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.arm.robot.arm_reader import CONDUITS
-from katana450.arm.robot.conduit import STRETCH_FRACTION
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
+from katana450.extensions.conduit.rings import PROFILE, SIDES, poses, ring
+from katana450.extensions.conduit.stretches import (
+    CONDUITS,
+    STRETCH_FRACTION,
+    ConduitStretch,
+    stretches_of,
+)
+from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from katana450.server.view.conduit import PROFILE, SIDES, ring
+
+Stretches = tuple[ConduitStretch, ...]
 
 DENSE = 400
 SPARSE = 40
 
 
-def test_it_runs_from_the_base_to_the_wrist_over_every_bending_joint(arm: MountedArm) -> None:
-    assert [each.hinge.joint for each in arm.stretches] == [f"axis_{i}" for i in range(1, 5)]
-    assert [each.winds for each in arm.stretches] == [True, False, False, False]
+@pytest.fixture(scope="module")
+def stretches(robot: Robot) -> Stretches:
+    return stretches_of(robot)
+
+
+def test_it_runs_from_the_base_to_the_wrist_over_every_bending_joint(stretches: Stretches) -> None:
+    assert [each.hinge.joint for each in stretches] == [f"axis_{i}" for i in range(1, 5)]
+    assert [each.winds for each in stretches] == [True, False, False, False]
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_it_leaves_one_fitting_and_arrives_at_the_other(arm: MountedArm, number: int) -> None:
+def test_it_leaves_one_fitting_and_arrives_at_the_other(stretches: Stretches, number: int) -> None:
     """Compare with the poses of both links, as yourdfpy reads them from the URDF."""
-    stretch = arm.stretches[number]
+    stretch = stretches[number]
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
     hinge = stretch.hinge
     for angle in np.linspace(hinge.lower, hinge.upper, 13):
@@ -49,9 +60,9 @@ def test_it_leaves_one_fitting_and_arrives_at_the_other(arm: MountedArm, number:
 
 @pytest.mark.parametrize("number", range(4))
 def test_its_ribs_keep_their_distance_and_it_moves_continuously(
-    arm: MountedArm, number: int
+    stretches: Stretches, number: int
 ) -> None:
-    stretch = arm.stretches[number]
+    stretch = stretches[number]
     before = None
     for angle in np.linspace(stretch.hinge.lower, stretch.hinge.upper, 400):
         (points,), _ = stretch.courses([angle], DENSE)
@@ -87,7 +98,10 @@ POSTURES = (
 
 @pytest.mark.parametrize("posture", POSTURES)
 def test_it_is_clear_of_every_solid(
-    robot: Robot, arm: MountedArm, surfaces: dict[str, FloatArray], posture: tuple[int, ...]
+    robot: Robot,
+    stretches: Stretches,
+    surfaces: dict[str, FloatArray],
+    posture: tuple[int, ...],
 ) -> None:
     """Test random points on the visible surfaces of the links, about 5 mm apart."""
     angles = robot.joint_values(np.radians(posture), 0.0)
@@ -95,7 +109,7 @@ def test_it_is_clear_of_every_solid(
     solid = np.concatenate(
         [points @ T[name][:3, :3].T + T[name][:3, 3] for name, points in surfaces.items()]
     )
-    for stretch in arm.stretches:
+    for stretch in stretches:
         (points,), _ = stretch.courses([angles[stretch.hinge.joint]], SPARSE)
         along = np.linspace(0.0, 1.0, SPARSE) * stretch.length
         free = points[(along > FITTED) & (along < stretch.length - FITTED)]
@@ -141,7 +155,7 @@ def test_a_broken_file_is_refused(tmp_path: Path, text: str, message: str) -> No
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(text, encoding="utf-8")
     with pytest.raises(RobotDescriptionError, match=message) as refused:
-        load(urdf).require_arm()
+        stretches_of(load(urdf))
     assert CONDUITS in str(refused.value)
 
 
@@ -163,7 +177,7 @@ def test_a_conduit_with_invalid_values_is_refused(
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
     with pytest.raises(RobotDescriptionError, match=message):
-        load(urdf).require_arm()
+        stretches_of(load(urdf))
 
 
 @pytest.mark.parametrize(
@@ -186,4 +200,23 @@ def test_ends_on_links_without_one_joint_between_are_refused(
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
     with pytest.raises(RobotDescriptionError, match=message):
-        load(urdf).require_arm()
+        stretches_of(load(urdf))
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_rings_are_square_to_the_conduit_also_between_computed_angles(
+    stretches: Stretches, number: int
+) -> None:
+    stretch = stretches[number]
+    rings = poses(stretch, 30)
+    between = 0.5 * (rings[1:] + rings[:-1])
+    for angles, shown in (
+        (stretch.angles, rings),
+        (0.5 * (stretch.angles[1:] + stretch.angles[:-1]), between),
+    ):
+        points, tangents = stretch.courses(angles, 30)
+        np.testing.assert_allclose(shown[..., 4:], points, atol=1e-6)
+        # A deviation of the length scales a ring by less than one pixel.
+        np.testing.assert_allclose(np.linalg.norm(shown[..., :4], axis=2), 1.0, atol=6e-3)
+        for row, lead in zip(shown.reshape(-1, 7), tangents.reshape(-1, 3), strict=True):
+            assert so3.from_quaternion(row[:4])[:, 0] @ lead > 0.998

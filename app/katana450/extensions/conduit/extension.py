@@ -1,0 +1,20 @@
+"""The extension ``conduit``: the cable conduit of the arm in the scene."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import TYPE_CHECKING
+
+from katana450.extension import Extension, ServeExtension
+
+if TYPE_CHECKING:
+    from katana450.server.view.layer import ViewLayer
+
+
+def _view_layer(_options: Namespace) -> ViewLayer:
+    from katana450.extensions.conduit.rings import ConduitLayer
+
+    return ConduitLayer()
+
+
+EXTENSION = Extension("conduit", serve=ServeExtension(view_layer=_view_layer))
