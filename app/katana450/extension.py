@@ -73,6 +73,8 @@ BUILT_IN = (
     "bodies",
     "loops",
     "conduit",
+    "water",
+    "ellipsoid",
     "general_arms",
 )
 """Built-in extensions, in the order of their commands in the help text."""

@@ -147,7 +147,7 @@ def test_command_of_a_missing_extension_reports_it(blocking: Path) -> None:
 
 NOT_NEEDED = (
     *("importers", "scene", "reachability", "export", "experiments", "media"),
-    *("conduit",),
+    *("conduit", "ellipsoid"),
 )
 """Extensions that a server does not need."""
 

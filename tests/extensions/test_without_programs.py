@@ -1,4 +1,4 @@
-"""Test a server without the extension ``programs``: it drives, stops and watches the arm."""
+"""Test a server without the extensions ``programs`` and ``water``: it drives and stops the arm."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ EXTENSION = Extension("nodding", serve=ServeExtension(runner=runner, folder=Fold
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
     folder = tmp_path_factory.mktemp("blocking")
-    with without(folder, "programs"), AppServer(STRICT_APP) as server:
+    with without(folder, "programs", "water"), AppServer(STRICT_APP) as server:
         yield server
 
 

@@ -28,10 +28,10 @@ from katana450.extensions.programs.server.preview import GHOSTS
 from katana450.extensions.programs.server.step_list import ListedStep, steps_of
 from katana450.extensions.programs.server.step_list import page as step_page
 from katana450.extensions.programs.timeline import Timeline
+from katana450.extensions.water.nodes import WORTH_SHOWING
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api.answers import Progress
-from katana450.server.view.water import WORTH_SHOWING
 from katana450.settings import Settings
 from tests.browser.server import free_port
 from tests.view.gestures import ANNA, RecordedGestures

@@ -20,6 +20,7 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.conduit.rings import ConduitLayer
+from katana450.extensions.water.nodes import WaterLayer
 from katana450.library.motion_plan import MotionPlan
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.controls import NoGestures
@@ -68,7 +69,7 @@ class Viewer:
         camera.position, camera.look_at, camera.fov = look.position, look.target, FOV
         session = arm.session
         parts = (self._server, arm.robot, session, load_props(), NoGestures(), Meshes())
-        self._scenery = Scenery(*parts, layers=(ConduitLayer(),))
+        self._scenery = Scenery(*parts, layers=(ConduitLayer(), WaterLayer()))
         self._path = scene.add_line_segments(
             "/path", np.zeros((1, 2, 3), np.float32), PATH_COLOUR, thickness=0.003, visible=False
         )

@@ -14,6 +14,7 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.programs.server.traces import TracesLayer
+from katana450.extensions.water.nodes import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.machine_nodes import MachineNodes
@@ -55,5 +56,5 @@ def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callabl
         set_up_room(server)
         nodes = MachineNodes(server, robot)
         return lambda state: nodes.move(robot.joint_values(state.q, state.gripper))
-    layers = (ConduitLayer(), TracesLayer())
+    layers = (ConduitLayer(), WaterLayer(), TracesLayer())
     return Scenery(server, robot, session, load_props(), NoGestures(), Meshes(), layers).show

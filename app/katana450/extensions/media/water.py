@@ -7,15 +7,7 @@ import numpy as np
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.media.picture import Translucent
 from katana450.extensions.media.scene import Item, smooth
-from katana450.maths.geometry import se3, so3
-from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Water, WaterFlow
-from katana450.maths.water.liquid import Liquid
-from katana450.maths.water.parcel import landing
-from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
-from katana450.maths.water.units import FEMTOLITRE
-from katana450.server.view.water import (
+from katana450.extensions.water.nodes import (
     CLEAR,
     FLAT,
     IN_AIR,
@@ -26,6 +18,14 @@ from katana450.server.view.water import (
     TWIST,
     WORTH_SHOWING,
 )
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.environment import WaterEnvironment
+from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.liquid import Liquid
+from katana450.maths.water.parcel import landing
+from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
+from katana450.maths.water.units import FEMTOLITRE
 
 CUP, STREAM, BASIN, PUDDLE = (
     "water in cup",

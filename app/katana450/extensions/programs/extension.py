@@ -97,6 +97,12 @@ def _routes(context: RouteContext) -> list[Any]:
 EXTENSION = Extension(
     "programs",
     serve=ServeExtension(
-        add_serve_options, view_layer=_view_layer, routes=_routes, runner=_runner, folder=_folder
+        add_serve_options,
+        view_layer=_view_layer,
+        routes=_routes,
+        runner=_runner,
+        folder=_folder,
+        # Previews show the water.
+        needs=("water",),
     ),
 )

@@ -18,13 +18,11 @@ class DisplayOptions:
     """The functions that the controls call.
 
     Attributes:
-        ellipsoid: shows or hides the velocity ellipsoid.
         handles: shows or hides the handles of scene objects.
         look_from: turns the camera of one browser.
         layers: layers of extensions.
     """
 
-    ellipsoid: Callable[[bool], None]
     handles: Callable[[bool], None]
     look_from: Callable[[viser.ClientHandle, Preset], None]
     layers: tuple[ViewLayer, ...]
@@ -45,12 +43,6 @@ def add_views(gui: viser.GuiApi, shows: DisplayOptions) -> None:
 
 def add_shows(gui: viser.GuiApi, shows: DisplayOptions) -> None:
     """Add the controls of the folder "Show"."""
-    box = gui.add_checkbox(
-        "Velocity ellipsoid",
-        initial_value=False,
-        hint="Possible speed of the tool point in each direction; flat at a singularity",
-    )
-    box.on_update(lambda _: shows.ellipsoid(box.value))
     handles = gui.add_checkbox(
         "Handles on objects",
         initial_value=False,

@@ -1,4 +1,4 @@
-"""The visible parts of a state apart from controls: arm, table, objects and water."""
+"""The visible parts of a state apart from controls: arm, table, objects, and layers."""
 
 from __future__ import annotations
 
@@ -11,18 +11,16 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
-from katana450.maths.water.environment import WaterEnvironment
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
-from katana450.server.view.water import WaterNodes
 from katana450.server.view.workcell import Workcell
 
 
 class Scenery:
-    """The nodes of arm, table, objects, water and layers. Only changes are sent."""
+    """The nodes of arm, table, objects and layers. Only changes are sent."""
 
     def __init__(
         self,
@@ -39,7 +37,7 @@ class Scenery:
         Args:
             server: viser's server.
             robot: The robot, which must have an arm.
-            session: The session, which has the environment of objects and the water model.
+            session: The session, which has the environment of objects.
             props: Table, cup and basin.
             gestures: The path of gestures at the handles of objects.
             meshes: The meshes of objects.
@@ -48,16 +46,11 @@ class Scenery:
         Raises:
             ConfigurationError: A layer cannot be shown.
         """
-        self._server = server
         self._robot = robot
-        self._session = session
         set_up_room(server)
         Workcell(server, props)
         self.objects = SceneObjectNodes(server, props, session.environment, gestures, meshes)
         self.arm = ArmNodes(server, robot)
-        # Made on the first state with water.
-        self._water: WaterNodes | None = None
-        self._water_environment: WaterEnvironment | None = None
         self._layers = layers
         for layer in layers:
             layer.attach(LayerContext(server, robot, session, self.arm.path))
@@ -66,20 +59,5 @@ class Scenery:
         """Show ``state``."""
         self.arm.move(self._robot.joint_values(state.q, state.gripper))
         self.objects.follow(state)
-        self._show_water(state)
         for layer in self._layers:
             layer.follow(state)
-
-    def _show_water(self, state: State) -> None:
-        pouring = self._session.pouring
-        if pouring is None or state.poured is None:
-            if self._water is not None:
-                self._water.hide()
-            return
-        water_environment = pouring.water_environment(state.objects)
-        if self._water is None:
-            self._water = WaterNodes(self._server, water_environment)
-        elif water_environment is not self._water_environment:
-            self._water.stand(water_environment)
-        self._water_environment = water_environment
-        self._water.show(state.poured.water)

@@ -23,7 +23,6 @@ from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.display_options import DisplayOptions
-from katana450.server.view.ellipsoid import EllipsoidNode
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.paint import PaintNodes
@@ -121,13 +120,11 @@ class View(ViewUpdater):
         self._gizmo = (view_options.gizmo or Gizmo)(
             server, self._arm, gestures, lambda: state_publisher.snapshot.state
         )
-        self._ellipsoid = EllipsoidNode(server, self._arm)
         self._cameras = Cameras(server, robot)
         if view_options.gizmo is not None:
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
         shows = DisplayOptions(
-            self._show_ellipsoid,
             self._scenery.objects.show_handles,
             self._look_from,
             view_options.layers,
@@ -147,9 +144,6 @@ class View(ViewUpdater):
         server.gui.add_html(style())
         self.show(state_publisher.snapshot)
 
-    def _show_ellipsoid(self, visible: bool) -> None:
-        self._ellipsoid.show(visible, self._state_publisher.snapshot.state)
-
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
         self._cameras.give(client, preset, self._state_publisher.snapshot.state)
 
@@ -161,7 +155,6 @@ class View(ViewUpdater):
             self._paint.follow(state)
             self._tint.follow(state)
             self._show_goal(state)
-            self._ellipsoid.follow(state)
             self._cameras.follow(state)
             caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(state, time.perf_counter(), caught_up=caught_up)

@@ -14,12 +14,12 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
+from katana450.extensions.water.nodes import WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.flow import Water
 from katana450.server.view.scene import Colour, Window
 from katana450.server.view.scene_objects import ObjectShape
-from katana450.server.view.water import WaterNodes
 
 ROOT = "/path"
 """Node above all ghosts of a preview."""

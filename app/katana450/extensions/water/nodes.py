@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from katana450.arm.control.state import State
 from katana450.disk_cache import kept
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -16,6 +17,7 @@ from katana450.maths.water.liquid import WATER, Liquid
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
+from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.scene import Window
 from katana450.srgb import to_light
 
@@ -42,6 +44,32 @@ FLAT = 5e-3
 
 TWIST = 2.4
 """Turn [rad] from puddle to puddle, which hides that all have the same shape."""
+
+
+class WaterLayer(ViewLayer):
+    """The water as a layer of the scene, without controls."""
+
+    def attach(self, context: LayerContext) -> None:
+        """Prepare for the water of a session."""
+        self._server, self._session = context.server, context.session
+        # Made on the first state with water.
+        self._nodes: WaterNodes | None = None
+        self._water_environment: WaterEnvironment | None = None
+
+    def follow(self, state: State) -> None:
+        """Draw the water of ``state``; hide the nodes without water."""
+        pouring = self._session.pouring
+        if pouring is None or state.poured is None:
+            if self._nodes is not None:
+                self._nodes.hide()
+            return
+        water_environment = pouring.water_environment(state.objects)
+        if self._nodes is None:
+            self._nodes = WaterNodes(self._server, water_environment)
+        elif water_environment is not self._water_environment:
+            self._nodes.stand(water_environment)
+        self._water_environment = water_environment
+        self._nodes.show(state.poured.water)
 
 
 class WaterNodes:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import velocity_ellipsoid
+from katana450.server.view.layer import LayerContext, ViewLayer
 
 SCALE = 0.2
 """Joint motion [rad] (norm) to which the drawn displacement of the tool point belongs."""
@@ -20,12 +22,14 @@ MIN_RADIUS = 1e-3
 COLOUR = (124, 77, 219)
 
 
-class EllipsoidNode:
-    """The ellipsoid in the scene, hidden until a person shows it."""
+class EllipsoidLayer(ViewLayer):
+    """The ellipsoid as a layer of the scene, hidden until a person shows it."""
 
-    def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
-        self._arm = arm
-        self._node = server.scene.add_icosphere(
+    def attach(self, context: LayerContext) -> None:
+        """Add the hidden node."""
+        self._arm = context.robot.require_arm()
+        self._state: State | None = None
+        self._node = context.server.scene.add_icosphere(
             "/velocity",
             radius=1.0,
             color=COLOUR,
@@ -35,13 +39,23 @@ class EllipsoidNode:
             visible=False,
         )
 
-    def show(self, visible: bool, state: State) -> None:
-        """Show the ellipsoid for ``state``, or hide it."""
-        self._node.visible = visible
-        self.follow(state)
+    def add_controls(self, gui: viser.GuiApi) -> None:
+        """Add the checkbox that shows the ellipsoid."""
+        box = gui.add_checkbox(
+            "Velocity ellipsoid",
+            initial_value=False,
+            hint="Possible speed of the tool point in each direction; flat at a singularity",
+        )
+
+        @box.on_update
+        def _(_: viser.GuiEvent[Any]) -> None:
+            self._node.visible = box.value
+            if self._state is not None:
+                self.follow(self._state)
 
     def follow(self, state: State) -> None:
         """Draw the ellipsoid for ``state`` if it is shown."""
+        self._state = state
         if not self._node.visible:
             return
         chain = self._arm.chain_to(state.tool)

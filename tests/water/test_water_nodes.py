@@ -15,11 +15,11 @@ import viser
 
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.water import water_environment
+from katana450.extensions.water.nodes import WORTH_SENDING, WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.water.flow import WaterFlow
 from katana450.maths.water.liquid import HONEY, LIQUIDS, OIL, WATER
 from katana450.maths.water.puddle import THICKNESS, Puddle
-from katana450.server.view.water import WORTH_SENDING, WaterNodes
 from katana450.srgb import to_srgb
 from tests.viser_bridge.internals import nodes, outlet
 from tests.water.motions import NO_ACCELERATION, over_basin, placed, poured, turned_to

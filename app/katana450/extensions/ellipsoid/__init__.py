@@ -1,0 +1,1 @@
+"""The velocity ellipsoid of the tool."""

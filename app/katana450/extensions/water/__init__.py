@@ -1,0 +1,1 @@
+"""The water of the state, drawn in the scene."""
