@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from katana450.maths.geometry.arrays import FloatArray
     from katana450.server.service.nodes import Nodes
     from katana450.server.service.recorder import Recorder
+    from katana450.server.service.request_handler import RequestHandler
     from katana450.server.service.runner import Runner
     from katana450.server.service.server_log import ServerLog
     from katana450.server.view.gizmo import Gizmo
@@ -72,6 +73,8 @@ BUILT_IN = (
     "gallery",
     "bodies",
     "loops",
+    "objects",
+    "undo",
     "conduit",
     "water",
     "ellipsoid",
@@ -168,6 +171,7 @@ class ServeExtension:
             Called in the process of the view, of the first extension that has it.
         runner: Returns the class that drives the arm over time, with its requests. Called in the
             process of the view, of the first extension that has it.
+        handler: Returns a class that answers further requests. Called in the process of the view.
         folder: Adds controls to a tab of the panel of an arm and returns them, or None. Called in
             the process of the view. Raises KatanaError.
         server_log: Returns the event log of the server on a port, or None. Called in the process
@@ -191,6 +195,7 @@ class ServeExtension:
     routes: Callable[[RouteContext], list[BaseRoute]] | None = None
     nodes: Callable[[Robot, Environment], Nodes] | None = None
     runner: Callable[[], type[Runner]] | None = None
+    handler: Callable[[], type[RequestHandler]] | None = None
     folder: Callable[[FolderContext], PanelFolder | None] | None = None
     server_log: Callable[[Namespace, int], ServerLog | None] | None = None
     send_records: Callable[[Namespace, Recorder, Connection], Callable[[], None] | None] | None = (

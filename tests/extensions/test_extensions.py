@@ -147,7 +147,7 @@ def test_command_of_a_missing_extension_reports_it(blocking: Path) -> None:
 
 NOT_NEEDED = (
     *("importers", "scene", "reachability", "export", "experiments", "media"),
-    *("conduit", "ellipsoid"),
+    *("conduit", "ellipsoid", "objects", "undo", "server_commands"),
 )
 """Extensions that a server does not need."""
 
@@ -164,6 +164,9 @@ def test_server_runs_without_the_extensions_it_does_not_need(
             assert arm.query(answers.Links).links
             with pytest.raises(RefusedError, match="Install the extension"):
                 arm.ask(requests.Get(node="Clock", field="startTime"))
+            for absent in (requests.Undo(), requests.Remove(name="cup"), requests.ListPeople()):
+                with pytest.raises(RefusedError, match="Install the extension"):
+                    arm.ask(absent)
             arm.ask(requests.Home())
         upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")
         with pytest.raises(urllib.error.HTTPError) as refused:

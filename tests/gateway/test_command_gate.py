@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from argparse import Namespace
 from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import replace
@@ -21,6 +22,8 @@ from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import ACCEPTED, Finding, Outcome, Reason
 from katana450.errors import LeaseError
+from katana450.extensions.undo.undo_requests import UndoRequests
+from katana450.server.api import requests
 from katana450.server.service import serialize
 from katana450.server.service.hub import TICK
 from katana450.server.service.participants import Participant
@@ -271,16 +274,17 @@ def test_event_of_a_browser_without_a_gesture_has_no_actor(
 def test_undone_change_is_kept_only_if_the_arm_refuses_its_inverse(
     table: Table, outcome: Outcome, meanwhile: bool, left: list[str]
 ) -> None:
-    gate, driver = table.hub.gate, table.join(PAGES[0])
+    handler, driver = UndoRequests(table.hub, Namespace()), table.join(PAGES[0])
     reported: Future[Outcome] = Future()
     table.arm.outcome = lambda _ticket: reported
 
     def undoable() -> list[str]:
-        return [each.name for each in gate.undo.changes(driver.person.key, gate.revocations)]
+        found: list[str] = handler.page_status(driver)["undo"]
+        return found
 
     table.hub.move(driver, cmd.SpeedScale(0.5))
     assert undoable() == ["speed"]
-    gate.undo_last(driver.actor)
+    handler.handle(driver, requests.Undo())
     assert undoable() == []
     if meanwhile:
         # Its undoing would now also undo this one.

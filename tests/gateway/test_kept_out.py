@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from starlette.requests import Request
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
@@ -38,6 +40,7 @@ class House:
     def __init__(self, folder: Path, session: Session, *, free: bool = False) -> None:
         self.file = AccessFile.create(folder / "access.json")
         self.hub = Hub(time.monotonic)
+        self.hub.add_handler(PeopleRequests(self.hub, Namespace()))
         self.arm = self.hub.gate.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
         access = None if free else self.file
         self.people = self.hub.people

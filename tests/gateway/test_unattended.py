@@ -18,6 +18,7 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.extension import OWNER_SILENCE
 from katana450.extensions.programs.requests import AllowUnattended, ProgramOrder, Steer
 from katana450.extensions.programs.server.program_runner import ProgramRunner
+from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
@@ -198,6 +199,7 @@ def test_unattended_program_of_a_disconnected_person_ends(
     assert table.status == "running"
     (number,) = people.shown
     kick = requests.Kick(person=number, seconds=60.0, revoke=revoke)
+    table.hub.add_handler(PeopleRequests(table.hub, Namespace()))
 
     async def act() -> None:
         Dispatcher(table.hub).handle(admin, kick, Budgets(table.hub.clock).of("ada"))

@@ -80,6 +80,9 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
         meshes,
         routes,
         partial(runners[0], options=options) if runners and options is not None else None,
+        [partial(part.handler(), options=options) for part in parts if part.handler is not None]
+        if options is not None
+        else [],
     )
     gateway.hub.supervisor_problem = lambda: supervisor.problem
     supervisor.notify = gateway.announce

@@ -31,6 +31,7 @@ from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival, keep_alive
 from katana450.server.service.hub import TICK, Hub
+from katana450.server.service.request_handler import RequestHandler
 from katana450.server.service.runner import Runner
 from katana450.server.service.stop_path import StopPath
 from katana450.server.service.stop_state import ClearBy
@@ -83,6 +84,7 @@ class Gateway:
         meshes: Meshes | None = None,
         routes: Sequence[RouteProvider] = (),
         runner: Callable[[Hub], Runner] | None = None,
+        handlers: Sequence[Callable[[Hub], RequestHandler]] = (),
     ) -> None:
         """Set up the server; it does not answer yet.
 
@@ -93,6 +95,7 @@ class Gateway:
             meshes: the meshes of scene objects, to which uploaded ones are added.
             routes: routes of the extensions.
             runner: see ``Hub``.
+            handlers: further handlers of requests.
 
         Raises:
             ConfigurationError: ``settings`` do not allow serving on this socket.
@@ -116,6 +119,8 @@ class Gateway:
             self.hub = Hub(
                 time.monotonic, settings.silence, meshes, runner, ClearBy(settings.clear_by)
             )
+            for handler in handlers:
+                self.hub.add_handler(handler(self.hub))
             self.hub.stop_path = StopPath(
                 # Behind a proxy, the paths of STOP on the page's own address lead there.
                 settings.stop_port if settings.public_url is None else None,

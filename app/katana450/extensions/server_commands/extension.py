@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from typing import TYPE_CHECKING
 
-from katana450.extension import CliCommand, Extension
+from katana450.extension import CliCommand, Extension, ServeExtension
 from katana450.extensions.server_commands.access_options import add_access_options
 from katana450.extensions.server_commands.go_options import add_go_options
 from katana450.extensions.server_commands.people_options import add_people_options
+
+if TYPE_CHECKING:
+    from katana450.server.service.request_handler import RequestHandler
 
 
 def _go(options: Namespace) -> int:
@@ -28,6 +32,12 @@ def _people(options: Namespace) -> int:
     return people(options)
 
 
+def _handler() -> type[RequestHandler]:
+    from katana450.extensions.server_commands.people_requests import PeopleRequests
+
+    return PeopleRequests
+
+
 EXTENSION = Extension(
     "server_commands",
     (
@@ -41,4 +51,5 @@ EXTENSION = Extension(
             "people", "list who is connected, disconnect and mute", add_people_options, _people
         ),
     ),
+    ServeExtension(handler=_handler),
 )

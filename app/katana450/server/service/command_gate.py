@@ -15,7 +15,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Lease, Person
 from katana450.arm.control.messages import finding_text
-from katana450.arm.control.state import CAUSES, Finding
+from katana450.arm.control.state import CAUSES, Finding, State
 from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
@@ -23,7 +23,6 @@ from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.last_pause import LastPause
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import ClearBy, ClearRights, StopRecord
-from katana450.server.service.undo import UndoHistory
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +50,8 @@ class CommandGate:
     def __init__(self, clock: Callable[[], float], clear_by: ClearBy = ClearBy.DRIVER) -> None:
         """Create a gate without an arm. ``clock`` is in seconds. ``clear_by``: see ``ClearBy``."""
         self._clock = clock
-        self._lock = threading.RLock()
+        self.lock = threading.RLock()
+        """Lock that keeps other commands, stops and changes of the lease out."""
         self.lease = Lease()
         self.stopped: StopRecord | None = None
         self.arm: ArmInterface | None = None
@@ -67,7 +67,9 @@ class CommandGate:
         """Notes commands, stops and changes of the lease for the event log."""
         self.presser_of: Callable[[StopCause], Actor | None] = lambda _: None
         """Function that returns the participant that pressed STOP; None for another cause."""
-        self.undo = UndoHistory(clock)
+        self.delivered: list[Callable[[cmd.Command, Actor, State, bool], None]] = []
+        """Callbacks with each delivered command, its actor, the state before it, and whether that
+        state includes every earlier command."""
         self._clear_by = clear_by
         self._presses = Presses()
         self._cleared = 0
@@ -82,7 +84,7 @@ class CommandGate:
         0 while there is no arm. Raises LeaseError if ``actor`` may not give the command now, and
         InputError for a command that the arm cannot accept.
         """
-        with self._lock:
+        with self.lock:
             if isinstance(command, cmd.Stop):
                 return self._press(command, actor)
             try:
@@ -92,9 +94,11 @@ class CommandGate:
                     granted = self._checked(command, actor)
                     # What follows from the command later is void after a revocation.
                     granted = replace(granted, seen=self.revocations)
-                    arm, before = self.present(), self.present().state
-                    with self.undo.noted(arm, command, granted):
-                        ticket = arm.deliver(command, granted)
+                    arm = self.present()
+                    before, caught_up = arm.state, arm.caught_up
+                    ticket = arm.deliver(command, granted)
+                    for note in self.delivered:
+                        note(command, granted, before, caught_up)
                     self.motions += any(each.traits.supersedes for each in command.parts)
                     self.last_pause = LastPause.after(self.last_pause, command, actor, before)
             except KatanaError as error:
@@ -103,16 +107,6 @@ class CommandGate:
             if isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
             self.recorder.command(command, granted, ticket)
-            return ticket
-
-    def undo_last(self, actor: Actor) -> int:
-        """Undo the last change of ``actor``; return the ticket. Raises as ``submit`` does."""
-        with self._lock:
-            arm = self.check_runs()
-            self.check_current(actor)
-            change, command = self.undo.inverse(actor.key, self.revocations, arm.state)
-            ticket = self.submit(command, actor)
-            self.undo.forget(change, arm.outcome(ticket))
             return ticket
 
     def _checked(self, command: cmd.Command, actor: Actor) -> Actor:
@@ -130,7 +124,7 @@ class CommandGate:
         A gesture without a command, such as grabbing a handle, uses this. Raises, and acquires a
         free lease, as ``submit`` does.
         """
-        with self._lock:
+        with self.lock:
             try:
                 self.check_runs()
                 self._check_settled(actor)
@@ -171,7 +165,7 @@ class CommandGate:
 
     def acquire(self, actor: Actor) -> None:
         """Acquire the free lease for ``actor``. Raises LeaseError if another person holds it."""
-        with self._lock:
+        with self.lock:
             before = self.lease
             lease = before.acquire(actor.person, self._clock())
             if before.holder is not None:
@@ -185,7 +179,7 @@ class CommandGate:
 
         ``by``: actor in whose name the arm holds. Raises the LeaseError of ``event``.
         """
-        with self._lock:
+        with self.lock:
             lease = event(self.lease, self._clock())
             if lease.holder != self.lease.holder:
                 self._revoke()
@@ -201,7 +195,7 @@ class CommandGate:
 
     def protect(self, why: str) -> None:
         """Stop the arm in the name of the server, for the reason ``why``."""
-        with self._lock:
+        with self.lock:
             self._stop(StopCause(why, at=time.time()), SERVER)
 
     @property
@@ -221,7 +215,7 @@ class CommandGate:
 
     def pause(self, cause: Finding) -> None:
         """Pause the arm in the name of the server: the next command moves it."""
-        with self._lock:
+        with self.lock:
             arm = self.present()
             log.warning("Paused: %s.", finding_text(cause))
             self._waits = True
@@ -234,13 +228,13 @@ class CommandGate:
 
         Messages that waited while a connection or a process hung are not new commands.
         """
-        with self._lock:
+        with self.lock:
             self._revoke()
             self.refuse_motion()
 
     def refuse_motion(self) -> None:
         """Refuse motion for SETTLE_TIME from now on."""
-        with self._lock:
+        with self.lock:
             self._settled = self._clock() + SETTLE_TIME
 
     def _note_pause(self) -> None:
@@ -263,7 +257,7 @@ class CommandGate:
 
     def reconcile(self) -> None:
         """Make gate and arm agree on whether the arm is stopped or paused. Call this often."""
-        with self._lock:
+        with self.lock:
             arm = self.arm
             if arm is None:
                 return
@@ -290,7 +284,7 @@ class CommandGate:
 
     def moves(self) -> bool:
         """Return whether the arm moves or is about to move."""
-        with self._lock:
+        with self.lock:
             jogged = self._clock() - self._jogged < cmd.JOG_TIME
             return self.arm is not None and (self.arm.state.moving or jogged)
 

@@ -22,10 +22,8 @@ from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub
 from katana450.server.service.interfaces import ArmInterface
-from katana450.server.service.object_requests import ObjectRequests
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.pending_answer import PendingAnswer, give_back
-from katana450.server.service.people_requests import PeopleRequests
 
 COMMANDS: dict[type[requests.Request], cmd.Command] = {
     requests.EndDrag: cmd.EndDrag(),
@@ -61,8 +59,6 @@ class Dispatcher:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._objects = ObjectRequests(hub)
-        self._people = PeopleRequests(hub)
 
     def handle(
         self, participant: Participant, request: requests.Request, budget: Budget
@@ -125,18 +121,12 @@ class Dispatcher:
             case requests.Stop(press=press):
                 # Answered at once: later states confirm the stop.
                 return _done(hub.stop(participant.actor, press), REQUESTED)
-        about_people = self._people.answer(participant, request)
-        if about_people is not None:
-            return about_people
-        if isinstance(request, hub.runner.request_types):
-            hub.gate.check_current(replace(participant.actor, seen=request.revocations))
-            return hub.runner.handle(participant, request)
-        if isinstance(request, requests.Undo):
-            # Read before the undo: a stop in between is newer than the answer.
-            revocations = hub.gate.revocations
-            ticket = hub.gate.undo_last(replace(participant.actor, seen=request.revocations))
-            return msgspec.structs.replace(_done(ticket, None), revocations=revocations)
-        command = self._command(request)
+            case requests.Watch():
+                # The channel has set the rate of states.
+                return answers.Done()
+        command = self._handled(participant, request) or self._command(request)
+        if isinstance(command, answers.Answer):
+            return command
         if command is None:
             self._change_lease(participant, request)
             return answers.Done()
@@ -147,6 +137,18 @@ class Dispatcher:
         at_once = request.traits.stream or command.traits.planned or not ticket
         done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))
         return msgspec.structs.replace(done, revocations=revocations)
+
+    def _handled(
+        self, participant: Participant, request: requests.Request
+    ) -> answers.Answer | cmd.Command | None:
+        """Return what the handler of ``request`` does; None for a request of the core."""
+        for handler in self._hub.handlers:
+            if isinstance(request, handler.request_types):
+                if handler is self._hub.runner:
+                    actor = replace(participant.actor, seen=request.revocations)
+                    self._hub.gate.check_current(actor)
+                return handler.handle(participant, request)
+        return None
 
     def _change_lease(self, participant: Participant, request: requests.Request) -> None:
         """Execute a request about the lease."""
@@ -168,6 +170,8 @@ class Dispatcher:
                 hub.decline(participant, number)
             case requests.Rename(name=name):
                 hub.rename(participant, name)
+            case _:
+                raise InputError(f"Install the extension that answers {type(request).__name__}.")
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of ``request``; None for a request about the lease."""
@@ -192,7 +196,7 @@ class Dispatcher:
                 return cmd.OperateArm(act, confirmed)
             case requests.Set():
                 return self._setting(request)
-        return self._tool_command(request) or self._objects.command(request)
+        return self._tool_command(request)
 
     def _tool_command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of a request about the tool; None for another request."""

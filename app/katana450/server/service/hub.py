@@ -39,6 +39,7 @@ from katana450.server.service.participants import (
 from katana450.server.service.people import People
 from katana450.server.service.pictures import ShownPictures
 from katana450.server.service.recorder import Recorder
+from katana450.server.service.request_handler import RequestHandler
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_news import StopNews
@@ -75,7 +76,8 @@ class Hub:
         self.event_log = EventLog()
         self.people = People(clock)
         self.runner = Runner(self, Namespace()) if runner is None else runner(self)
-        self.requests = RequestDecoder(self.runner.request_types)
+        self.handlers: list[RequestHandler] = []
+        self.add_handler(self.runner)
         self.gate.on_stop = guarded(self.runner.stopped)
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
@@ -89,6 +91,12 @@ class Hub:
         """Returns what is wrong with the supervisor of this process, in words."""
         self.shown: dict[str, Any] = {}
         """Entries of extensions in the status of all pages. It is replaced, never changed."""
+
+    def add_handler(self, handler: RequestHandler) -> None:
+        """Let ``handler`` answer its requests."""
+        self.handlers.append(handler)
+        added = (kind for each in self.handlers for kind in each.request_types)
+        self.requests = RequestDecoder(tuple(added))
 
     @property
     def held_up(self) -> float:

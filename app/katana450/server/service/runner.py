@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import logging
-from argparse import Namespace
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.state import State
 from katana450.server.api import answers
-from katana450.server.api.fields import Request
+from katana450.server.service.request_handler import RequestHandler
 
 if TYPE_CHECKING:
-    from katana450.server.service.hub import Hub
     from katana450.server.service.participants import Participant
 
 log = logging.getLogger(__name__)
@@ -35,7 +33,7 @@ class StatusLine(NamedTuple):
     end: str = ""
 
 
-class Runner:
+class Runner(RequestHandler):
     """A runner drives the arm over time on behalf of an owner. This base class never does.
 
     A run joins the hub as a participant, holds the lease, and submits its commands through the
@@ -43,30 +41,15 @@ class Runner:
     below in the server's thread, except where they name another. A server has one runner.
 
     Attributes:
-        request_types: Classes of the requests that ``handle`` answers, in addition to the core's.
         controls: Labels of its controls in the panel. ``check_may_touch`` decides who may use them.
     """
 
-    request_types: ClassVar[tuple[type[Request], ...]] = ()
     controls: ClassVar[tuple[str, ...]] = ()
-
-    def __init__(self, hub: Hub, options: Namespace) -> None:
-        """Create a runner for ``hub``. ``options``: those of ``katana450 serve``."""
-        self.hub = hub
-        self.options = options
 
     @property
     def running(self) -> bool:
         """True while a run drives the arm."""
         return False
-
-    def handle(self, participant: Participant, request: Request) -> answers.Answer:  # noqa: ARG002
-        """Execute ``request``, one of ``request_types``, and return its answer.
-
-        Raises LeaseError and InputError with the reason for a refusal.
-        """
-        kind = type(request).__name__
-        raise AssertionError(f"{type(self).__name__} lists {kind} and does not execute it.")
 
     def owns(self, participant: Participant) -> bool:  # noqa: ARG002
         """Return whether ``participant`` owns the present or last run, or its planning."""

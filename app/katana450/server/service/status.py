@@ -172,6 +172,10 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
         "planning": planning,
         "fraction": round(program.fraction, 2) if program is not None and planning else 0.0,
         "orders": list(hub.runner.orders(participant)) if hub.arm is not None else [],
-        "undo": [each.name for each in hub.gate.undo.changes(person.key, hub.gate.revocations)],
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
+        **{
+            key: value
+            for each in hub.handlers
+            for key, value in each.page_status(participant).items()
+        },
     }

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from katana450.arm.control import commands as cmd
@@ -13,7 +12,6 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.scene_objects import SceneObject, named
 from katana450.arm.control.state import Outcome, State, Verdict
 from katana450.errors import InputError
-from katana450.server.service.interfaces import ArmInterface
 
 MAX_CHANGES = 20
 """Maximum number of changes that can be undone."""
@@ -71,7 +69,7 @@ class Change:
 
 
 class UndoHistory:
-    """The changes that ``CommandGate`` has accepted, the newest last.
+    """The changes that the gate has accepted, the newest last.
 
     A stop or a change of driver ends the history, because it counts as a revocation.
     """
@@ -85,11 +83,11 @@ class UndoHistory:
         # Outcomes are reported in the thread of the pipe.
         self._lock = threading.Lock()
 
-    @contextmanager
-    def noted(self, arm: ArmInterface, command: cmd.Command, actor: Actor) -> Iterator[None]:
-        """Note what ``command`` of ``actor`` changes, if the block delivers it without an error."""
-        state, caught_up = arm.state, arm.caught_up
-        yield
+    def note(self, command: cmd.Command, actor: Actor, state: State, caught_up: bool) -> None:
+        """Note what ``command`` of ``actor``, delivered in ``state``, changes.
+
+        ``caught_up``: whether ``state`` includes every earlier command.
+        """
         with self._lock:
             self._note(state, command, actor, caught_up=caught_up)
 

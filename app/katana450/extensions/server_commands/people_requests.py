@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
+from argparse import Namespace
 from datetime import UTC, datetime
 
 from katana450.arm.control.lease import Role
@@ -14,23 +15,26 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.request_handler import RequestHandler
 
 log = logging.getLogger(__name__)
 
 
-class PeopleRequests:
+class PeopleRequests(RequestHandler):
     """Executes the requests of admins about people.
 
     The dispatcher has checked that the sender is one. Raises LeaseError for what even an admin may
     not do, and InputError for an unknown person.
     """
 
-    def __init__(self, hub: Hub) -> None:
-        self._hub = hub
+    request_types = (requests.ListPeople, requests.Kick, requests.Mute, requests.Unmute)
+
+    def __init__(self, hub: Hub, options: Namespace) -> None:
+        super().__init__(hub, options)
         self._people = hub.people
 
-    def answer(self, participant: Participant, request: requests.Request) -> answers.Answer | None:
-        """Execute ``request`` and return its answer; None for a request about something else."""
+    def handle(self, participant: Participant, request: requests.Request) -> answers.Answer:
+        """Execute ``request`` and return its answer."""
         match request:
             case requests.ListPeople():
                 return answers.People(people=self._list(session_of(participant.person.key)))
@@ -44,8 +48,6 @@ class PeopleRequests:
                 self._people.mutes.remove(found.session)
                 self._store_mute(participant, found, None)
                 log.warning("%s ended the mute of %s.", participant.person.name, self._name(found))
-            case _:
-                return None
         return answers.Done()
 
     def _kick(self, participant: Participant, person: Identity, request: requests.Kick) -> None:
@@ -86,7 +88,7 @@ class PeopleRequests:
     def _remove(self, person: Identity, seconds: float) -> None:
         """Disconnect ``person`` for ``seconds``, and end what runs on its behalf."""
         self._people.kick(person, seconds)
-        self._hub.runner.removed(person.session)
+        self.hub.runner.removed(person.session)
 
     def _mute(self, participant: Participant, person: Identity, seconds: float) -> None:
         if person.role is Role.ADMIN:
@@ -100,7 +102,7 @@ class PeopleRequests:
     def _note(self, kind: str, participant: Participant, person: Identity, **values: float) -> None:
         """Note for the event log what an admin did to ``person``."""
         what = {"person": self._name(person), "link": person.link, **values}
-        self._hub.recorder.note(kind, participant.actor, what, always=True)
+        self.hub.recorder.note(kind, participant.actor, what, always=True)
 
     def _store_mute(
         self, participant: Participant, person: Identity, interval: float | None
@@ -135,7 +137,7 @@ class PeopleRequests:
         *,
         you: bool,
     ) -> answers.ConnectedPerson:
-        hub, people, session = self._hub, self._people, identity.session
+        hub, people, session = self.hub, self._people, identity.session
         program = hub.gate.program
         owns = program is not None and session_of(program.owner) == session
         kept_out = people.kept_out(session)
@@ -159,13 +161,13 @@ class PeopleRequests:
         if identity.link_name:
             return identity.link_name
         for each in self._people.connections.get(identity.session, ()):
-            participant = self._hub.participant(each.key)
+            participant = self.hub.participant(each.key)
             if participant is not None:
                 return participant.person.name
         return identity.name or "Somebody"
 
     def _connection(self, connection: Connection) -> answers.PersonConnection:
-        participant = self._hub.participant(connection.key)
+        participant = self.hub.participant(connection.key)
         scene = connection.kind is ConnectionKind.SCENE
         return answers.PersonConnection(
             kind=connection.kind.value,

@@ -17,37 +17,39 @@ from katana450.maths.geometry import se3
 from katana450.maths.water.liquid import LIQUIDS
 from katana450.maths.water.units import ML
 from katana450.server.api import requests
-from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Participant
+from katana450.server.service.request_handler import RequestHandler
 
 
-class ObjectRequests:
+class ObjectRequests(RequestHandler):
     """Translates requests about scene objects and water into commands.
 
     Raises InputError or LeaseError with the reason for a refusal.
     """
 
-    def __init__(self, hub: Hub) -> None:
-        self._hub = hub
+    request_types = (
+        *(requests.Place, requests.Attach, requests.Load, requests.Fill, requests.Remove),
+    )
 
-    def command(self, request: requests.Request) -> cmd.Command | None:
-        """Return the command of ``request``; None for a request about something else."""
+    def handle(self, _participant: Participant, request: requests.Request) -> cmd.Command:
+        """Return the command of ``request``."""
         match request:
             case requests.Place():
                 return cmd.PlaceObject(self._object(request))
             case requests.Attach():
                 return self._attached(request)
             case requests.Load(scene=key):
-                return self._hub.scenes.load_command(key, self._hub.present())
+                return self.hub.scenes.load_command(key, self.hub.present())
             case requests.Fill(ml=ml, of=name):
                 return cmd.Fill(ML * ml, LIQUIDS[name])
             case requests.Remove(name=name):
                 self._known(name)
                 return cmd.Remove(name)
-        return None
+        raise AssertionError(request)
 
     def _object(self, request: requests.Place) -> SceneObject:
         """Return the requested object at its place; fields that are not given keep their values."""
-        arm = self._hub.present()
+        arm = self.hub.present()
         known = self._known(request.name)
         if known is None and len(arm.state.objects) >= MAX_OBJECTS:
             raise InputError(f"There are {MAX_OBJECTS} objects already: remove one first.")
@@ -76,7 +78,7 @@ class ObjectRequests:
         if request.shape is not None:
             shape = Shape(request.shape.value)
         if request.mesh is not None:
-            solid = self._hub.meshes.need(request.mesh).solid
+            solid = self.hub.meshes.need(request.mesh).solid
         if request.size is not None:
             size = tuple(request.size)
         if shape is Shape.MESH:
@@ -115,7 +117,7 @@ class ObjectRequests:
 
     def _attached(self, request: requests.Attach) -> cmd.Command:
         """Return the command that fixes the object where it is, or at a pose on the hand."""
-        arm = self._hub.present()
+        arm = self.hub.present()
         scene_object = self._known(request.name)
         if scene_object is None:
             raise InputError(f"There is no {request.name!r}.")
@@ -131,7 +133,7 @@ class ObjectRequests:
 
     def _known(self, name: str) -> SceneObject | None:
         """Return the object of ``name``; None without one. Raises InputError while it is held."""
-        arm = self._hub.present()
+        arm = self.hub.present()
         if any(link.name == name for link in arm.robot.links) or name == "table":
             raise InputError(f"{name!r} is not an object that can be moved.")
         known = named(arm.state.objects, name)

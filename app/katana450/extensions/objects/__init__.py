@@ -1,0 +1,1 @@
+"""Scene objects and water, changed by people and programs."""

@@ -1,0 +1,1 @@
+"""Undo of the last changes of the driver."""
