@@ -21,8 +21,8 @@ from katana450.arm.robot.creases import drawn, glb
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
 from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.extensions.objects.objects_panel import NOTHING, ObjectsPanel
 from katana450.maths.water.environment import TableTop
-from katana450.server.view.objects_panel import NOTHING, ObjectsPanel
 from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.tint import Tint
 from tests.view.gestures import RecordedGestures
@@ -175,7 +175,7 @@ def test_panel_shows_the_chosen_object(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ObjectsPanel(server, RecordedGestures(), lambda: state, session.environment)
+    panel = ObjectsPanel(server, RecordedGestures(), lambda: state, lambda: session.environment)
     assert panel._choice.value == NOTHING
     scene_object = SceneObject(
         "it",

@@ -1,4 +1,4 @@
-"""The extension ``objects``: the requests that place, change and remove scene objects."""
+"""The extension ``objects``: requests and controls that change scene objects."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
     from katana450.server.service.request_handler import RequestHandler
+    from katana450.server.view.panel_folder import FolderContext, PanelFolder
 
 
 def _handler() -> type[RequestHandler]:
@@ -16,4 +17,10 @@ def _handler() -> type[RequestHandler]:
     return ObjectRequests
 
 
-EXTENSION = Extension("objects", serve=ServeExtension(handler=_handler))
+def _folder(context: FolderContext) -> PanelFolder:
+    from katana450.extensions.objects.objects_panel import ObjectsFolder
+
+    return ObjectsFolder(context)
+
+
+EXTENSION = Extension("objects", serve=ServeExtension(handler=_handler, folder=_folder))

@@ -27,6 +27,8 @@ from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import frozen
 from katana450.server.view.controls import GestureGate, refuse, set_value
+from katana450.server.view.panel_folder import FolderContext
+from katana450.server.view.panel_tabs import SCENE
 from katana450.server.view.scene_objects import COLOUR
 
 NOTHING = "nothing yet"
@@ -37,6 +39,27 @@ MOUNTS = {"Hand": Attachment.HAND, "Table": Attachment.TABLE, "Here": Attachment
 OWN, REMOVE = "Own colour", "Remove"
 
 
+class ObjectsFolder:
+    """The folder "Objects" in the tab "Scene"."""
+
+    def __init__(self, context: FolderContext) -> None:
+        """Add the controls."""
+        self._hub = context.hub
+        with context.tabs.tab(SCENE), context.server.gui.add_folder("Objects"):
+            self._panel = ObjectsPanel(
+                context.server,
+                context.gestures,
+                context.state,
+                lambda: context.hub.present().environment,
+            )
+
+    def follow(self) -> None:
+        """Show the objects of the newest state."""
+        arm = self._hub.arm
+        if arm is not None:
+            self._panel.follow(arm.state, caught_up=arm.caught_up)
+
+
 class ObjectsPanel:
     """The controls for the chosen scene object."""
 
@@ -45,7 +68,7 @@ class ObjectsPanel:
         server: viser.ViserServer,
         gestures: GestureGate,
         state: Callable[[], State],
-        environment: Environment,
+        environment: Callable[[], Environment],
     ) -> None:
         """Add the controls to the open folder of ``server``.
 
@@ -53,7 +76,7 @@ class ObjectsPanel:
             server: viser's server.
             gestures: The path of gestures to the arm.
             state: Returns the newest state.
-            environment: The supports and links to which objects can be fixed.
+            environment: Returns the supports and links to which objects can be fixed.
         """
         self._environment = environment
         self._gestures = gestures
@@ -152,7 +175,7 @@ class ObjectsPanel:
 
     def _mounted(self, scene_object: SceneObject) -> cmd.Command:
         to, state = MOUNTS[self._mounts.value], self._state()
-        check_mounted(self._environment, state.objects, scene_object, to, state.x)
+        check_mounted(self._environment(), state.objects, scene_object, to, state.x)
         return cmd.Attach(scene_object.name, to)
 
     def _acted(self, scene_object: SceneObject) -> cmd.Command:

@@ -16,7 +16,6 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
-from katana450.server.view.display_options import add_themes
 from katana450.server.view.event_list import EventList
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
@@ -53,10 +52,8 @@ class MachinePanel:
             listen(drive, lambda: GESTURES[drive.value])
             self._readout = gui.add_html(page(joints, self._labels, state))
             gui.add_html(style())
-        with tabs.tab(SCENE):
-            add_themes(gui)
-            with gui.add_folder("Why", expand_by_default=False):
-                self._why = EventList(gui, gestures)
+        with tabs.tab(SCENE), gui.add_folder("Why", expand_by_default=False):
+            self._why = EventList(gui, gestures)
 
     def follow(
         self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import viser
 
+from katana450.server.view.display_options import add_themes
+
 DRIVE, SCENE = "Drive", "Scene"
-"""Labels of the tabs of the core. The tabs of extensions are between them."""
+"""Labels of the tabs of the core. The tabs of built-in extensions are between them."""
 
 
 class PanelTabs:
@@ -13,6 +15,7 @@ class PanelTabs:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         """Add the empty group of tabs to ``gui``."""
+        self._gui = gui
         self._group = gui.add_tab_group()
         self._tabs: dict[str, viser.GuiTabHandle] = {}
 
@@ -20,4 +23,7 @@ class PanelTabs:
         """Return the tab ``label``, a context in which controls are added to it."""
         if label not in self._tabs:
             self._tabs[label] = self._group.add_tab(label)
+            if label == SCENE:
+                with self._tabs[label]:
+                    add_themes(self._gui)
         return self._tabs[label]

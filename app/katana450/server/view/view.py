@@ -137,9 +137,7 @@ class View(ViewUpdater):
             self._panel = Panel(server, robot, gestures, session.choices, state)
         self._folders = tuple(view_options.folders(tabs))
         with tabs.tab(SCENE):
-            self._scene_tab = SceneTab(
-                server, gestures, shows, lambda: state_publisher.snapshot.state, session.environment
-            )
+            self._scene_tab = SceneTab(server.gui, gestures, shows)
         # At the end of the panel, because the element takes an empty line.
         server.gui.add_html(style())
         self.show(state_publisher.snapshot)
@@ -158,7 +156,7 @@ class View(ViewUpdater):
             self._cameras.follow(state)
             caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(state, time.perf_counter(), caught_up=caught_up)
-            self._scene_tab.follow(state, caught_up=caught_up)
+            self._scene_tab.follow()
             for folder in self._folders:
                 folder.follow()
         self._server.flush()
