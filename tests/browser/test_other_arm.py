@@ -65,5 +65,5 @@ def test_gizmo_has_arrows_and_rings_and_branches_have_names(six: ViserPage) -> N
     rows = six.frame.locator("tr[data-branch]")
     rows.first.wait_for()
     assert rows.count() == 8
-    assert "front-up-plus" in {rows.nth(k).get_attribute("data-branch") for k in range(8)}
+    assert "left-up-noflip" in {rows.nth(k).get_attribute("data-branch") for k in range(8)}
     assert not six.errors

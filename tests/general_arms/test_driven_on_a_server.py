@@ -98,8 +98,8 @@ def test_step_has_six_numbers_and_undo_takes_it_back(arm: Client) -> None:
     [
         (requests.StepTool(by=(0.0,) * 5), "6 numbers"),
         (requests.Turn(pitch=0.0, roll=0.0), "pose or a rotation"),
-        (requests.Branch(name="left"), "front-up-plus"),
-        (requests.Branch(shoulder="front", elbow="up"), "front-up-plus"),
+        (requests.Branch(name="left"), "left-up-noflip"),
+        (requests.Branch(shoulder="front", elbow="up"), "left-up-noflip"),
     ],
 )
 def test_request_of_five_axes_is_refused(arm: Client, request_: requests.Request, why: str) -> None:

@@ -200,7 +200,7 @@ def test_jog_of_four_axes_moves_the_point_exactly(chain: Chain) -> None:
         (cmd.StepTool(np.zeros(5)), "6 numbers"),
         (cmd.TurnTool(0.1, 0.2), "give this tool a pose or a rotation"),
         (cmd.SetPriority(Priority.PITCH), "'pose', 'position', 'orientation'"),
-        (cmd.TakeBranch("left-up"), "front-up-plus, front-down-plus"),
+        (cmd.TakeBranch("left-up"), "left-up-noflip, left-up-flip, left-down-noflip"),
     ],
 )
 def test_command_of_five_axes_is_refused_with_what_works(
@@ -234,7 +234,7 @@ def test_number_whose_square_overflows_is_refused(command: cmd.Command) -> None:
         (cmd.StepTool(np.zeros(6)), "5 numbers"),
         (cmd.OrientTool(np.eye(3)), "by a pitch and a roll"),
         (cmd.SetPriority(Priority.ORIENTATION), "'position and pitch'"),
-        (cmd.TakeBranch("front-up-plus"), "front-up, front-down, back-up, back-down"),
+        (cmd.TakeBranch("left-up-noflip"), "front-up, front-down, back-up, back-down"),
     ],
 )
 def test_command_of_six_axes_is_refused_by_five(
@@ -329,6 +329,6 @@ def test_state_of_a_drag_and_its_commands_are_recorded_to_the_bit() -> None:
     assert json_text(codec.encoded(State, again)) == text
     following, repeated = (session.step(each, [], 2 * TICK) for each in (state, again))
     np.testing.assert_array_equal(following.goal, repeated.goal)
-    for command in (cmd.OrientTool(TURN), cmd.TakeBranch("front-up-plus")):
+    for command in (cmd.OrientTool(TURN), cmd.TakeBranch("left-up-noflip")):
         form = json_text(codec.encoded(cmd.Command, command))
         assert type(codec.decoded(cmd.Command, json_form(form))) is type(command)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from katana450 import tolerances
+from katana450.extensions.general_arms.branch_words import SECOND
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry.arrays import FloatArray
@@ -30,6 +32,11 @@ class BranchSolver:
         """The names, in the order of the solutions."""
         solver = self.solver
         return solver.branches if isinstance(solver, ClosedForm | SevenAxes) else (ONLY,)
+
+    @property
+    def shown(self) -> Sequence[str]:
+        """The names in the order for people: those of usual postures first."""
+        return sorted(self.names, key=lambda name: [word in SECOND for word in name.split("-")])
 
     @property
     def swivel(self) -> int | None:

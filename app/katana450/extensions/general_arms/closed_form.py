@@ -6,127 +6,23 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
+from katana450.extensions.general_arms.branch_words import BranchWords
+from katana450.extensions.general_arms.form import Form, form_of
+from katana450.extensions.general_arms.functions import ARRAYS, FLOATS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
-from katana450.extensions.general_arms.parallel_axes import (
-    LOOSE,
-    four_axes,
-    pointed,
-    six_axes,
-    why_not_parallel,
-)
+from katana450.extensions.general_arms.parallel_axes import LOOSE, six_axes
 from katana450.extensions.general_arms.posture import GeneralPosture
-from katana450.extensions.general_arms.spherical_wrist import (
-    Angles,
-    Solve,
-    crossing_shoulder,
-    is_crossing_shoulder,
-    is_parallel_shoulder,
-    parallel_shoulder,
-    why_not_spherical,
-)
+from katana450.extensions.general_arms.spherical_wrist import Angles, Solve
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.se3 import Rows
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.turns import in_turn, nearest_turn
-
-SHOULDERS, ELBOWS, WRISTS = ("front", "back"), ("up", "down"), ("plus", "minus")
-"""Parts of the names of branches, in the order in which the formulas return them. The tool, or the
-wrist's centre, is in front of the plane through axis 1 along axis 2, or behind it. The elbow is on
-one or the other side of the line from shoulder to wrist. alpha5 is positive or negative."""
-
-
-def branch_names(n: int, *, wrist_first: bool = False, shoulder_last: bool = False) -> list[str]:
-    """Return the names of the 4 or 8 branches in the order of the formulas."""
-    if n == 4:
-        return [f"{shoulder}-{elbow}" for shoulder in SHOULDERS for elbow in ELBOWS]
-    if wrist_first:
-        return [f"{s}-{e}-{w}" for s in SHOULDERS for w in WRISTS for e in ELBOWS]
-    if shoulder_last:
-        return [f"{s}-{e}-{w}" for e in ELBOWS for s in SHOULDERS for w in WRISTS]
-    return [f"{s}-{e}-{w}" for s in SHOULDERS for e in ELBOWS for w in WRISTS]
-
-
-class Form(NamedTuple):
-    """A closed form that solves certain links.
-
-    Attributes:
-        method: in words.
-        links: the links as the formulas read them.
-        build: makes the function solve(rows, free) of the module of the formulas.
-        branches: names in the order of the solutions.
-        keeps_tool_point: whether rows hold the place of the tool point, not of the last frame.
-    """
-
-    method: str
-    links: DHLinks
-    build: Callable[[DHLinks, Operations], Solve]
-    branches: tuple[str, ...]
-    keeps_tool_point: bool = False
-
-    def rows(self, T: FloatArray) -> Rows:
-        """Return the rows that the formulas read, for `T` (4, 4) = T_S_tool."""
-        if not self.keeps_tool_point:
-            return self.links.rows(T)
-        here: FloatArray = self.links.T_1_S @ T
-        here[:3, :3] = here[:3, :3] @ self.links.T_n_tool[:3, :3].T
-        rows: Rows = here.tolist()
-        return rows
-
-    def columns(self, T: FloatArray) -> list[list[FloatArray]]:
-        """Return the same rows of many poses `T` (N, 4, 4): an array (N,) in place of a number."""
-        here = self.links.T_1_S @ T
-        if self.keeps_tool_point:
-            here[:, :3, :3] = here[:, :3, :3] @ self.links.T_n_tool[:3, :3].T
-        else:
-            here = here @ self.links.T_tool_n
-        return [[here[:, i, j] for j in range(4)] for i in range(4)]
-
-
-def form_of(links: DHLinks) -> Form | str:
-    """Return the closed form of four or six axes, or the condition that these links miss."""
-    if links.n == 4:
-        missing = why_not_parallel(links)
-        return missing or Form(
-            "closed form for four axes: pan and three parallel axes",
-            pointed(links),
-            four_axes,
-            tuple(branch_names(4)),
-            keeps_tool_point=True,
-        )
-    if links.n != 6:
-        return f"it has {links.n} axes"
-    if is_parallel_shoulder(links):
-        return Form(
-            "closed form for six axes with a spherical wrist",
-            links,
-            parallel_shoulder,
-            tuple(branch_names(6)),
-        )
-    if is_crossing_shoulder(links):
-        return Form(
-            "closed form for six axes with a spherical wrist and a shoulder whose axes meet",
-            links,
-            crossing_shoulder,
-            tuple(branch_names(6, shoulder_last=True)),
-        )
-    parallel = why_not_parallel(links)
-    if not parallel:
-        return Form(
-            "closed form for six axes, three of them parallel",
-            links,
-            six_axes,
-            tuple(branch_names(6, wrist_first=True)),
-        )
-    return f"{why_not_spherical(links)}, and {parallel}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,10 +58,11 @@ class ClosedForm:
         """The method in words."""
         return self.form.method
 
-    @property
+    @cached_property
     def branches(self) -> tuple[str, ...]:
-        """Names of the branches, in the order of the solutions."""
-        return self.form.branches
+        """Names of the branches, in the order of the solutions; see branch_words.py."""
+        words = BranchWords(self.chain, tuple(range(self.chain.n)), self.is_reversed)
+        return words.in_order(lambda T, q: np.array(self.solve(T, q.tolist())))
 
     @cached_property
     def _solve(self) -> Solve:

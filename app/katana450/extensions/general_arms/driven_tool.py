@@ -94,8 +94,8 @@ class DrivenTool:
 
     @property
     def branches(self) -> Sequence[AnyBranch]:
-        """The names of the branches."""
-        return self._branches.names
+        """The names of the branches, those of usual postures first."""
+        return self._branches.shown
 
     def inverse(
         self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None

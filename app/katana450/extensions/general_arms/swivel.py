@@ -25,7 +25,8 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
-from katana450.extensions.general_arms.closed_form import branch_names, errors_of, in_limits_turns
+from katana450.extensions.general_arms.branch_words import BranchWords
+from katana450.extensions.general_arms.closed_form import errors_of, in_limits_turns
 from katana450.extensions.general_arms.functions import ARRAYS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import Numerical
@@ -125,11 +126,12 @@ class SevenAxes:
         """The method in words."""
         return f"closed form for seven axes with axis {self.swivel + 1} as the swivel"
 
-    @property
+    @cached_property
     def branches(self) -> tuple[str, ...]:
-        """Names of the branches, in the order of the solutions."""
-        parallel = self.locked == 0 and is_parallel_shoulder(self.links.from_axis(1))
-        return tuple(branch_names(6, shoulder_last=not parallel))
+        """Names of the branches, in the order of the solutions; see branch_words.py."""
+        joints = tuple(k for k in range(7) if k != self.swivel)
+        words = BranchWords(self.chain, joints, self.is_reversed)
+        return words.in_order(lambda T, q: self.at_swivels(T, q[[self.swivel]])[0])
 
     def at_swivels(self, T: FloatArray, swivels: FloatArray) -> FloatArray:
         """Return the joint angles (N, 8, 7) [rad] for the pose `T` (4, 4) at `swivels` (N,)."""
