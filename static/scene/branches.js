@@ -48,7 +48,7 @@ export class Branches {
   async #show(name, colour) {
     const state = await this.#read();
     const option = this.#options.get(name);
-    if (!state || this.#row !== name || this.#ghost) return;
+    if (!state || this.#row !== name || this.#ghost || option.refusal) return;
     const { viewer, node } = this.#inner;
     const links = this.#arm.links.map(({ path }) => node(`/arm/${path.join("/")}`));
     const [first] = links;
@@ -109,7 +109,7 @@ export class Branches {
         const differs = parts.map((word, k) => (word === now[k] ? "" : `${PARTS[k]} ${word}`));
         const time = each.time / (this.#status()?.speed ?? 1);
         const words = [...differs.filter(Boolean), `${time.toFixed(1)} s`].join(", ");
-        return [each.name, { words, q: each.q }];
+        return [each.name, { words, q: each.q, refusal: each.refusal }];
       }),
     );
     return state;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -261,6 +262,31 @@ def test_other_branch_keeps_the_pose(chain: Chain) -> None:
     state = settled(session, start, [cmd.Follow(plan_to(arm, None, start, goal))])
     np.testing.assert_allclose(pose(session, state), T, atol=1e-6)
     assert state.branch == usable[-1].branch
+
+
+@pytest.mark.parametrize("name", ["OpenMANIPULATOR-X", "PincherX-100", "Panda"])
+def test_branch_that_the_limits_exclude_has_a_reason_and_is_refused_with_it(name: str) -> None:
+    session = session_of(ARMS[name])
+    arm, start = session.require_arm(), begun(session)
+    refused = {each.metrics.branch: each.refusal for each in session.choices(start)}
+    assert refused[start.branch] == ""
+    assert set(refused) == set(arm.kinematics.branches)
+    for branch, why in refused.items():
+        if not why:
+            assert with_branch(arm, start, branch).branch == branch
+            continue
+        assert re.match(rf"The limits of ax[ie]s [1-7].* exclude the branch {branch}", why)
+        with pytest.raises(InputError, match=f"exclude the branch {branch}"):
+            with_branch(arm, start, branch)
+    assert any(refused.values())
+
+
+def test_stretched_elbow_is_on_both_branches() -> None:
+    session = session_of(UR5E)
+    state = session.begin(np.radians([0.0, -60.0, 0.0, -60.0, -90.0, 0.0]), 0.0, 0.0)
+    near = [each for each in session.choices(state) if each.metrics.distance < 1e-6]
+    assert len(near) == 2
+    assert all(each.refusal == "" for each in near)
 
 
 def test_priority_decides_what_is_kept_out_of_reach() -> None:

@@ -20,6 +20,7 @@ from katana450.arm.control.messages import (
     branch_cells,
     condition,
     degrees,
+    excluded,
     headline,
     limit_text,
     millimetres,
@@ -178,6 +179,14 @@ def test_branch_cells_have_three_texts(
     choice = BranchOption(cost, contact)
     assert branch_cells(choice) == (expected, "90°, 1.3 s", "0.151")
     assert len(BRANCH_HEADINGS) == 1 + len(branch_cells(choice))
+
+
+def test_branch_that_the_limits_exclude_has_their_axes_in_place_of_numbers(state: State) -> None:
+    cost = BranchMetrics(BRANCHES[0], state.q, True, 0.0, 0.0, 0.0, 0.0, 0.1)
+    for axes, expected in (((2,), "limits of axis 3"), ((0, 2, 3), "limits of axes 1, 3 and 4")):
+        choice = BranchOption(cost, None, excluded("back-up", axes))
+        assert branch_cells(choice) == (expected, "–", "–")
+        assert "exclude the branch back-up" in choice.refusal
 
 
 def test_two_reasons_make_one_sentence(state: State) -> None:

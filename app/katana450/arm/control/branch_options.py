@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.messages import excluded
 from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.state import State
 from katana450.errors import InputError
@@ -27,10 +28,13 @@ class BranchOption:
     Attributes:
         metrics: its posture, cost and distance from a singularity.
         contact: the contact that the arm would have at its end; None if there is none.
+        refusal: why the arm cannot take the branch; empty if it can. If it cannot, the metrics are
+            those of the nearest posture on another one.
     """
 
     metrics: BranchMetrics
     contact: Contact | None
+    refusal: str = ""
 
 
 def branch_named(arm: ArmModel, name: str) -> AnyBranch:
@@ -71,14 +75,21 @@ def branch_options(
     world: the collision world; without one no contacts are reported.
     """
     chain = arm.chain_to(state.tool)
-    # An option keeps its name where the nearest posture is on another branch.
-    found = [
-        replace(BranchMetrics.of(chain, branch_option(arm, state, branch), state.q), branch=branch)
-        for branch in arm.kinematics.branches
-    ]
+    found = [(branch, branch_option(arm, state, branch)) for branch in arm.kinematics.branches]
     return tuple(
-        BranchOption(metrics, contact_at(world, metrics.q, state.gripper)) for metrics in found
+        BranchOption(
+            replace(BranchMetrics.of(chain, best, state.q), branch=branch),
+            contact_at(world, best.q, state.gripper),
+            branch_refusal(branch, best),
+        )
+        for branch, best in found
     )
+
+
+def branch_refusal(branch: AnyBranch, best: Projection) -> str:
+    """Return why the arm cannot take ``branch``, of which ``best`` is the option; else empty."""
+    taken = best.branch == branch or not best.limits
+    return "" if taken else excluded(branch, best.limits)
 
 
 def contact_at(world: CollisionWorld | None, q: FloatArray, gripper: float) -> Contact | None:

@@ -287,9 +287,21 @@ def condition(values: FloatArray) -> str:
     return "∞" if values[0] >= MAX_CONDITION * values[-1] else _short(float(values[0] / values[-1]))
 
 
+def excluded(branch: object, axes: Sequence[int]) -> str:
+    """Return the reason why the arm cannot take ``branch``: the limits of ``axes``, from 0."""
+    *most, last = [str(each + 1) for each in axes]
+    which = f"axes {', '.join(most)} and {last}" if most else f"axis {last}"
+    return (
+        f"The limits of {which} exclude the branch {branch} for this target: choose another one, "
+        "or move the target"
+    )
+
+
 def branch_cells(choice: BranchOption) -> tuple[str, str, str]:
     """Return the loss, the path length and time, and the smallest singular value of a branch."""
     metrics = choice.metrics
+    if choice.refusal:
+        return choice.refusal.partition(" exclude")[0].removeprefix("The "), "–", "–"
     lost = []
     if metrics.position_error > POSITION_WORTH_TELLING:
         lost.append(f"{_short(1e3 * metrics.position_error)} mm")

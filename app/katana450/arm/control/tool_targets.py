@@ -5,7 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.branch_options import branch_option, current_target, target_on_branch
+from katana450.arm.control.branch_options import (
+    branch_option,
+    branch_refusal,
+    current_target,
+    target_on_branch,
+)
 from katana450.arm.control.findings import of_jog
 from katana450.arm.control.goals import go_on_detour, with_goal, with_mode
 from katana450.arm.control.modes import (
@@ -19,6 +24,7 @@ from katana450.arm.control.modes import (
 )
 from katana450.arm.control.state import CAUSES, GRIPPER_REASONS, Reason, State
 from katana450.arm.control.tool_commands import StepTool, TurnCommand
+from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.tool import DragTarget
@@ -95,8 +101,13 @@ def with_reapplied_priority(arm: ArmModel, state: State) -> State:
 
 
 def with_branch(arm: ArmModel, state: State, branch: AnyBranch) -> State:
-    """Return ``state`` that moves to ``branch`` with the tool at its target."""
+    """Return ``state`` that moves to ``branch`` with the tool at its target.
+
+    Raises InputError if the limits exclude the branch.
+    """
     best = branch_option(arm, state, branch)
+    if refusal := branch_refusal(branch, best):
+        raise InputError(f"{refusal}.")
     target: Target = JointTarget(best.q)
     if isinstance(state.target, PoseTarget):
         target = state.target

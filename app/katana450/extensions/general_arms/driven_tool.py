@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450 import tolerances
 from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import Finding, State
 from katana450.arm.control.tool_commands import OrientTool, StepTool, TurnCommand
@@ -166,7 +167,7 @@ class DrivenTool:
                     break
             branch_there = str(self.branch_of(q))
             found.append(projected(self.chain, q, T, branch_there, state.priority))
-        return _best(found, branch, state.priority)
+        return self._best(found, state, T, branch)
 
     def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
         """Return the posture on ``branch`` nearest to ``target``."""
@@ -176,7 +177,25 @@ class DrivenTool:
         for start in self._starts(state, T, branch):
             q = self._descended(start, pose, priority)
             found.append(self._projected(q, pose, str(self.branch_of(q)), priority))
-        return _best(found, branch, priority)
+        return self._best(found, state, T, branch)
+
+    def _best(
+        self, found: Sequence[Projection], state: State, T: FloatArray, branch: AnyBranch
+    ) -> Projection:
+        """Return the nearest of ``found``, on ``branch`` if one is.
+
+        If the limits exclude the branch for the pose `T` (4, 4), the posture is on another one, and
+        its limits are those that do so.
+        """
+        best = min(found, key=lambda each: (each.branch != branch, *_misses(each, state.priority)))
+        closed = self._branches.on_branch(T, str(branch), state.goal)
+        if best.branch == branch or closed is None:
+            return best
+        slack = tolerances.LIMIT_SLACK
+        beyond = (closed < self.chain.lower - slack) | (closed > self.chain.upper + slack)
+        # Without such a limit, two branches meet in one posture, which has both names.
+        axes = tuple(np.flatnonzero(beyond).tolist())
+        return replace(best, limits=axes) if axes else replace(best, branch=branch)
 
     def _starts(self, state: State, T: FloatArray, branch: AnyBranch) -> list[FloatArray]:
         """Return postures (n,) [rad] from which the one nearest to `T` (4, 4) is searched."""
@@ -260,8 +279,3 @@ def _misses(found: Projection, priority: Priority) -> tuple[float, ...]:
     if priority is Priority.POSITION:
         return (position,)
     return (rotation, position) if priority is Priority.ORIENTATION else (position, rotation)
-
-
-def _best(found: Sequence[Projection], branch: AnyBranch, priority: Priority) -> Projection:
-    """Return the nearest of ``found``, on ``branch`` if one is."""
-    return min(found, key=lambda each: (each.branch != branch, *_misses(each, priority)))

@@ -299,6 +299,8 @@ class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
         time: Minimum duration of the motion, at full speed [s].
         smallest_singular_value: See ``Margins``.
         contact: The two parts that would meet there; null without contact.
+        refusal: Why the arm cannot take the branch; empty if it can. If it cannot, the numbers are
+            those of the nearest posture on another branch.
     """
 
     name: str
@@ -312,6 +314,7 @@ class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
     time: float
     smallest_singular_value: float
     contact: tuple[str, str] | None
+    refusal: str
 
 
 class Branches(Answer, frozen=True, kw_only=True):

@@ -310,6 +310,7 @@ def branch_option(choice: BranchOption) -> answers.BranchOption:
         time=metrics.time,
         smallest_singular_value=metrics.smallest_singular_value,
         contact=None if contact is None else contact.parts,
+        refusal=choice.refusal,
     )
 
 

@@ -104,6 +104,7 @@ class BranchList:
         for ghost, choice in zip(self._ghosts, found, strict=False):
             branch = choice.metrics.branch
             visible = wanted in (OTHERS, str(branch)) and branch != state.branch
+            visible = visible and not choice.refusal
             ghost.root.visible = visible
             if visible:
                 ghost.move(self._robot.joint_values(choice.metrics.q, state.gripper))
