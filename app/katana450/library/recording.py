@@ -291,7 +291,8 @@ class Recording:
             InputError: the speed is not above 0, or the part has no states.
             ConfigurationError: no port could be opened.
         """
-        from katana450.library.loading import load
+        from katana450.library.arm import Arm
+        from katana450.library.pose_frame import PoseFrame
         from katana450.library.recorded_frames import RecordedFrames
         from katana450.library.viewer import Viewer, check_speed
 
@@ -300,7 +301,8 @@ class Recording:
             robot = session_for(file, None if urdf is None else Path(urdf))
             part = shown_part(file, start, end)
         frames = RecordedFrames(self.path, robot, *part)
-        viewer = Viewer(load(None if urdf is None else Path(urdf), frame="base"), port, host)
+        frame = PoseFrame.of(robot.robot.require_arm().T_base_shoulder, "base")
+        viewer = Viewer(Arm(*robot, pose_frame=frame, objects=()), port, host)
         viewer.replay(frames, speed)
         return viewer
 

@@ -216,7 +216,7 @@ class ScriptWriter:
         self._add("screw", {"point": point, "axis": axis, **given(angle=angle, climb=climb)})
 
     def trajectory(self, times: Sequence[Number], postures: Sequence[Sequence[Number]]) -> None:
-        """Move through postures of five angles [deg] at times [s], slower where limits require."""
+        """Move through joint angles [deg] at times [s], slower where limits require."""
         rows = zip(times, postures, strict=True)
         self._add("trajectory", {"through": [[time, *angles] for time, angles in rows]})
 

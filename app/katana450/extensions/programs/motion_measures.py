@@ -10,7 +10,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.pouring import MotionWithWater
 from katana450.extensions.programs.score import score
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.velocity import singular_values, tool_speed
+from katana450.maths.kinematics.velocity import singular_values
 
 
 def motion_measures(
@@ -21,14 +21,16 @@ def motion_measures(
     Args:
         arm: the arm.
         tools: (N,) the tool frame.
-        q: (N, 5) joints [rad].
-        qd: (N, 5) rates [rad/s].
+        q: (N, n) joints [rad].
+        qd: (N, n) rates [rad/s].
     """
     chains = [arm.chain_to(tool) for tool in tools]
     limits = arm.chain
     room = np.minimum(q - limits.lower, limits.upper - q)
     singular = [singular_values(chain, row)[-1] for chain, row in zip(chains, q, strict=True)]
-    speeds = [tool_speed(*each) for each in zip(chains, q, qd, strict=True)]
+    speeds = [
+        arm.kinematics_to(tool).tool_speed(*each) for tool, *each in zip(tools, q, qd, strict=True)
+    ]
     return {
         "smallest_singular_value": float(min(singular)),
         "margin_to_limits_deg": float(np.degrees(room.min())),

@@ -35,7 +35,7 @@ from katana450.extensions.programs.schema_parts import (
 )
 from katana450.extensions.programs.script import MAX_NAME_LENGTH
 from katana450.extensions.programs.settings_steps import MAX_PAUSE
-from katana450.extensions.programs.trajectory import AXES, MAX_POSTURES, MAX_TIME
+from katana450.extensions.programs.trajectory import MAX_POSTURES, MAX_TIME
 from katana450.maths.water.liquid import LIQUIDS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -61,9 +61,9 @@ FINGERS = number_or_text(
 
 DEFINITIONS: dict[str, Schema] = {
     "posture": list_of(
-        number_or_text(-MAX_TIME, MAX_TIME, "A time, s, then five joint angles, deg"),
-        1 + AXES,
-        1 + AXES,
+        number_or_text(-MAX_TIME, MAX_TIME, "A time, s, then the angles of all joints, deg"),
+        1 + LEAST_JOINTS,
+        1 + MAX_JOINTS,
     ),
     "point": any_of(
         "A point, mm: {x, y, z}, [x, y, z], or the name of a pose",

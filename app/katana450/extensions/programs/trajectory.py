@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from katana450.arm.control.session import TOOL_SPEED
-from katana450.errors import BlockedError
+from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.places import LEAST_JOINTS, MAX_JOINTS
 from katana450.extensions.programs.plan_builder import CARRY, PlanBuilder, UntimedPath
 from katana450.extensions.programs.recorded_pace import recorded_scaling
 from katana450.extensions.programs.script_context import ScriptContext
@@ -35,8 +37,6 @@ MAX_POSTURES = 1200
 
 MAX_TIME = 24 * 3600.0
 """[s] Maximum time of a posture."""
-
-AXES = 5
 
 TRAJECTORY = "trajectory"
 
@@ -64,7 +64,7 @@ class FollowTrajectory:
 
     Attributes:
         times: (m,) [s], from any zero.
-        postures: (m, 5) [rad].
+        postures: (m, n) [rad].
     """
 
     times: FloatArray
@@ -72,9 +72,9 @@ class FollowTrajectory:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {through: rows of a time [s] and five angles [deg]}. Raises ScriptError."""
+        """Read {through: rows of a time [s] and the angles [deg]}. Raises ScriptError."""
         fields = Fields(value, "a trajectory")
-        rows = fields.need("through", read.listed(_row, 2, MAX_POSTURES), ())
+        rows = fields.need("through", _rows, ())
         fields.done()
         table = np.array(rows)
         return cls(frozen(table[:, 0]), frozen(table[:, 1:]))
@@ -83,8 +83,11 @@ class FollowTrajectory:
         """Plan the way to the start, and the trajectory.
 
         Raises BlockedError with the time at which two parts would meet, and InputError for a
-        posture beyond the limits.
+        posture beyond the limits, or of another number of joints.
         """
+        joints, given = builder.chain.n, self.postures.shape[1]
+        if given != joints:
+            raise InputError(f"The arm has {joints} joints; a row of this has {given} angles.")
         path = TrajectoryPath(builder.chain, self.times, self.postures)
         builder.move_to(path.start, f"{TRAJECTORY}: approach")
         _check_clear(builder, path)
@@ -96,10 +99,22 @@ class FollowTrajectory:
         )
 
 
+def _rows(value: YamlValue) -> Sequence[tuple[float, ...]]:
+    """Read rows of one length."""
+    rows = read.listed(_row, 2, MAX_POSTURES)(value)
+    joints = len(rows[0]) - 1
+    for item, row in zip(value.items, rows, strict=True):
+        if len(row) != 1 + joints:
+            raise item.wrong(f"Expected a time and {joints} angles, as in the first row.")
+    return rows
+
+
 def _row(value: YamlValue) -> tuple[float, ...]:
-    """Read a time [s] and five angles [deg]; the angles are returned in rad."""
-    if value.kind != "list" or len(value.items) != 1 + AXES:
-        raise value.wrong(f"Expected a time and {AXES} angles, such as [0.5, 0, -65, 85, 8, 0].")
+    """Read a time [s] and the angles of all joints [deg]; the angles are returned in rad."""
+    if value.kind != "list" or not LEAST_JOINTS <= len(value.items) - 1 <= MAX_JOINTS:
+        raise value.wrong(
+            "Expected a time and the angles of all joints, such as [0.5, 0, -65, 85, 8, 0]."
+        )
     time, *angles = value.items
     angle = read.degrees()
     return read.number(0.0, MAX_TIME, "s")(time), *map(angle, angles)
@@ -121,7 +136,7 @@ def _check_clear(builder: PlanBuilder, path: TrajectoryPath) -> None:
         f"At {path.time(met.sigma):.2f} s of the trajectory, with the tool at {{point}}, {{parts}} "
         f"would {apart(worst.distance)}, and {1e3 * CLEARANCE:g} mm are required. Move the "
         "obstacle, or leave this part out.",
-        forward(path.chain, x[:AXES])[:3, 3].tolist(),
+        forward(path.chain, x[: path.chain.n])[:3, 3].tolist(),
         parts=worst.parts,
     )
 

@@ -77,7 +77,7 @@ class TrajectoryPath(PolynomialPath):
     Attributes:
         chain: the arm with its tool.
         times: (m,) [s], rising.
-        postures: (m, 5) joint angles at these times [rad].
+        postures: (m, n) joint angles at these times [rad].
     """
 
     chain: Chain
@@ -124,12 +124,12 @@ class TrajectoryPath(PolynomialPath):
 
     @property
     def start(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the start."""
+        """The joint angles (n,) [rad] at the start."""
         return frozen(self.postures[0])
 
     @property
     def end(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the end."""
+        """The joint angles (n,) [rad] at the end."""
         return frozen(self.postures[-1])
 
     def time(self, sigma: float) -> float:

@@ -43,8 +43,8 @@ FIRST_SPACING = 0.2
 TIME_DIGITS, ANGLE_DIGITS, EXACT_DIGITS = 5, 6, 8
 """Decimals of times [s] and angles [deg] in a trajectory, and of single numbers."""
 
-EVENTS_OF_ROW = 8
-"""YAML events of a posture."""
+EVENTS_OF_ROW = 3
+"""YAML events of a posture, beside those of its angles."""
 
 
 class Motion(NamedTuple):
@@ -96,10 +96,11 @@ def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = Fals
             "by --from."
         )
     pieces = tuple(pieces_of(part))
+    of_row = EVENTS_OF_ROW + part.setpoint.shape[1]
     for tolerance in TOLERANCES:
         steps = list(_steps(part, pieces, tolerance, gripper))
         counts = [len(each[TRAJECTORY]["through"]) for each in steps if TRAJECTORY in each]
-        events = EVENTS_OF_ROW * (sum(counts) + len(steps) + 5)
+        events = of_row * (sum(counts) + len(steps) + 5)
         text = _text(part, steps, bare=bare)
         if (
             len(text.encode()) <= MAX_BYTES
@@ -213,7 +214,7 @@ def postures(t: FloatArray, q: FloatArray, tolerance: float) -> IntArray:
 
     Args:
         t: (N,) times [s], rising.
-        q: (N, 5) setpoints [rad].
+        q: (N, n) setpoints [rad].
         tolerance: maximum difference of a joint [rad]; near the first and the last state less.
     """
     count = len(t)

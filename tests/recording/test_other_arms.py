@@ -1,0 +1,195 @@
+"""Recordings of an arm outside the five-axis family: verified, scored, exported, and run again."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+import katana450
+from katana450.arm.control import commands as cmd
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.assembly.robot_session import DescribedRobot, find_robot
+from katana450.cli.main import main
+from katana450.client import connect
+from katana450.extensions.recording.files.header import header_of
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.maths.kinematics.forward import forward
+from katana450.server.api import answers, requests
+from katana450.settings import Settings
+from tests.browser.server import RECORDING_APP, AppServer
+from tests.general_arms.links_of_arms import ur5e
+from tests.recording.lerobot_check import check_dataset, rows_of
+from tests.recording.recorded import ADA, PERIOD, TestClock
+from tests.recording.test_datasets_pictures import decoded
+from tests.recording.test_recorder import waited_for
+
+TOLERANCE = 1.5e-4
+"""[rad] Distance of a run from the recorded setpoints, as in ``test_run_again``."""
+
+
+@pytest.fixture(scope="module")
+def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("ur5e") / "ur5e.urdf"
+    path.write_text(ur5e(), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def described(urdf: Path) -> DescribedRobot:
+    return find_robot(Settings(), urdf, None)
+
+
+@pytest.fixture(scope="module")
+def path(urdf: Path, described: DescribedRobot) -> Path:
+    """Two typed places of the tool, one after the other, and a stop."""
+    session, clock = described.session, TestClock(100.0)
+    arm, mailbox = session.require_arm(), Mailbox(session.check)
+    driver = SimulatedDriver(described.robot.require_arm(), session.ready, 0.0)
+    loop = ControlLoop(session, driver, mailbox, clock, 1.0 / PERIOD)
+    p = forward(arm.chain, session.ready)[:3, 3]
+    at = {5: p + np.array((0.0, 0.05, -0.05)), 120: p - np.array((0.0, 0.05, 0.0))}
+    recorded = urdf.with_name("run.mcap")
+    head = header_of(described.robot, Settings(), urdf, None, session.environment)
+    with recorded.open("wb") as file:
+        writer = RecordingWriter(file, head)
+        loop.record = writer.put
+        for tick in range(260):
+            clock.t += PERIOD
+            if tick in at:
+                mailbox.put(cmd.MoveTool(at[tick]), ADA)
+            loop.tick()
+        writer.close()
+    return recorded
+
+
+def test_states_have_all_axes_and_the_tool(path: Path, described: DescribedRobot) -> None:
+    run = katana450.open(path)
+    assert run.q.shape[1] == 6
+    arm = described.robot.require_arm()
+    T = arm.T_base_shoulder @ forward(arm.chain, run.q[-1])
+    np.testing.assert_allclose(run.position[-1], T[:3, 3], atol=2e-6)
+    assert float(np.ptp(run.position[:, 1])) > 0.09
+
+
+def test_verification_needs_its_urdf(
+    path: Path, urdf: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert katana450.open(path).verify(urdf).identical
+    assert main(["record", "verify", str(path)]) == 1
+    assert "Name the same URDF" in capsys.readouterr().err
+
+
+def test_score_has_the_measures_of_the_tool(
+    path: Path, urdf: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["score", str(path), "--urdf", str(urdf), "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)
+    run = katana450.open(path)
+    length = 1e3 * np.linalg.norm(np.diff(run.position, axis=0), axis=1).sum()
+    assert found["tool_path_mm"] == pytest.approx(length, rel=0.01)
+    step = 1e3 * np.linalg.norm(np.diff(run.position, axis=0), axis=1).max() / PERIOD
+    assert found["max_tool_speed_mm_s"] == pytest.approx(step, rel=0.02)
+    assert 0.0 < found["smallest_singular_value"] < 1.0
+    assert found["nearest_clearance_mm"] > 0.0
+
+
+def test_motion_runs_again(
+    path: Path, urdf: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    script = tmp_path / "again.yaml"
+    command = ["record", "again", str(path), "--urdf", str(urdf), "--headless"]
+    assert main([*command, "--out", str(script)]) == 0
+    found = re.search(r"recorded setpoints: (\S+) rad", capsys.readouterr().out)
+    assert found is not None
+    assert 0.0 < float(found[1]) < TOLERANCE
+    # Its script is refused for an arm of five axes.
+    text = script.read_text(encoding="utf-8").replace("tool: tool0\n", "")
+    script.write_text(text, encoding="utf-8")
+    assert main(["run", str(script), "--headless"]) == 1
+    assert "5 joints, but the command has 6" in capsys.readouterr().err
+
+
+def test_tables_bags_and_datasets_have_six_axes(path: Path, tmp_path: Path) -> None:
+    export = ["record", "export", str(path), "--format"]
+    for kind in ("csv", "parquet", "rosbag2", "lerobot"):
+        more = ["--task", "reach"] if kind == "lerobot" else []
+        assert main([*export, kind, "--out", str(tmp_path / kind), *more]) == 0
+    with (tmp_path / "csv").open() as opened:
+        names = next(csv.reader(opened))
+    table = pq.read_table(tmp_path / "parquet")
+    assert table.schema.names == names
+    assert names[:7] == ["t", *(f"theta{axis}" for axis in range(1, 7))]
+    assert table.schema.field("theta6").metadata[b"unit"] == b"rad"
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with AnyReader([tmp_path / "rosbag2"], default_typestore=store) as reader:
+        (wanted,) = (each for each in reader.connections if each.topic == "/joint_setpoints")
+        *_, (connection, _, data) = reader.messages(connections=[wanted])
+        last: Any = reader.deserialize(data, connection.msgtype)
+    run = katana450.open(path)
+    np.testing.assert_array_equal(last.position[:6], run.setpoint[-1])
+    assert last.name[:2] == ["shoulder_pan_joint", "shoulder_lift_joint"]
+    check_dataset(tmp_path / "lerobot")
+    assert np.array(rows_of(tmp_path / "lerobot")["action"]).shape[1] == 7
+
+
+@pytest.mark.long
+def test_pages_films_and_the_viewer_show_it(path: Path, urdf: Path, tmp_path: Path) -> None:
+    export = ["record", "export", str(path), "--urdf", str(urdf), "--to", "1", "--format"]
+    page, film = tmp_path / "run.html", tmp_path / "run.mp4"
+    assert main([*export, "html", "--out", str(page)]) == 0
+    assert "ur5e: run" in page.read_text(encoding="utf-8")
+    assert main([*export, "mp4", "--out", str(film), "--size", "160x120", "--fps", "5"]) == 0
+    pictures = decoded(film, (160, 120))
+    assert len(pictures) == 6
+    assert np.abs(pictures[0].astype(int) - pictures[-1].astype(int)).max() > 50
+    with katana450.open(path).replay(20.0, urdf=urdf) as viewer:
+        seen = set[float]()
+
+        def turned() -> bool:
+            seen.add(round(viewer._scenery.arm._joints[0].angle, 3))
+            return len(seen) > 3
+
+        waited_for(turned, "the arm to move in the viewer")
+
+
+@pytest.mark.long
+def test_server_records_it_and_runs_it_again(
+    urdf: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = ("--record", str(tmp_path / "ring"), "--episodes", str(tmp_path / "episodes"))
+    kept = tmp_path / "kept.mcap"
+    with AppServer((*RECORDING_APP, "--urdf", str(urdf), *folders)) as server:
+        with connect(server.url, "Ada") as client:
+            client.ask(requests.Home(wait=30))
+            T = np.array(client.query(answers.State).T)
+            target = tuple((T[:3, 3] + (0.0, 0.05, -0.05)).tolist())
+            client.ask(requests.Position(p=target, wait=30))
+            end = client.query(answers.State).q
+
+            def recorded() -> bool:
+                try:
+                    kept.write_bytes(client.recording())
+                except katana450.KatanaError:
+                    return False
+                return bool(np.abs(katana450.open(kept).setpoint[-1] - end).max() < 1e-9)
+
+            waited_for(recorded, "the motion in the recording", 60.0)
+        assert katana450.open(kept).verify(urdf).identical
+        command = ["record", "again", str(kept), "--urdf", str(urdf), "--url", server.url]
+        assert main(command) == 0
+        found = re.search(r"recorded setpoints: (\S+) rad", capsys.readouterr().out)
+        assert found is not None
+        assert 0.0 < float(found[1]) < 1e-3
+        with connect(server.url, "Ada") as client:
+            np.testing.assert_allclose(client.query(answers.State).q, end, atol=1e-6)
