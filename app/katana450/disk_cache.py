@@ -81,15 +81,20 @@ def _digest(parts: Iterable[bytes | str | np.ndarray[Any, Any]]) -> bytes:
 @cache
 def _surroundings() -> bytes:
     """Return a hash of the code and the libraries that compute the values."""
-    package = Path(__file__).parent
-    files = sorted(package.rglob("*.py"))
-    known = [f"{each.relative_to(package)} {_stamp(each)}" for each in files]
+    # By `os`, because `pathlib` takes four times as long for 700 files.
+    package = os.path.dirname(__file__)
+    known = sorted(
+        f"{folder.removeprefix(package)}/{name} {_stamp(f'{folder}/{name}')}"
+        for folder, _, names in os.walk(package)
+        for name in names
+        if name.endswith(".py")
+    )
     libraries = [f"{each} {version(each)}" for each in LIBRARIES]
     return _digest([sys.version, *libraries, *known])
 
 
-def _stamp(file: Path) -> str:
-    found = file.stat()
+def _stamp(file: str) -> str:
+    found = os.stat(file)
     return f"{found.st_size} {found.st_mtime_ns}"
 
 

@@ -22,7 +22,7 @@ def test_arm_ends_stopped_and_at_rest_although_a_command_has_just_arrived(
     robot: Robot, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The priority of this process stays.
-    monkeypatch.setattr(running_arm, "_be_prompt", lambda: None)
+    monkeypatch.setattr(running_arm, "raise_priority", lambda: None)
     arm = RunningArm(Settings(), DescribedRobot(robot, session, ()))
     arm.start()
     ours, theirs = multiprocessing.Pipe()

@@ -101,9 +101,6 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
 
         front_end, view, detours = build_frontend(gateway, config, meshes, supervisor.ended)
         view.start()
-        # Exempt all present objects from garbage collection, which would delay STOP.
-        gc.collect()
-        gc.freeze()
         supervisor.report(READY)
         while not supervisor.ended.wait(WAKE_INTERVAL) and not front_end.cut.is_set():
             if view.failed.is_set():

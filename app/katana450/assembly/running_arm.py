@@ -89,7 +89,7 @@ class RunningArm:
 
     def start(self) -> None:
         """Run the control loop in a separate thread."""
-        _be_prompt()
+        raise_priority()
         self._loop.start()
 
     def attach(self, pipe: Connection, greeting: Greeting) -> None:
@@ -155,11 +155,3 @@ class RunningArm:
     def _stands_stopped(self) -> bool:
         state = self.state_publisher.snapshot.state
         return state.stopped is not None and not state.moving
-
-
-def _be_prompt() -> None:
-    """Keep garbage collection and other processes from delaying the ticks."""
-    # Exempt all present objects from garbage collection, which would delay a tick too much.
-    gc.collect()
-    gc.freeze()
-    raise_priority()

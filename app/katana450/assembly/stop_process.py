@@ -7,7 +7,6 @@ ends or hangs; the arm does not stop for that.
 from __future__ import annotations
 
 import asyncio
-import gc
 import socket
 import time
 from dataclasses import dataclass
@@ -67,9 +66,6 @@ async def _serve(config: StopConfig, supervisor: SupervisorPipe) -> None:
     authenticator = Authenticator(access, config.main_port, address)
     server = StopServer(stop_pipe, authenticator, address, config.main_port, acceptor)
     acceptor.start(partial(StopConnection, server), tls)
-    # Exempt all present objects from garbage collection, which would delay STOP.
-    gc.collect()
-    gc.freeze()
     turned = time.monotonic()
     supervisor.prove(lambda: stop_pipe.running and time.monotonic() - turned < HANG_TIMEOUT)
     supervisor.report(READY)
