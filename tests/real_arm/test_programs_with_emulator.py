@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import katana450.extensions.programs
-from katana450.arm.control import supervision
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.arm.control.state import State
@@ -103,8 +102,6 @@ def test_program_runs_with_slow_replies(name: str, monkeypatch: pytest.MonkeyPat
     emulator = EmulatorOnPaper(np.array([*plan.start.q, plan.start.gripper]), 0.035, 0.01)
     setpoints: dict[int, FloatArray] = {}
     errors, lags = [], []
-    # A cup that is held but still stands on the table touches it, as measured.
-    monkeypatch.setattr(supervision, "CONTACT_DISTANCE", -0.002)
 
     def drive(state: State) -> State:
         joints = np.array([*state.setpoint, state.gripper_setpoint])
