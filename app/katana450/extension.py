@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from katana450.server.view.gizmo import Gizmo
     from katana450.server.view.layer import ViewLayer
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
+    from katana450.server.view.view_updater import ViewUpdater
     from katana450.server.web.http_api import RouteContext
     from katana450.settings import Settings
 
@@ -75,6 +76,7 @@ BUILT_IN = (
     "loops",
     "objects",
     "undo",
+    "joint_view",
     "conduit",
     "water",
     "ellipsoid",
@@ -225,6 +227,8 @@ class Extension:
             None. Called when a robot is read for ``serve``.
         gizmo: Returns the class of the gizmo of a tool with so many freedoms, or None. Called in
             the process of the view.
+        joint_view: Returns the class of the view of a robot that is driven joint by joint, which is
+            called as that of `MachineView`. Called in the process of the view.
     """
 
     name: str
@@ -235,6 +239,7 @@ class Extension:
     world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
     find_arm: FindArm | None = None
     gizmo: Callable[[int], type[Gizmo] | None] | None = None
+    joint_view: Callable[[], Callable[..., ViewUpdater]] | None = None
 
 
 @cache

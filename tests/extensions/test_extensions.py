@@ -15,8 +15,8 @@ from katana450.client import RefusedError, connect
 from katana450.extension import BUILT_IN, extensions
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT as ROOT_PATH
-from tests.browser.server import AppServer, free_port
-from tests.extensions.environments import distribution, write_blocking
+from tests.browser.server import APP, AppServer, free_port
+from tests.extensions.environments import distribution, without, write_blocking
 
 ROOT = Path(__file__).resolve().parents[2]
 LINE = '{"q": [0, 0, 0, 0, 0]}\n'
@@ -173,6 +173,18 @@ def test_server_runs_without_the_extensions_it_does_not_need(
             urllib.request.urlopen(upload, timeout=10)
         with refused.value:
             assert refused.value.code == 404
+
+
+def test_robot_without_a_tool_is_driven_without_its_view(tmp_path: Path) -> None:
+    gantry = str(ROOT / "tests" / "exchange" / "gantry.urdf")
+    command = (*APP, "--urdf", gantry)
+    with (
+        without(tmp_path, "joint_view"),
+        AppServer(command) as server,
+        connect(server.url, "Test") as arm,
+    ):
+        goal = [0.1, *arm.query(answers.State).q[1:]]
+        assert arm.joints(goal).q == pytest.approx(goal)
 
 
 def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:

@@ -12,7 +12,7 @@ from katana450.arm.control.actor import SERVER
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.state import Finding, Reason
-from katana450.server.view.event_list import EventList
+from katana450.extensions.joint_view.event_list import EventList
 from tests.view.gestures import ANNA, RecordedGestures
 
 LIMIT = Finding(Reason.AXIS_LIMIT, 1.0, 0)

@@ -15,11 +15,11 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.joint_view.machine_nodes import MachineNodes
+from katana450.extensions.joint_view.machine_panel import MachinePanel, page
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.view.machine_nodes import MachineNodes
-from katana450.server.view.machine_panel import MachinePanel, page
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.labels import PERSONAL

@@ -25,7 +25,6 @@ from katana450.server.service.nodes import Nodes
 from katana450.server.service.runner import guarded
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
-from katana450.server.view.machine_view import MachineView
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.panel_tabs import PanelTabs
 from katana450.server.view.view import View, ViewOptions
@@ -68,7 +67,7 @@ def build_frontend(
                 raise ConfigurationError(f"{layer.what} {robot.why}")
         front_end.start()
         gateway.attach(ArmHandle(robot, session, front_end, None, nodes))
-        return front_end, _machine_view(gateway, config, robot, front_end), None
+        return front_end, _joint_view(gateway, config, robot, front_end), None
     planning_worker = PlanningWorker(session, front_end.state_publisher, front_end)
     folders = partial(_folders, gateway, config.options, robot, front_end)
     options = ViewOptions(layers, meshes, folders, find_gizmo(robot.arm.kinematics.freedoms))
@@ -146,14 +145,14 @@ def _folders(
             yield folder
 
 
-def _machine_view(
+def _joint_view(
     gateway: Gateway, config: FrontendConfig, robot: Robot, front_end: FrontEnd
-) -> MachineView:
-    return MachineView(
-        gateway.viser,
-        robot,
-        front_end.state_publisher,
-        gateway.gestures,
-        lambda: front_end.last_ticket,
-        config.settings.frame_rate,
-    )
+) -> ViewUpdater:
+    """Return the view of a robot without a tool; without an extension, one that shows nothing."""
+    publisher, rate = front_end.state_publisher, config.settings.frame_rate
+    for each in extensions():
+        if each.joint_view is not None:
+            gestures, last_ticket = gateway.gestures, lambda: front_end.last_ticket
+            view = each.joint_view()
+            return view(gateway.viser, robot, publisher, gestures, last_ticket, rate)
+    return ViewUpdater(gateway.viser, publisher, rate)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import viser
 
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.display_options import DisplayOptions, add_shows, add_views
-from katana450.server.view.event_list import problem_page
 
 
 class SceneTab:
@@ -30,3 +31,9 @@ class SceneTab:
         content = problem_page(self._gestures.log_problem)
         if content != self._problem.content:
             self._problem.content, self._problem.visible = content, bool(content)
+
+
+def problem_page(problem: str) -> str:
+    """Return the ``problem`` of the event log on disk as HTML; empty for none."""
+    text = f"<div class='k450'><p class='status fault'>{escape(problem)}</p></div>"
+    return text if problem else ""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from abc import ABC, abstractmethod
 
 import viser
 
@@ -17,8 +16,8 @@ READOUT_INTERVAL = 0.1
 log = logging.getLogger(__name__)
 
 
-class ViewUpdater(ABC):
-    """Shows new snapshots, up to a maximum number per second.
+class ViewUpdater:
+    """Shows new snapshots, up to a maximum number per second. The base shows nothing.
 
     Attributes:
         failed: set when the view has ended with an error.
@@ -46,7 +45,6 @@ class ViewUpdater(ABC):
         if self._thread.is_alive():
             self._thread.join()
 
-    @abstractmethod
     def show(self, snapshot: Snapshot) -> None:
         """Send the changes in ``snapshot`` to every browser."""
 

@@ -11,9 +11,9 @@ from katana450.arm.control.messages import title
 from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.extensions.joint_view.machine_nodes import MachineNodes
+from katana450.extensions.joint_view.machine_panel import MachinePanel
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.machine_nodes import MachineNodes
-from katana450.server.view.machine_panel import MachinePanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.room import set_up_room
 from katana450.server.view.tint import Tint

@@ -11,6 +11,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.messages import finding_text
 from katana450.server.view.controls import GestureGate
+from katana450.server.view.scene_tab import problem_page
 
 MAX_SHOWN_ENTRIES = 12
 """Maximum number of entries in the panel. The log itself also has older ones and the driver."""
@@ -49,12 +50,6 @@ class EventList:
 
     def _clock(self, entry: LogEntry) -> str:
         return time.strftime("%H:%M:%S", time.localtime(self._epoch + entry.t))
-
-
-def problem_page(problem: str) -> str:
-    """Return the ``problem`` of the event log on disk as HTML; empty for none."""
-    text = f"<div class='k450'><p class='status fault'>{escape(problem)}</p></div>"
-    return text if problem else ""
 
 
 def _page(rows: list[str], problem: str) -> str:

@@ -15,8 +15,8 @@ from katana450.arm.control.messages import signed
 from katana450.arm.control.state import State
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.joint_view.event_list import EventList
 from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
-from katana450.server.view.event_list import EventList
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.view_updater import READOUT_INTERVAL

@@ -1,0 +1,1 @@
+"""The scene and the panel of a robot that is driven joint by joint."""
