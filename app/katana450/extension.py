@@ -77,6 +77,7 @@ BUILT_IN = (
     "objects",
     "undo",
     "joint_view",
+    "xacro",
     "conduit",
     "water",
     "ellipsoid",
@@ -223,6 +224,8 @@ class Extension:
             it leaves out. Of the first extension that has it.
         grip_model: Returns the model of the forces in the hand of a robot with its collision world;
             None if the pads of that hand are not known. Called for each session of an arm.
+        expand: Returns the URDF of a xacro file. Of the first extension that has it. Raises
+            RobotDescriptionError.
         find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or
             None. Called when a robot is read for ``serve``.
         gizmo: Returns the class of the gizmo of a tool with so many freedoms, or None. Called in
@@ -237,6 +240,7 @@ class Extension:
     grip_model: Callable[[CollisionWorld, Hand], GripModel | None] | None = None
     prepare: Callable[[Namespace], None] | None = None
     world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
+    expand: Callable[[Path], bytes] | None = None
     find_arm: FindArm | None = None
     gizmo: Callable[[int], type[Gizmo] | None] | None = None
     joint_view: Callable[[], Callable[..., ViewUpdater]] | None = None

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.robot import xacro_file
-from katana450.arm.robot.description import checked
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.xacro_expression import UnsafeExpressionError, evaluated
+from katana450.assembly.robot_files import read_robot, read_urdf
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
+from katana450.extensions.xacro import xacro_file
+from katana450.extensions.xacro.xacro_expression import UnsafeExpressionError, evaluated
 from tests.robot.public_arms import PX150, urdf
 from tests.robot.xacro_files import FILE, OPEN, PACKAGE, refusal, templated
 
@@ -32,7 +32,7 @@ def package(tmp_path: Path) -> Path:
 
 
 def test_a_package_is_expanded_as_it_is_published() -> None:
-    robot = load(FILE)
+    robot = read_robot(FILE)
     arm = robot.require_arm()
     assert (robot.name, robot.notes, robot.faults) == ("printed_arm", (), ())
     assert arm.chain.names == ("waist", "shoulder", "elbow", "wrist", "roll")
@@ -45,8 +45,13 @@ def test_a_package_is_expanded_as_it_is_published() -> None:
     assert len(robot.links[1].shapes) == 2
 
 
+def test_without_its_extension_xacro_is_refused_with_what_to_do() -> None:
+    with pytest.raises(RobotDescriptionError, match=r"is in xacro\. Install the extension"):
+        load(FILE)
+
+
 def test_a_package_is_found_by_the_name_in_its_manifest(package: Path) -> None:
-    assert load(package / "urdf" / FILE.name).require_arm().chain.n == 5
+    assert read_robot(package / "urdf" / FILE.name).require_arm().chain.n == 5
 
 
 def test_a_package_of_a_ros_workspace_is_found(
@@ -67,7 +72,7 @@ def test_a_package_of_a_ros_workspace_is_found(
         )
         with monkeypatch.context() as patch:
             patch.setenv(variable, str(folder))
-            assert b"orange" in checked(path)
+            assert b"orange" in read_urdf(path)
 
 
 def test_the_expansion_agrees_with_the_program_xacro(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,7 +86,7 @@ def test_the_expansion_agrees_with_the_program_xacro(monkeypatch: pytest.MonkeyP
     stock = subprocess.run(
         [sys.executable, "-c", words], capture_output=True, text=True, check=True, timeout=60
     )
-    assert checked(FILE).decode() == stock.stdout.rstrip("\n")
+    assert read_urdf(FILE).decode() == stock.stdout.rstrip("\n")
 
 
 def test_every_command_takes_xacro(
@@ -115,7 +120,7 @@ def test_a_file_without_the_suffix_is_expanded_too(tmp_path: Path) -> None:
     path = templated(tmp_path, '<xacro:property name="far" value="0.2"/>', name="arm.urdf")
     text = path.read_text().replace('xyz="0.05 0.0 0.15"', 'xyz="${far / 4} 0 0.15"')
     path.write_text(text)
-    assert load(path).require_arm().chain.n == 5
+    assert read_robot(path).require_arm().chain.n == 5
 
 
 def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
@@ -123,7 +128,7 @@ def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
     path = templated(tmp_path, '<include filename="width.xacro"/>')
     text = path.read_text().replace('xyz="0.05 0.0 0.15"', 'xyz="${far / 4} 0 0.15"')
     path.write_text(text)
-    assert load(path).require_arm().chain.n == 5
+    assert read_robot(path).require_arm().chain.n == 5
 
 
 @pytest.mark.parametrize(
@@ -180,7 +185,7 @@ def test_every_fault_is_reported_with_its_cause(
     message = refusal(path)
     assert message.startswith(str(path))
     with pytest.raises(RobotDescriptionError, match=expected):
-        load(path)
+        read_robot(path)
 
 
 @pytest.mark.parametrize(
@@ -223,7 +228,7 @@ def test_an_expansion_that_does_not_start_says_why(
     with pytest.raises(
         RobotDescriptionError, match=r"did not start: ImportError: a broken installation\.$"
     ):
-        load(templated(tmp_path, '<link name="${1}"/>'))
+        read_robot(templated(tmp_path, '<link name="${1}"/>'))
 
 
 def test_the_fault_of_an_included_file_names_that_file(package: Path) -> None:
@@ -256,4 +261,4 @@ def test_a_plain_file_starts_no_process(tmp_path: Path, monkeypatch: pytest.Monk
     path = tmp_path / "arm.urdf"
     path.write_text(urdf("arm", PX150).replace("<robot ", f"{OPEN[:7]}{OPEN[18:-2]} ", 1))
     assert "xmlns:xacro" in path.read_text()
-    assert load(path).require_arm().chain.n == 5
+    assert read_robot(path).require_arm().chain.n == 5

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from katana450.arm.robot.description import checked
-from katana450.arm.robot.loader import load
-from katana450.arm.robot.xacro_process import FORBIDDEN, FileGuard
+from katana450.assembly.robot_files import read_robot, read_urdf
+from katana450.extensions.xacro.xacro_process import FORBIDDEN, FileGuard
 from tests.robot.xacro_files import FILE, OPEN, PACKAGE, refusal, templated
 
 
@@ -57,7 +56,7 @@ def test_the_environment_stays_private(tmp_path: Path, monkeypatch: pytest.Monke
     path = templated(
         tmp_path, '<material name="$(optenv KATANA450_SECRET hidden) $(env ROS_DISTRO)"/>'
     )
-    assert b"hidden jazzy" in checked(path)
+    assert b"hidden jazzy" in read_urdf(path)
 
 
 @pytest.mark.parametrize("name", ["PATH", "LANG", "HOME"])
@@ -70,7 +69,7 @@ def test_only_variables_of_ros_are_read(
         refusal(path)
     )
     path = templated(tmp_path, f'<material name="$(optenv {name} hidden)"/>')
-    assert b'"hidden"' in checked(path)
+    assert b'"hidden"' in read_urdf(path)
 
 
 OUTSIDE = r"secret\.xacro cannot be opened \(it is outside the packages of the robot\)"
@@ -117,7 +116,7 @@ def test_the_root_and_the_home_folder_are_no_places_of_packages(
         assert f"line 2: this cannot be expanded: there is no package {name!r}" in refusal(path)
     (home / "letters" / "package.xml").write_text("<package><name>other</name></package>")
     path = templated(home / "arm", '<material name="$(find letters)"/>')
-    assert str(home / "letters").encode() in checked(path)
+    assert str(home / "letters").encode() in read_urdf(path)
 
 
 def test_a_package_installed_as_links_to_its_source_is_read(tmp_path: Path) -> None:
@@ -128,13 +127,13 @@ def test_a_package_installed_as_links_to_its_source_is_read(tmp_path: Path) -> N
             link = installed / file.relative_to(package)
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(file)
-    assert load(installed / "urdf" / FILE.name).require_arm().chain.n == 5
+    assert read_robot(installed / "urdf" / FILE.name).require_arm().chain.n == 5
 
 
 def test_a_package_without_a_manifest_is_found_by_its_folder(tmp_path: Path) -> None:
     package = shutil.copytree(PACKAGE, tmp_path / PACKAGE.name)
     (package / "package.xml").unlink()
-    assert load(package / "urdf" / FILE.name).require_arm().chain.n == 5
+    assert read_robot(package / "urdf" / FILE.name).require_arm().chain.n == 5
 
 
 def test_the_expansion_starts_nothing() -> None:

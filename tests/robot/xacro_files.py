@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from katana450.arm.robot.loader import load
+from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
 from tests.robot.public_arms import PX150, urdf
 
@@ -29,7 +29,7 @@ def templated(folder: Path, *lines: str, name: str = "arm.urdf.xacro") -> Path:
 def refusal(path: Path) -> str:
     """Return the message that refuses the file at ``path``."""
     with pytest.raises(RobotDescriptionError) as raised:
-        load(path)
+        read_robot(path)
     message = str(raised.value)
     assert not any(word in message for word in LEAKS), message
     return message

@@ -12,11 +12,11 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
-from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf
 from katana450.arm.robot.water import water_environment
+from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
 from katana450.extension import extensions
 from katana450.maths.collision.world import CollisionWorld
@@ -39,7 +39,7 @@ def describe_robot(
     ``tool``: the link to which targets refer. ``find``: see ``load``. Raises RobotDescriptionError
     for a robot without an arm.
     """
-    return arm_session(settings, load(urdf, tool, find))
+    return arm_session(settings, read_robot(urdf, tool, find))
 
 
 def find_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
@@ -54,7 +54,7 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
     Raises RobotDescriptionError for a robot that is neither. A robot without an arm also raises it
     if a ``tool`` or an arm without gripper is requested.
     """
-    robot = load(urdf, tool, find_arm)
+    robot = read_robot(urdf, tool, find_arm)
     try:
         return arm_session(settings, robot)
     except RobotDescriptionError as error:

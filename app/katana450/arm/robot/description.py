@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from katana450.arm.robot.xacro_file import expanded
 from katana450.errors import RobotDescriptionError
 
 XACRO = re.compile(r"^https?://(www\.|wiki\.)?ros\.org/(wiki/)?xacro")
@@ -75,8 +74,15 @@ SHAPES = ("box", "cylinder", "sphere", "mesh")
 JOINTS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
-def checked(path: Path) -> bytes:
-    """Check the URDF file at ``path`` and return its contents, expanded if it is xacro.
+def unexpanded(path: Path) -> bytes:
+    """Raise RobotDescriptionError for the xacro file at ``path``."""
+    raise RobotDescriptionError(
+        f"{path} is in xacro. Install the extension that expands it, or: xacro FILE > robot.urdf"
+    )
+
+
+def checked(path: Path, expand: Callable[[Path], bytes] = unexpanded) -> bytes:
+    """Check the URDF file at ``path`` and return its contents; a xacro file's after ``expand``.
 
     Raises RobotDescriptionError that names the file, the line and what to do.
     """
@@ -89,7 +95,7 @@ def checked(path: Path) -> bytes:
     checks = _Checks(str(path))
     root = checks.parsed(data)
     if path.suffix == SUFFIX or _template(root) is not None:
-        data = expanded(path)
+        data = expand(path)
         checks = _Checks(
             f"{path} (expanded)", "; if it only defines macros, name the file that includes it"
         )

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from katana450.arm.robot.arm_reader import FindArm, arm_in
-from katana450.arm.robot.description import checked, explained, refuse_loops
+from katana450.arm.robot.description import checked, explained, refuse_loops, unexpanded
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf, UrdfJoint, urdf_of
@@ -23,7 +23,12 @@ MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
 """Supported types of movable joints, and whether each slides."""
 
 
-def load(path: Path = URDF_PATH, tool: str | None = None, find: FindArm | None = None) -> Robot:
+def load(
+    path: Path = URDF_PATH,
+    tool: str | None = None,
+    find: FindArm | None = None,
+    expand: Callable[[Path], bytes] = unexpanded,
+) -> Robot:
     """Read the robot in a URDF file.
 
     A link without shapes that has child links is drawn as thin rods. Meshes are read on first use.
@@ -33,12 +38,13 @@ def load(path: Path = URDF_PATH, tool: str | None = None, find: FindArm | None =
         tool: link to which targets refer by default; None for the first of TOOL_FRAMES that exists,
             else the last link behind five turning joints.
         find: finds the kinematics of an arm outside the five-axis family; None to leave it without.
+        expand: returns the URDF of a xacro file.
 
     Raises:
         RobotDescriptionError: the file cannot be read, or there is no arm with that ``tool``. The
             message says what is wrong, and in which line.
     """
-    data = checked(path)
+    data = checked(path, expand)
     refuse_loops(data, path)
     with explained(path):
         urdf = urdf_of(data, path.parent)

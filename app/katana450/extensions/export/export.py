@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from katana450.arm.robot.loader import load
+from katana450.assembly.robot_files import read_robot
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.formats import FORMATS, ExportJob, named
@@ -22,7 +22,7 @@ def export(
     ``files_of`` returns names and contents of the files.
     """
     _check(options)
-    robot = load(options.urdf)
+    robot = read_robot(options.urdf)
     robot.check_complete()
     robot.read_shapes()
     for note in robot.notes:

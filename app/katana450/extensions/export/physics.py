@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.robot.description import checked
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_files import read_urdf
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -79,7 +79,7 @@ class Drive:
 def inertials_of(path: Path) -> dict[str, Inertial]:
     """Return the masses of the links of the URDF file at ``path`` that state one above 0."""
     found: dict[str, Inertial] = {}
-    for link in ET.fromstring(checked(path)).iterfind("link"):
+    for link in ET.fromstring(read_urdf(path)).iterfind("link"):
         inertial, mass = link.find("inertial"), link.find("inertial/mass")
         if inertial is None or mass is None or float(mass.get("value", "0")) <= 0.0:
             continue
@@ -114,7 +114,7 @@ def drives_of(robot: Robot, path: Path) -> dict[str, Drive]:
     inertials = inertials_of(path)
     stated = {
         joint.get("name", ""): _numbers(joint.find("dynamics"), ("damping", "friction"))
-        for joint in ET.fromstring(checked(path)).iterfind("joint")
+        for joint in ET.fromstring(read_urdf(path)).iterfind("joint")
     }
     carried = {
         joint.name: _carried(robot, link, joint, inertials) for link, joint in moved_links(robot)

@@ -16,11 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.robot.description import checked
-from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual, mesh_file
+from katana450.assembly.robot_files import read_robot, read_urdf
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.archive import zipped
 from katana450.extensions.export.names import distinct
@@ -71,7 +70,7 @@ def package_files(
     Raises RobotDescriptionError if the file is not a URDF, or a mesh is missing or unreadable.
     """
     try:
-        root = ET.XML(checked(path), ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
+        root = ET.XML(read_urdf(path), ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
     except ET.ParseError as error:
         raise RobotDescriptionError(f"{path} is not a robot description: {error}.") from error
     robot = root.attrib["name"]
@@ -82,7 +81,7 @@ def package_files(
     files = {
         f"urdf/{plain}.urdf": ET.tostring(root, encoding="utf-8", xml_declaration=True),
         **meshes,
-        **_launched(load(path), package, plain),
+        **_launched(read_robot(path), package, plain),
     }
     files = {
         "package.xml": manifest_text(package, robot, license_name, maintainer).encode(),

@@ -12,11 +12,11 @@ from pathlib import Path
 from sys import stderr
 from types import ModuleType
 
-from katana450.arm.robot.ros_package import package_folder
-from katana450.arm.robot.xacro_file import expanded
 from katana450.atomic import write_files, writer_of
 from katana450.errors import ConfigurationError
 from katana450.extensions.gallery.listed_robot import ListedRobot
+from katana450.extensions.xacro.ros_package import package_folder
+from katana450.extensions.xacro.xacro_file import expanded
 from katana450.platform_support import cache_folder
 
 PACKAGE_NAME = re.compile(r"package://([A-Za-z][\w-]*)/")

@@ -8,10 +8,11 @@ from functools import cached_property
 from pathlib import Path
 
 from katana450.arm.robot.arm_reader import described_chain
-from katana450.arm.robot.description import checked, explained, refuse_loops
+from katana450.arm.robot.description import explained, refuse_loops
 from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.structure import structure_of
 from katana450.arm.robot.urdf import urdf_of
+from katana450.assembly.robot_files import read_urdf
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
 from katana450.maths.geometry import se3
@@ -71,7 +72,7 @@ def described_arm(path: Path, tool: str | None = None) -> DescribedArm:
         RobotDescriptionError: the file cannot be read, has no such link, or no series of turning
             joints that carries it. The message says what is wrong.
     """
-    data = checked(path)
+    data = read_urdf(path)
     refuse_loops(data, path)
     with explained(path):
         urdf = urdf_of(data, path.parent)

@@ -15,8 +15,8 @@ from katana450.arm.control.branch_options import contact_at
 from katana450.arm.control.findings import of_projection
 from katana450.arm.control.messages import REASONS
 from katana450.arm.robot.collision import initial_objects, world_of
-from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
+from katana450.assembly.robot_files import read_robot
 from katana450.errors import InputError
 from katana450.extensions.kinematics.numbers import numbers, shown
 from katana450.extensions.kinematics.pose_requests import KEYS, requested_pose
@@ -59,7 +59,7 @@ class JsonKinematics:
         self._all_metrics = all_metrics
         self._priority = priority
         self._with_nearest = with_nearest
-        robot = load(urdf, tool)
+        robot = read_robot(urdf, tool)
         self._arm = robot.require_arm()
         self._world = None
         if all_metrics:

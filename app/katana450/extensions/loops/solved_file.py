@@ -8,9 +8,10 @@ from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 import numpy as np
 
-from katana450.arm.robot.description import checked, explained
+from katana450.arm.robot.description import explained
 from katana450.arm.robot.urdf import urdf_of
 from katana450.arm.robot.visual import mesh_file
+from katana450.assembly.robot_files import read_urdf
 from katana450.atomic import write_files, writer_of
 from katana450.errors import ConfigurationError, RobotDescriptionError
 from katana450.extensions.loops.closure import KINDS, JointLoop, closures
@@ -24,7 +25,7 @@ def solved_file(path: Path) -> Path:
 
     Raises RobotDescriptionError with the loop that cannot be solved.
     """
-    data = checked(path)
+    data = read_urdf(path)
     with explained(path):
         root, urdf = fromstring(data), urdf_of(data, path.parent)
         loops = [_loop(element, set(urdf.links), path) for element in root.findall("loop_joint")]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.robot.loader import load
+from katana450.assembly.robot_files import read_robot
 from katana450.atomic import Writer, check_writable, write_files
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
@@ -24,7 +24,7 @@ from katana450.extensions.reachability.reachability_file import write_npz, write
 def workspace(options: argparse.Namespace) -> int:
     """Map the workspace, write the requested files, print a summary. Raises InputError."""
     _check_files(options.out, options.ply)
-    robot = load(options.urdf, options.tool)
+    robot = read_robot(options.urdf, options.tool)
     arm = robot.require_arm()
     for note in (*arm.notes, *robot.notes):
         print(f"katana450: {note}", file=sys.stderr)

@@ -7,8 +7,8 @@ import tempfile
 from pathlib import Path
 
 from katana450.arm.robot.bare import bare
-from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_arm
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import Attachment
@@ -43,5 +43,5 @@ def recorded_robot(file: RecordingFile) -> Robot:
     with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
         path = Path(folder) / name
         path.write_bytes(urdf.data)
-        robot = load(path, None if tool is None else str(tool), find_arm)
+        robot = read_robot(path, None if tool is None else str(tool), find_arm)
         return bare(robot) if without_gripper else robot

@@ -1,6 +1,6 @@
 """The subprocess that expands one xacro file.
 
-``expanded`` starts it as ``python -m katana450.arm.robot.xacro_process FILE NAME:=VALUE...``.
+``expanded`` starts it as ``python -m katana450.extensions.xacro.xacro_process FILE NAME:=VALUE``.
 Before it reads the file, it limits its memory and time and the files that it can open. It writes
 JSON to standard output: {"urdf": text}, or the fault as {"what", "file", "line"}. The file is null
 if it is FILE, and the line if it is unknown.
@@ -21,9 +21,9 @@ from xml.parsers.expat import ErrorString, ExpatError
 import xacro
 from xacro import substitution_args
 
-from katana450.arm.robot import ros_package as ros
-from katana450.arm.robot.xacro_expression import evaluated
-from katana450.arm.robot.xacro_file import MAX_BYTES, MAX_MEMORY_BYTES, READABLE, SECONDS
+from katana450.extensions.xacro import ros_package as ros
+from katana450.extensions.xacro.xacro_expression import evaluated
+from katana450.extensions.xacro.xacro_file import MAX_BYTES, MAX_MEMORY_BYTES, READABLE, SECONDS
 from katana450.platform_support import limit_resources
 
 HIDDEN = ("type", "vars")

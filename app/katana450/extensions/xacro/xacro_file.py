@@ -43,7 +43,12 @@ def expanded(path: Path, arguments: Mapping[str, str] | None = None) -> bytes:
         for name, value in os.environ.items()
         if name.startswith(PASSED_ON) or name in system
     }
-    command = [sys.executable, "-m", "katana450.arm.robot.xacro_process", str(path.absolute())]
+    command = [
+        sys.executable,
+        "-m",
+        "katana450.extensions.xacro.xacro_process",
+        str(path.absolute()),
+    ]
     command += [f"{name}:={value}" for name, value in (arguments or {}).items()]
     try:
         done = subprocess.run(

@@ -1,0 +1,1 @@
+"""Robot descriptions in xacro, the macro language of ROS."""
