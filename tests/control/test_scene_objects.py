@@ -10,15 +10,15 @@ import pytest
 import trimesh
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.placement import free_place, girth
 from katana450.arm.control.scene_objects import MAX_OBJECTS, Attachment, SceneObject, Shape, same
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import ObjectAppearance, Solid
 from katana450.arm.control.state import Reason, State
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
+from katana450.extensions.convex_body import convex_body
+from katana450.extensions.free_place import free_place, girth
 from katana450.maths.collision.clearance import STOP
-from katana450.maths.collision.convex_body import convex_body
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import MILLILITRE

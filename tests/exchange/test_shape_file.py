@@ -18,6 +18,7 @@ from katana450.arm.control import scene_objects
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
+from katana450.extensions.convex_body import convex_body
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.vrml import world_of
 from katana450.extensions.export.vrml_text import world_text
@@ -34,7 +35,6 @@ from katana450.extensions.importers.shape_file import (
     object_name,
     read_shape,
 )
-from katana450.maths.collision.convex_body import convex_body
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES

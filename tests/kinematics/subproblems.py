@@ -15,7 +15,8 @@ import math
 from dataclasses import dataclass
 
 from katana450 import tolerances
-from katana450.maths.geometry.vectors import (
+from katana450.maths.kinematics.turns import wrapped
+from katana450.maths.water.vectors import (
     Vector,
     add,
     cross,
@@ -25,7 +26,6 @@ from katana450.maths.geometry.vectors import (
     scale,
     sub,
 )
-from katana450.maths.kinematics.turns import wrapped
 
 
 @dataclass(frozen=True, slots=True)

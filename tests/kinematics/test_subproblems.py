@@ -7,8 +7,8 @@ import pytest
 
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.vectors import Vector, vector
 from katana450.maths.kinematics.turns import wrapped
+from katana450.maths.water.vectors import Vector, vector
 from tests.kinematics.subproblems import (
     subproblem1,
     subproblem2,

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
+from katana450.extensions.ellipsoid.velocity_ellipsoid import velocity_ellipsoid
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
@@ -25,7 +26,6 @@ from katana450.maths.kinematics.velocity import (
     manipulability,
     singular_values,
     tool_speed,
-    velocity_ellipsoid,
 )
 from tests.kinematics.family import random_member
 

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
 from katana450.maths.water.lip import DROP_VOLUME
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, counted
+from katana450.maths.water.vectors import Vector
 from tests.geometry.strategies import points, repeatable, rotation_vectors
 from tests.water.motions import (
     NO_ACCELERATION,

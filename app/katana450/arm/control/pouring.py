@@ -9,11 +9,11 @@ import numpy as np
 
 from katana450.arm.control.scene_objects import Environment, SceneObject, named
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.vectors import Vector, scale, sub, vector
 from katana450.maths.water.course import Course
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
 from katana450.maths.water.liquid import WATER, Liquid
+from katana450.maths.water.vectors import Vector, scale, sub, vector
 
 CUP, BASIN = "cup", "basin"
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.maths.collision.convex_body import MAX_CORNERS
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+
+MAX_CORNERS = 64
+"""Maximum number of corners: such a body is measured as quickly as any link."""
 
 MAX_KEY_LENGTH = 64
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.robot.visual import GEOMETRY_FILES, PrimitiveShape, Visual
-from katana450.maths.collision.convex_body import convex_body
+from katana450.extensions.convex_body import convex_body
 from katana450.maths.collision.engine import engine
 from katana450.maths.geometry.arrays import FloatArray
 

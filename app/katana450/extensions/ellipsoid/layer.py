@@ -8,9 +8,9 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state import State
+from katana450.extensions.ellipsoid.velocity_ellipsoid import velocity_ellipsoid
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.velocity import velocity_ellipsoid
 from katana450.server.view.layer import LayerContext, ViewLayer
 
 SCALE = 0.2

@@ -16,6 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from katana450.errors import InputError
+from katana450.extensions.convex_body import ConvexBody
 from katana450.extensions.importers.archive import ChoiceError, packed
 from katana450.extensions.importers.companions import is_inside
 from katana450.extensions.importers.shape_file import (
@@ -28,7 +29,6 @@ from katana450.extensions.importers.shape_file import (
     check_file,
     label,
 )
-from katana450.maths.collision.convex_body import ConvexBody
 from katana450.maths.geometry.arrays import frozen
 from katana450.maths.planning.checkpoint import checkpoint
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.placement import free_place
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
+from katana450.extensions.free_place import free_place
 from katana450.extensions.importers.mesh_file import read_mesh_file
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
 from katana450.extensions.programs.scene_draft import Scene

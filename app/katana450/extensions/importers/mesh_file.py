@@ -10,6 +10,7 @@ import numpy as np
 from katana450.arm.control.solid import Solid
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
+from katana450.extensions.convex_body import ConvexBody
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES
 from katana450.extensions.importers.guarded_reading import Beside, read_shape_guarded
 from katana450.extensions.importers.shape_file import (
@@ -19,7 +20,6 @@ from katana450.extensions.importers.shape_file import (
     ShapeFile,
     Up,
 )
-from katana450.maths.collision.convex_body import ConvexBody
 
 HULL_DISTANCE_TO_REPORT = 2e-3
 """[m] Distance of a hull from its mesh from which it is reported."""

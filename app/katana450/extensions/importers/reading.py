@@ -16,6 +16,7 @@ import sys
 import numpy as np
 
 from katana450.errors import InputError
+from katana450.extensions.convex_body import convex_body
 from katana450.extensions.importers.archive import ChoiceError
 from katana450.extensions.importers.shape_file import (
     MAX_MEMORY_BYTES,
@@ -24,7 +25,6 @@ from katana450.extensions.importers.shape_file import (
     Up,
     read_shape,
 )
-from katana450.maths.collision.convex_body import convex_body
 from katana450.platform_support import limit_resources
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.placement import free_place
 from katana450.arm.control.pouring import BASIN, CUP
 from katana450.arm.control.scene_objects import MAX_OBJECTS, Attachment, SceneObject, Shape, named
 from katana450.arm.control.solid import PLAIN, ObjectAppearance
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
 from katana450.errors import InputError
+from katana450.extensions.free_place import free_place
 from katana450.maths.geometry import se3
 from katana450.maths.water.liquid import LIQUIDS
 from katana450.maths.water.units import ML

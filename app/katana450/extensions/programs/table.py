@@ -9,10 +9,10 @@ from typing import Self
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.placement import girth
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.support import check_carried
 from katana450.errors import InputError
+from katana450.extensions.free_place import girth
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import FillCup, PutObject
 from katana450.extensions.programs.fields import Fields

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 from typing import Final
@@ -21,7 +20,7 @@ import numpy.typing as npt
 
 from katana450.errors import InputError
 from katana450.maths.geometry import screws
-from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, joint_frames
@@ -50,20 +49,6 @@ class JogFrame(Enum):
 
 Task = Callable[[Chain, FloatArray, FloatArray, JogFrame], tuple[FloatArray, FloatArray]]
 """Returns Jacobian (k, n) and task (k,) of a twist (6,) at joint angles (n,) [rad]."""
-
-
-@dataclass(frozen=True, eq=False)
-class VelocityEllipsoid:
-    """Velocities of the tool point with joint rates of unit norm.
-
-    Attributes:
-        axes: principal directions in {S} as columns (3, 3), right-handed.
-        radii: radii (3,) [m/rad] in falling order. Where a radius is 0 the arm cannot move the tool
-            point in that direction.
-    """
-
-    axes: FloatArray
-    radii: FloatArray
 
 
 @lru_cache(maxsize=16)
@@ -105,15 +90,6 @@ def limit_distances(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     """Return the distance (n,) [rad] of each joint from its nearer limit; negative beyond it."""
     q = chain.check_q(q)
     return np.minimum(q - chain.lower, chain.upper - q)
-
-
-def velocity_ellipsoid(chain: Chain, q: npt.ArrayLike) -> VelocityEllipsoid:
-    """Return the ellipsoid of the tool point's translational Jacobian at `q` (n,) [rad]."""
-    R = forward(chain, q)[:3, :3]
-    axes, radii, _ = np.linalg.svd(R @ jacobian_body(chain, q)[3:])
-    if np.linalg.det(axes) < 0.0:
-        axes[:, 2] *= -1.0
-    return VelocityEllipsoid(frozen(axes), frozen(radii))
 
 
 def jog(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from katana450.maths.geometry.vectors import Vector, norm, scale, sub
+from katana450.maths.water.vectors import Vector, norm, scale, sub
 
 
 @dataclass(frozen=True)

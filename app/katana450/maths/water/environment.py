@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from katana450.errors import InputError
-from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.vectors import Vector
 
 
 @dataclass(frozen=True)

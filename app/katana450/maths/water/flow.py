@@ -17,7 +17,6 @@ import numpy.typing as npt
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
-from katana450.maths.geometry.vectors import Vector, add, norm, scale, sub, vector
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.film import drained_film, withdrawn_thickness
 from katana450.maths.water.lip import DROP_VOLUME, left_over, lip_speed, viscous_flow, weir_flow
@@ -26,6 +25,7 @@ from katana450.maths.water.parcel import Ground, Parcel, landing
 from katana450.maths.water.puddle import Puddle, spill
 from katana450.maths.water.slosh import Slosh, damping, frequency
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY, counted
+from katana450.maths.water.vectors import Vector, add, norm, scale, sub, vector
 
 MAX_FILM = 0.25
 """Maximum thickness of the film where it is left, relative to the radius of the cup."""

@@ -9,9 +9,9 @@ import math
 from enum import Enum
 from typing import NamedTuple
 
-from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY
+from katana450.maths.water.vectors import Vector
 from katana450.tolerances import ROUNDING
 
 SPREAD = 0.03

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from katana450.maths.geometry.vectors import Vector, add, scale
 from katana450.maths.water.units import FEMTOLITRE
+from katana450.maths.water.vectors import Vector, add, scale
 
 THICKNESS = 2.7e-3
 """Thickness [m] of a large puddle with a contact angle of 60 degrees: 2 sin(30 degrees) times the

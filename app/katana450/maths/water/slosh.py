@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.liquid import Liquid
 from katana450.maths.water.units import GRAVITY
+from katana450.maths.water.vectors import Vector
 
 FIRST_MODE = 1.8412
 """The first zero of J1', the derivative of the Bessel function."""

@@ -20,13 +20,13 @@ from katana450.extensions.recording.form_error import FormError
 from katana450.extensions.recording.shared_values import SharedText
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water
 from katana450.maths.water.parcel import Parcel, landing
 from katana450.maths.water.puddle import Puddle
 from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
+from katana450.maths.water.vectors import Vector
 
 
 class ObjectRow(msgspec.Struct):

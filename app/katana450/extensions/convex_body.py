@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.control.solid import MAX_CORNERS
 from katana450.errors import InputError
 from katana450.maths.collision.engine import engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
-
-MAX_CORNERS = 64
-"""Maximum number of corners: such a body is measured as quickly as any link."""
 
 MIN_THICKNESS_FRACTION = 0.005
 """Minimum thickness [1] relative to the length; a flatter body is thickened to have an inside."""

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 
-from katana450.maths.geometry import vectors
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water import vectors
 from tests.geometry.strategies import directions, points, repeatable
 
 
