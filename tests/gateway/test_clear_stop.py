@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any, cast
 
 import pytest
 
@@ -67,7 +68,8 @@ class ClearingTable(Table):
         super().__init__(state)
         self.hub = Hub(lambda: self.t, clear_by=clear_by)
         self.stoppable = StoppableArm(state)
-        self.arm = self.hub.gate.arm = self.stoppable
+        self.arm = self.stoppable
+        self.hub.gate.arm = cast(Any, self.arm)
 
     def person(self, name: str, role: Role) -> Participant:
         return self.hub.join(Identity(name, name, role), PAGES[0], lambda _notice: None)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 import viser
@@ -145,7 +145,8 @@ def test_no_gesture_of_another_thread_passes_a_stop(table: Table) -> None:
             self.order.append((command, actor))
             return super().deliver(command, actor)
 
-    arm = gate.arm = RecordingArm()
+    arm = RecordingArm()
+    gate.arm = cast(Any, arm)
 
     def gesture() -> None:
         while not done.is_set():

@@ -15,12 +15,12 @@ from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service import derived
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.derived import once
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.interfaces import ArmInterface
 
 
 def _snapshot() -> Snapshot:
@@ -35,7 +35,7 @@ def test_branches_are_computed_once_per_snapshot() -> None:
         return ()
 
     arm.choices = choices
-    hub.gate.arm = cast(ArmInterface, arm)
+    hub.gate.arm = cast(ArmHandle, arm)
     budgets = Budgets(hub.clock)
     for number in range(3):
         identity = Identity(f"session-{number}", "Viewer", Role.VIEWER)

@@ -7,6 +7,7 @@ import time
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from starlette.exceptions import HTTPException
@@ -41,7 +42,8 @@ class House:
         self.file = AccessFile.create(folder / "access.json")
         self.hub = Hub(time.monotonic)
         self.hub.add_handler(PeopleRequests(self.hub, Namespace()))
-        self.arm = self.hub.gate.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
+        self.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
+        self.hub.gate.arm = cast(Any, self.arm)
         access = None if free else self.file
         self.people = self.hub.people
         self.people.links = access

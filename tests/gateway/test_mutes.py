@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -39,7 +40,8 @@ class Room:
     def __init__(self, session: Session) -> None:
         self.t = 100.0
         self.hub = Hub(lambda: self.t)
-        self.arm = self.hub.gate.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
+        self.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
+        self.hub.gate.arm = cast(Any, self.arm)
         self.vera, self.oda = (self.join(each) for each in (VERA, ODA))
 
     def join(self, identity: Identity) -> Participant:

@@ -12,8 +12,8 @@ from katana450.extensions.programs.scene_draft import Scene
 from katana450.maths.water.liquid import WATER
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.scenes import free_name, used_in
 
 
@@ -32,7 +32,7 @@ def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
     )
 
 
-def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmInterface) -> answers.Scene:
+def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmHandle) -> answers.Scene:
     """Store ``stored``, read from ``data``, so that it can be loaded. Raises InputError."""
     key = hashlib.sha256(data).hexdigest()[:32]
     scene = stored.scene
@@ -46,13 +46,13 @@ def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmInterface) ->
     return answers.Scene(key=key, objects=names, text=text)
 
 
-def zipped(hub: Hub, arm: ArmInterface) -> bytes:
+def zipped(hub: Hub, arm: ArmHandle) -> bytes:
     """Return the present scene as a .zip. Raises InputError or LeaseError if it cannot be saved."""
     hand = arm.environment.hand
     return scene_zip(_stored(hub, arm), None if hand is None else hand.T_palm_tool)
 
 
-def _stored(hub: Hub, arm: ArmInterface) -> StoredScene:
+def _stored(hub: Hub, arm: ArmHandle) -> StoredScene:
     state = arm.state
     held = state.held
     if held is not None:

@@ -24,8 +24,8 @@ from katana450.arm.control.stop_cause import pressed
 from katana450.extensions.rosbridge import names
 from katana450.extensions.rosbridge.messages import TFMessage
 from katana450.extensions.rosbridge.publications import SILENT_AFTER, Publications
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import ArmInterface
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ class FoxgloveServer:
                 log.exception("Error in the connection of Foxglove.")
                 return
 
-    def _publish(self, arm: ArmInterface) -> None:
+    def _publish(self, arm: ArmHandle) -> None:
         state = arm.state
         if self._frames.has_sinks():
             found = [self._publications.message(each) for each in (names.TF_STATIC, names.TF)]

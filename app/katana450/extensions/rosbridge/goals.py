@@ -16,8 +16,8 @@ from katana450.extensions.rosbridge.messages import RosMessage
 from katana450.extensions.rosbridge.ops import OpId, SendActionGoal
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.participants import Participant
 
 FEEDBACK_INTERVAL = 0.1
@@ -61,7 +61,7 @@ class GoalHost:
     show: Callable[[str, dict[str, Any]], None]
 
     @property
-    def arm(self) -> ArmInterface:
+    def arm(self) -> ArmHandle:
         """The arm. Raises LeaseError until it is ready."""
         return self.hub.present()
 

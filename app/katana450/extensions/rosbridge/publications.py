@@ -31,8 +31,8 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers
 from katana450.server.service import serialize
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import ArmInterface
 
 SILENT_AFTER = 0.3
 """[s] Age at which the state counts as unknown, and topics of the arm are no longer sent."""
@@ -81,13 +81,13 @@ class Publications(NamedTuple):
                 return transforms(moving, values, stamp)
         return String(data=answers.encoded(serialize.state(self.hub)))
 
-    def stamp(self, arm: ArmInterface) -> float:
+    def stamp(self, arm: ArmHandle) -> float:
         """Return the time of the newest state [s since the epoch]; an arm at rest has it now."""
         now = time.time()
         return now - max(self.hub.clock() - arm.state.t, 0.0) if arm.state.moving else now
 
 
-def joint_state(arm: ArmInterface, stamp: Time) -> JointState:
+def joint_state(arm: ArmHandle, stamp: Time) -> JointState:
     """Return all movable joints: positions [rad or m], and the rates of the arm's setpoints.
 
     The rate of a joint beside the arm's axes is 0. There are no efforts.
@@ -133,7 +133,7 @@ def _transform(T: FloatArray) -> RosTransform:
     )
 
 
-def diagnostics(hub: Hub, arm: ArmInterface) -> DiagnosticArray:
+def diagnostics(hub: Hub, arm: ArmHandle) -> DiagnosticArray:
     """Return the condition of the arm, of its control loop and of the right to drive."""
     now = serialize.state(hub)
     return DiagnosticArray(
@@ -161,7 +161,7 @@ def _arm_status(now: answers.State) -> DiagnosticStatus:
     return _status("katana450: arm", level, message, values)
 
 
-def _loop_status(arm: ArmInterface) -> DiagnosticStatus:
+def _loop_status(arm: ArmHandle) -> DiagnosticStatus:
     timing = arm.loop_timing
     late = timing.p99 > timing.period
     message = "1 % of the ticks are more than a period late." if late else "ok"

@@ -19,7 +19,7 @@ from katana450.arm.control.state import CAUSES, Finding, State
 from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
-from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.last_pause import LastPause
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_state import ClearBy, ClearRights, StopRecord
@@ -54,7 +54,7 @@ class CommandGate:
         """Lock that keeps other commands, stops and changes of the lease out."""
         self.lease = Lease()
         self.stopped: StopRecord | None = None
-        self.arm: ArmInterface | None = None
+        self.arm: ArmHandle | None = None
         """The arm; None until it is ready."""
         self.program: RunningProgram | None = None
         """The running program; None without one."""
@@ -133,7 +133,7 @@ class CommandGate:
                 self.recorder.refuse("gesture", actor, error)
                 raise
 
-    def check_runs(self) -> ArmInterface:
+    def check_runs(self) -> ArmHandle:
         """Return the arm. Raises LeaseError while it is missing or stopped."""
         arm = self.present()
         self.check_not_stopped()
@@ -155,7 +155,7 @@ class CommandGate:
         """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
         return actor.seen is None or actor.seen == self.revocations
 
-    def present(self) -> ArmInterface:
+    def present(self) -> ArmHandle:
         """Return the arm. Raises LeaseError until it is ready."""
         if self.arm is None:
             raise LeaseError("The arm is not ready yet.")
@@ -319,7 +319,7 @@ class CommandGate:
         self.on_stop()
         self.last_pause = None
 
-    def _adopt(self, cause: StopCause, arm: ArmInterface) -> None:
+    def _adopt(self, cause: StopCause, arm: ArmHandle) -> None:
         """Record a stop that the arm has executed and this gate has not sent."""
         self._end_gestures()
         named, actor = self._named(cause)

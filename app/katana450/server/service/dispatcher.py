@@ -18,10 +18,10 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.pending_answer import PendingAnswer, give_back
 
@@ -246,7 +246,7 @@ class Dispatcher:
             return serialize.loop(arm.loop_timing)
         return once(arm.snapshot, at, lambda: self._derived(arm, at))
 
-    def _derived(self, arm: ArmInterface, at: str) -> answers.Answer:
+    def _derived(self, arm: ArmHandle, at: str) -> answers.Answer:
         """Return the answer to a query that depends on the newest snapshot alone."""
         match at:
             case "arm":

@@ -20,12 +20,12 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.command_gate import CommandGate
 from katana450.server.service.driver_watch import DriverWatch
 from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
-from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.known_pages import KnownPages
 from katana450.server.service.mutes import MutedError
 from katana450.server.service.names import renamed
@@ -104,7 +104,7 @@ class Hub:
         return self.clock() - self._ticked
 
     @property
-    def arm(self) -> ArmInterface | None:
+    def arm(self) -> ArmHandle | None:
         """The arm; None until it is ready."""
         return self.gate.arm
 
@@ -200,7 +200,7 @@ class Hub:
                 self._driver_watch.brake_left(person)
             self.gate.change(lambda lease, t: lease.close(person, t))
 
-    def present(self) -> ArmInterface:
+    def present(self) -> ArmHandle:
         """Return the arm. Raises LeaseError until it is ready."""
         return self.gate.present()
 
@@ -356,7 +356,7 @@ class Hub:
             newest = participant.heartbeat.newest
             self.gate.change(lambda lease, _: lease.hear(participant.person, newest))
 
-    def _watch(self, arm: ArmInterface) -> None:
+    def _watch(self, arm: ArmHandle) -> None:
         """Stop an arm whose process does not answer; it stops once the process answers again."""
         age, due = arm.age, self.gate.moves() or not arm.caught_up
         # A simulated arm that answers late pauses by itself.

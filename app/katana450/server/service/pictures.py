@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from katana450.server.service.interfaces import MeasuresAge
+from typing import Protocol
+
+
+class MeasuresAge(Protocol):
+    """Interface for the age of a window's picture; ``Flow`` implements it."""
+
+    def age(self, t: float) -> float:
+        """Return the age of the picture [s] at time ``t`` [s]."""
 
 
 class ShownPictures:

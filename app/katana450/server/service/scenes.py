@@ -12,7 +12,7 @@ from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError, LeaseError
 
 if TYPE_CHECKING:
-    from katana450.server.service.interfaces import ArmInterface
+    from katana450.server.service.arm_handle import ArmHandle
 
 MAX_WAITING_SCENES = 4
 """Maximum number of uploaded scenes that are not loaded yet."""
@@ -31,7 +31,7 @@ class Scenes:
         self._waiting: dict[str, _Waiting] = {}
 
     def keep(
-        self, key: str, command: cmd.ReplaceScene, meshes: Collection[Mesh], arm: ArmInterface
+        self, key: str, command: cmd.ReplaceScene, meshes: Collection[Mesh], arm: ArmHandle
     ) -> None:
         """Keep a scene under ``key``, and drop the oldest if there are too many.
 
@@ -43,7 +43,7 @@ class Scenes:
         while len(self._waiting) > MAX_WAITING_SCENES:
             self._waiting.pop(next(iter(self._waiting)))
 
-    def load_command(self, key: str, arm: ArmInterface) -> cmd.ReplaceScene:
+    def load_command(self, key: str, arm: ArmHandle) -> cmd.ReplaceScene:
         """Return the command that loads the scene.
 
         Raises InputError for an unknown key, and LeaseError while an object is held.

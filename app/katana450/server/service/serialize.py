@@ -28,10 +28,10 @@ from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
 from katana450.server.api.fields import tag_of
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.derived import once
 from katana450.server.service.event_log import UNITS, LogLine
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import ArmInterface
 
 
 def finding(found: control.Finding) -> answers.Finding:
@@ -63,7 +63,7 @@ def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | an
     )
 
 
-def motion_end(arm: ArmInterface, how: str, why: str, seconds: float) -> answers.MotionEnd:
+def motion_end(arm: ArmHandle, how: str, why: str, seconds: float) -> answers.MotionEnd:
     """Return the end of a motion with the place of the arm; see ``answers.MotionEnd``."""
     now, robot = arm.state, arm.robot
     T = None if robot.arm is None else forward(robot.arm.chain_to(now.tool), now.q).tolist()
@@ -92,7 +92,7 @@ def state(hub: Hub) -> answers.State:
     )
 
 
-def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
+def _state(arm: ArmHandle, snapshot: Snapshot) -> answers.State:
     """Return the part that depends on ``snapshot`` alone; ``state`` fills in the rest."""
     now = snapshot.state
     tool = None if arm.robot.arm is None else _Tool.of(arm.robot.arm, now)
@@ -314,7 +314,7 @@ def branch_option(choice: BranchOption) -> answers.BranchOption:
     )
 
 
-def objects(arm: ArmInterface) -> answers.Objects:
+def objects(arm: ArmHandle) -> answers.Objects:
     """Return all scene objects as an answer."""
     now = arm.state
     x = now.x

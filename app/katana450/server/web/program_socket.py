@@ -20,12 +20,12 @@ from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.service.recorder import REFUSED, stranger
@@ -135,7 +135,7 @@ class ProgramChannel(Channel):
             why = f"States are sent less often than requested. {error}"
             return answers.Refused(why=why, retry=error.retry), self._due - t
 
-    def _state(self, arm: ArmInterface) -> answers.State:
+    def _state(self, arm: ArmHandle) -> answers.State:
         """Return the state with the watched fields, except those of removed objects."""
         now = serialize.state(self.hub)
         values: list[answers.Value] = []
