@@ -14,6 +14,7 @@ import contextlib
 import io
 import math
 import time
+from argparse import Namespace
 from collections.abc import Callable
 from threading import Event
 
@@ -32,9 +33,10 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
+from katana450.assembly.frontend import layers
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.server.view.view import View
+from katana450.server.view.view import View, ViewOptions
 from katana450.settings import Settings
 from tests.view.gestures import RecordedGestures
 
@@ -125,6 +127,7 @@ def drive(commands: Callable[[int, Session, State], Command | None]) -> None:
         lambda: mailbox.last_ticket,
         session,
         settings.frame_rate,
+        ViewOptions(layers(Namespace(workspace=None))),
     )
     nodes = BareNodes(bare, robot.require_arm().chain.n)
     ours: list[float] = []

@@ -49,7 +49,7 @@ def build_frontend(
         ConfigurationError: an option needs an arm, but the robot has none.
         EOFError: the server ends, or the arm's process has closed the pipe.
     """
-    settings, layers = config.settings, _layers(config.options)
+    settings, added = config.settings, layers(config.options)
     found = find_robot(settings, config.urdf, config.tool)
     robot, session, _ = found
     address = config.address
@@ -62,7 +62,7 @@ def build_frontend(
     front_end.on_stop_change = partial(gateway.soon, gateway.hub.follow_stop)
     front_end.on_command_at_rest = partial(gateway.soon, gateway.watch_closely)
     if robot.arm is None:
-        for layer in layers:
+        for layer in added:
             if layer.what:
                 raise ConfigurationError(f"{layer.what} {robot.why}")
         front_end.start()
@@ -70,7 +70,7 @@ def build_frontend(
         return front_end, _joint_view(gateway, config, robot, front_end), None
     planning_worker = PlanningWorker(session, front_end.state_publisher, front_end)
     folders = partial(_folders, gateway, config.options, robot, front_end)
-    options = ViewOptions(layers, meshes, folders, find_gizmo(robot.arm.kinematics.freedoms))
+    options = ViewOptions(added, meshes, folders, find_gizmo(robot.arm.kinematics.freedoms))
     view = _view(gateway, config, found, front_end, options)
     go = partial(gateway.hub.gate.submit, cmd.Go()) if settings.go_on_release else None
     detours = DetourPlanner(session, front_end.state_publisher, planning_worker, go)
@@ -88,7 +88,7 @@ def find_gizmo(freedoms: int) -> type[Gizmo] | None:
     return next(found, None)
 
 
-def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
+def layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
     """Return the layers that the extensions add to the scene of an arm."""
     if options is None:
         return ()
