@@ -21,6 +21,7 @@ from katana450.arm.robot.creases import drawn, glb
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
 from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.extensions.objects.handles import ObjectHandles
 from katana450.extensions.objects.objects_panel import NOTHING, ObjectsPanel
 from katana450.maths.water.environment import TableTop
 from katana450.server.view.scene_objects import SceneObjectNodes
@@ -55,9 +56,7 @@ def test_mesh_is_drawn_again_only_when_necessary(
 ) -> None:
     meshes = Meshes()
     meshes.put([mesh], ())
-    nodes = SceneObjectNodes(
-        server, load_props(), Environment(None, None), RecordedGestures(), meshes
-    )
+    nodes = SceneObjectNodes(server, load_props(), Environment(None, None), meshes)
     state = session.begin(session.ready, 0.0, 0.0)
     scene_object = SceneObject("it", Shape.MESH, (), np.eye(4), solid=mesh.solid)
 
@@ -108,9 +107,7 @@ def test_mesh_is_drawn_again_only_when_necessary(
 def test_mesh_without_triangles_is_drawn_as_its_convex_body(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
-    nodes = SceneObjectNodes(
-        server, load_props(), Environment(None, None), RecordedGestures(), Meshes()
-    )
+    nodes = SceneObjectNodes(server, load_props(), Environment(None, None), Meshes())
     state = session.begin(session.ready, 0.0, 0.0)
     scene_object = SceneObject("it", Shape.MESH, (), np.eye(4), solid=mesh.solid)
     nodes.follow(seen(state, scene_object))
@@ -145,7 +142,7 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     gestures = RecordedGestures()
     put = gestures.commands
     around = Environment(None, None, TableTop((-0.25, 0.75), (-0.7, 0.7), -0.025))
-    nodes = SceneObjectNodes(server, load_props(), around, gestures, Meshes())
+    nodes = ObjectHandles(server, around, gestures)
     cup = SceneObject("cup", Shape.CYLINDER, (0.032, 0.09), np.eye(4), can_be_held=True)
     nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), cup))
     shown: list[str] = []

@@ -18,12 +18,10 @@ class DisplayOptions:
     """The functions that the controls call.
 
     Attributes:
-        handles: shows or hides the handles of scene objects.
         look_from: turns the camera of one browser.
         layers: layers of extensions.
     """
 
-    handles: Callable[[bool], None]
     look_from: Callable[[viser.ClientHandle, Preset], None]
     layers: tuple[ViewLayer, ...]
 
@@ -43,12 +41,6 @@ def add_views(gui: viser.GuiApi, shows: DisplayOptions) -> None:
 
 def add_shows(gui: viser.GuiApi, shows: DisplayOptions) -> None:
     """Add the controls of the folder "Show"."""
-    handles = gui.add_checkbox(
-        "Handles on objects",
-        initial_value=False,
-        hint="Arrows that move cup, basin and other objects on the table",
-    )
-    handles.on_update(lambda _: shows.handles(handles.value))
     for layer in shows.layers:
         layer.add_controls(gui)
 

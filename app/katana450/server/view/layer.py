@@ -10,6 +10,7 @@ import viser
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
+from katana450.server.view.controls import GestureGate
 
 
 class LayerContext(NamedTuple):
@@ -20,12 +21,14 @@ class LayerContext(NamedTuple):
         robot: The robot, which has an arm.
         session: The session, which has the environment of objects and the water model.
         path: Path of the node of each link, by link name.
+        gestures: The path of gestures to the arm.
     """
 
     server: viser.ViserServer
     robot: Robot
     session: Session
     path: Mapping[str, str]
+    gestures: GestureGate
 
 
 class ViewLayer:

@@ -1,35 +1,24 @@
-"""Scene objects in the scene, with handles that move them on the table."""
+"""Scene objects in the scene."""
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import viser
 
-from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import PlaceObject
 from katana450.arm.control.scene_objects import Environment, SceneObject, Shape
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
-from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.robot.creases import Drawn, drawn, glb
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.visual import Visual
-from katana450.errors import InputError, KatanaError
-from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.controls import GestureGate, refuse
-from katana450.server.view.scene import Window, node_name
+from katana450.server.view.scene import Window
 from katana450.server.view.tint import Tint
-from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place, turn
-
-HANDLE = 0.09
-"""Length [m] of a handle's arrows: they end outside cup and basin."""
 
 COLOUR = (148, 163, 184)
 """Colour of an object without a colour of its own."""
@@ -49,7 +38,6 @@ class SceneObjectNodes:
         server: viser.ViserServer,
         props: Props,
         environment: Environment,
-        gestures: GestureGate,
         meshes: Meshes,
     ) -> None:
         """Prepare for objects on ``server``.
@@ -58,31 +46,17 @@ class SceneObjectNodes:
             server: viser's server.
             props: Table, cup and basin.
             environment: The supports and links to which objects are fixed.
-            gestures: The path of gestures to the arm.
             meshes: The meshes of objects.
         """
         self._server = server
         self._props = {"cup": props.cup.mesh, "basin": props.basin.mesh}
         self._environment = environment
-        self._gestures = gestures
         self._meshes = meshes
         self._frames: dict[str, viser.FrameHandle] = {}
         self._shapes: dict[str, ObjectShape] = {}
-        self._handles: dict[str, viser.TransformControlsHandle] = {}
         self._made = 0
         self._objects: dict[str, SceneObject] = {}
         self._seen: tuple[SceneObject, ...] = ()
-        self._dragged: tuple[str, Actor] | None = None
-        self._handles_shown = False
-
-    def show_handles(self, visible: bool) -> None:
-        """Show or hide the handles. A carried object has none."""
-        self._handles_shown = visible
-        for name, handle in self._handles.items():
-            scene_object = self._objects.get(name)
-            shown = visible and scene_object is not None and not scene_object.carried
-            if handle.visible != shown:
-                handle.visible = shown
 
     def follow(self, state: State) -> None:
         """Show the objects of ``state``; those near a contact are coated."""
@@ -108,7 +82,6 @@ class SceneObjectNodes:
             shape.follow(scene_object)
             if frame.visible == scene_object.appearance.hidden:
                 frame.visible = not scene_object.appearance.hidden
-        self.show_handles(self._handles_shown)
 
     def _pose(self, scene_object: SceneObject, x: FloatArray) -> None:
         T = self._environment.pose(scene_object, x)
@@ -116,15 +89,12 @@ class SceneObjectNodes:
         w, i, j, k = so3.to_quaternion(T[:3, :3]).tolist()
         place(self._frames[scene_object.name], (px, py, pz))
         turn(self._frames[scene_object.name], (w, i, j, k))
-        if not self._holds(scene_object.name):
-            place(self._handles[scene_object.name], (px, py, pz))
 
     def _add(self, name: str) -> None:
         self._made += 1
         path = f"/{name}" if name in self._props else f"/objects/{self._made}"
         self._frames[name] = self._server.scene.add_frame(path, show_axes=False)
         self._shapes[name] = ObjectShape(self._server, path, self._meshes, self._props.get(name))
-        self._handles[name] = self._handle(name)
 
     def _take_away(self, name: str) -> None:
         if name in self._props:
@@ -133,56 +103,6 @@ class SceneObjectNodes:
             return
         del self._shapes[name]
         self._frames.pop(name).remove()
-        self._handles.pop(name).remove()
-
-    def _handle(self, name: str) -> viser.TransformControlsHandle:
-        handle = self._server.scene.add_transform_controls(
-            f"/handles/{node_name(name)}",
-            scale=HANDLE,
-            line_width=3.0,
-            active_axes=(True, True, False),
-            disable_rotations=True,
-            depth_test=False,
-            translation_limits=((-WORKSPACE, WORKSPACE),) * 2 + ((0.0, 0.0),),
-            visible=False,
-        )
-
-        @handle.on_update
-        async def _(event: viser.TransformControlsEvent) -> None:
-            self._moved(name, event)
-
-        return handle
-
-    def _moved(self, name: str, event: viser.TransformControlsEvent) -> None:
-        scene_object, actor = self._objects.get(name), self._gestures.actor(event.client_id)
-        if event.phase == "start":
-            self._dragged = name, actor
-        if scene_object is None or scene_object.carried or self._dragged != (name, actor):
-            return
-        if event.phase == "end":
-            self._dragged = None
-        x, y, _ = (float(each) for each in event.target.position)
-        T = se3.from_rotation_translation(
-            scene_object.T[:3, :3], (x, y, float(scene_object.T[2, 3]))
-        )
-        moved = replace(scene_object, T=T)
-        try:
-            if is_loose(moved):
-                check_carried(self._environment.table, self._seen, moved)
-        except InputError as error:
-            # The object stays at the edge, and the handle returns to it.
-            if event.phase == "end":
-                px, py, pz = scene_object.T[:3, 3].tolist()
-                place(self._handles[name], (px, py, pz))
-                refuse(event, error)
-            return
-        # A drag sends 20 messages a second: the next one repeats the request or shows the refusal.
-        with suppress(KatanaError):
-            self._gestures.submit(PlaceObject(moved), actor)
-
-    def _holds(self, name: str) -> bool:
-        dragged = self._dragged
-        return dragged is not None and dragged[0] == name and self._gestures.is_current(dragged[1])
 
 
 class ObjectShape:

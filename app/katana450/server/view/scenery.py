@@ -39,7 +39,7 @@ class Scenery:
             robot: The robot, which must have an arm.
             session: The session, which has the environment of objects.
             props: Table, cup and basin.
-            gestures: The path of gestures at the handles of objects.
+            gestures: The path of gestures at the nodes of layers.
             meshes: The meshes of objects.
             layers: Layers of extensions.
 
@@ -49,15 +49,15 @@ class Scenery:
         self._robot = robot
         set_up_room(server)
         Workcell(server, props)
-        self.objects = SceneObjectNodes(server, props, session.environment, gestures, meshes)
+        self._objects = SceneObjectNodes(server, props, session.environment, meshes)
         self.arm = ArmNodes(server, robot)
         self._layers = layers
         for layer in layers:
-            layer.attach(LayerContext(server, robot, session, self.arm.path))
+            layer.attach(LayerContext(server, robot, session, self.arm.path, gestures))
 
     def show(self, state: State) -> None:
         """Show ``state``."""
         self.arm.move(self._robot.joint_values(state.q, state.gripper))
-        self.objects.follow(state)
+        self._objects.follow(state)
         for layer in self._layers:
             layer.follow(state)

@@ -125,7 +125,6 @@ class View(ViewUpdater):
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
         shows = DisplayOptions(
-            self._scenery.objects.show_handles,
             self._look_from,
             view_options.layers,
         )
