@@ -22,7 +22,8 @@ from katana450.maths.kinematics.nearest_posture import nearest_posture
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Coefficient, Jet
-from katana450.maths.planning.posture import FiveJets, ThreeJets
+from katana450.maths.planning.path import CurvePath
+from katana450.maths.planning.posture import FiveJets
 
 KNOTS = 400
 """Number of intervals in which a path is checked when it is built."""
@@ -43,7 +44,7 @@ HALVINGS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class ToolPath:
+class ToolPath(CurvePath):
     """The joints on `branch` that keep the tool on `curve`.
 
     Raises InputError where the curve leaves the branch's reach or the limits, or meets the end of
@@ -79,11 +80,6 @@ class ToolPath:
         self._refuse_kinks(q, qd)
         self._refuse_limits(q, qd)
 
-    @property
-    def joins(self) -> tuple[float, ...]:
-        """The joins of the curve."""
-        return self.curve.joins
-
     def joints(self, sigma: Jet) -> FiveJets:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         arm = arm_of(self.chain)
@@ -95,11 +91,6 @@ class ToolPath:
             found.append(q + turns * math.tau if np.any(turns) else q)
         one, two, three, four, five = found
         return one, two, three, four, five
-
-    def point(self, sigma: Jet) -> ThreeJets:
-        """Return the tool point in {S} [m]."""
-        x, y, z, _, _ = self.curve.at(sigma)
-        return x, y, z
 
     @cached_property
     def start(self) -> FloatArray:
@@ -159,7 +150,7 @@ class ToolPath:
         short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
         raise PathError(
             f"The path leaves the reach of the arm on the branch {self.branch} "
-            f"{_at(failing)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}. "
+            f"{at_place(failing)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}. "
             "Links come in line there, or the tool comes over axis 1. Keep the path nearer to the "
             "arm, or give it another pitch.",
             target.position.tolist(),
@@ -179,7 +170,7 @@ class ToolPath:
             place, axis = (int(each) for each in np.argwhere(kinked)[0])
             sigma = float(self._sigma[place])
             raise PathError(
-                f"Axis {axis + 1} would have to leap or turn back at once {_at(sigma)}. "
+                f"Axis {axis + 1} would have to leap or turn back at once {at_place(sigma)}. "
                 "Links come in line there, or the tool passes over axis 1. Lead the path around "
                 "that place.",
                 self._target(sigma).position.tolist(),
@@ -192,8 +183,8 @@ class ToolPath:
         """
         slack, lower, upper = tolerances.LIMIT_SLACK, self.chain.lower, self.chain.upper
         beyond = np.maximum(lower - q, q - upper)
-        peaks = _peaks(q, qd, np.diff(self._sigma)[:, None])
-        over = np.maximum(beyond[:-1], np.maximum(lower - peaks, peaks - upper))
+        extreme = peaks(q, qd, np.diff(self._sigma)[:, None])
+        over = np.maximum(beyond[:-1], np.maximum(lower - extreme, extreme - upper))
         over[-1] = np.maximum(over[-1], beyond[-1])
         if over.max() <= slack:
             return
@@ -207,18 +198,18 @@ class ToolPath:
             sigma -= float(passed) * (sigma - float(self._sigma[place - 1]))
         raise PathError(
             f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
-            f"{_at(sigma)}, by up to {np.degrees(worst):.3g} deg later on. "
+            f"{at_place(sigma)}, by up to {np.degrees(worst):.3g} deg later on. "
             "Shift the path, or give it another pitch or roll.",
             self._target(sigma).position.tolist(),
         )
 
 
-def _at(sigma: float) -> str:
+def at_place(sigma: float) -> str:
     """Return the place in words for a PathError, which names the point."""
     return f"{100.0 * sigma:.1f} % along it, at {{point}}"
 
 
-def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
+def peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
     """Return the extreme (N, n) inside each piece of length `h` (N, 1), or its start if none."""
     a, b = q[:-1], q[1:]
     da, db = h * qd[:-1], h * qd[1:]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -44,12 +44,35 @@ class Path(Protocol):
         ...
 
 
+class CurvePath:
+    """A joint path that keeps the tool on a curve; the base of `ToolPath`.
+
+    Attributes:
+        chain: the arm, with the tool.
+        curve: the curve; `at` returns x, y and z of the tool point [m] first.
+    """
+
+    chain: Chain
+    curve: Any
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The joins of the curve."""
+        found: tuple[float, ...] = self.curve.joins
+        return found
+
+    def point(self, sigma: Jet) -> ThreeJets:
+        """Return the tool point in {S} [m]."""
+        x, y, z, *_ = self.curve.at(sigma)
+        return x, y, z
+
+
 def joint_derivatives(path: Path, sigma: FloatArray) -> FloatArray:
     """Return the joint angles at `sigma` (N,) and their first three derivatives, (4, N, n)."""
     return _stacked(path.joints(Jet.variable(sigma)), sigma)
 
 
-def point_derivatives(path: Path, sigma: FloatArray) -> FloatArray:
+def point_derivatives(path: Path | CurvePath, sigma: FloatArray) -> FloatArray:
     """Return the tool point [m] at `sigma` (N,) and its first three derivatives, (4, N, 3)."""
     return _stacked(path.point(Jet.variable(sigma)), sigma)
 

@@ -33,7 +33,7 @@ its ends equal to that of the legs.
 
 
 class PiecewisePolynomial:
-    """Coordinates as polynomials of fifth degree, each on a piece of sigma from 0 to 1."""
+    """Coordinates as polynomials, each on a piece of sigma from 0 to 1."""
 
     _starts: list[float]
     _terms: FloatArray
@@ -121,9 +121,9 @@ class Polyline(PiecewisePolynomial):
 def _polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
     """Return the polynomial at `t` by Horner's rule.
 
-    `terms` are floats or (6, N), the lowest power first.
+    `terms` are floats or (k, N), the lowest power first.
     """
-    found = Jet.constant(terms[5])
-    for term in (terms[4], terms[3], terms[2], terms[1], terms[0]):
+    found = Jet.constant(terms[-1])
+    for term in terms[-2::-1]:
         found = found * t + term
     return found

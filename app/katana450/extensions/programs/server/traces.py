@@ -8,11 +8,10 @@ import viser
 
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.path import point_derivatives
+from katana450.maths.planning.path import CurvePath, point_derivatives
 from katana450.maths.planning.plan import Plan, Segment
 from katana450.server.view.layer import LayerContext, ViewLayer
 
@@ -75,7 +74,7 @@ class Traces:
         if following.plan is not self._plan:
             self._begin(following.plan)
         path = following.segment.path
-        if not isinstance(path, ToolPath):
+        if not isinstance(path, CurvePath):
             return
         point = forward(path.chain, state.q)[:3, 3]
         sigma = following.segment.scaling.pace(following.local).sigma
@@ -91,7 +90,7 @@ class Traces:
     def _begin(self, plan: Plan) -> None:
         """Draw the tool paths of ``plan``. A plan without any keeps the last path and trace."""
         self._plan = plan
-        paths = [self._lines(each) for each in plan.segments if isinstance(each.path, ToolPath)]
+        paths = [self._lines(each) for each in plan.segments if isinstance(each.path, CurvePath)]
         if not paths:
             return
         self._points, self._errors, self._shown = [], [], 0
