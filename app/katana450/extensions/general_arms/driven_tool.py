@@ -22,6 +22,7 @@ from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.losses import losses_of
 from katana450.extensions.general_arms.nearest import nearest_posture
 from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.pose_equations import PoseEquations
 from katana450.extensions.general_arms.pose_tracker import PoseTracker
 from katana450.extensions.general_arms.projected import projected
 from katana450.extensions.general_arms.ready_posture import ready_posture
@@ -235,6 +236,19 @@ class DrivenTool:
         """Return the twist (6,) of rates (6,): a velocity and three rotations along ``frame``."""
         R = np.eye(3) if frame is JogFrame.BASE else forward(self.chain, q)[:3, :3]
         return np.concatenate((R @ rates[3:], R @ rates[:3]))
+
+    def equations(self, q: FloatArray) -> PoseEquations:
+        """Return the equations of a path of the tool that begins at `q` (n,) [rad].
+
+        Of more than six axes the swivel is locked, or the joints without which the others move the
+        tool best.
+        """
+        swivel = self._branches.swivel
+        found = PoseEquations(self._tracker.descent, () if swivel is None else (swivel,))
+        while len(found.free) > 6:
+            rest = [replace(found, locked=(*found.locked, k)) for k in found.free]
+            found = max(rest, key=lambda each: each.least(q))
+        return found
 
     def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:
         """Return the speed of the tool point [m/s] for the rates `qd` (n,)."""

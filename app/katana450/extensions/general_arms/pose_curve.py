@@ -1,0 +1,160 @@
+"""Curves of poses: tool point and rotation of the tool as functions of one parameter.
+
+They are formulas of sigma, from 0 to 1, on jets, like the curves of maths/planning/curve.py. For an
+arm with fewer than six axes rotations are those with axis 1 at zero, as in `ToolPose`. Lengths in
+m, angles in rad, frame {S}.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.planning.curve import Curve
+from katana450.maths.planning.jet import Jet, sin_cos, sqrt
+from katana450.maths.planning.polyline import Polyline
+from katana450.maths.planning.posture import ThreeJets
+
+TURN_LENGTH: Final = 0.25
+"""Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
+
+VIA_TOLERANCE: Final = 1e-9
+"""Vias nearer to each other than this [m] are the same."""
+
+
+class PoseJets(NamedTuple):
+    """The pose of the tool as jets: the tool point x, y, z, and the columns of its rotation."""
+
+    x: Jet
+    y: Jet
+    z: Jet
+    columns: tuple[ThreeJets, ThreeJets, ThreeJets]
+
+    @property
+    def T(self) -> FloatArray:
+        """The poses at N places, or at one, (N, 4, 4)."""
+        numbers = [*(each for column in self.columns for each in column), *self[:3]]
+        rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(each.c0) for each in numbers)), axis=1)
+        T = np.zeros((len(rows), 4, 4))
+        T[:, :3] = rows.reshape(-1, 4, 3).swapaxes(1, 2)
+        T[:, 3, 3] = 1.0
+        return T
+
+
+class PoseCurve(Protocol):
+    """The pose of the tool along a path."""
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places between 0 and 1 where one formula ends and another begins, in rising order."""
+        ...
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedCurve:
+    """A curve of the tool point on which the tool turns evenly about one axis.
+
+    Attributes:
+        points: the curve of the tool point; its pitch and roll are not used.
+        R: rotation (3, 3) at the start.
+        turn: rotation vector (3,) of the whole turn [rad], zero to keep the orientation.
+    """
+
+    points: Curve
+    R: FloatArray
+    turn: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, shape in (("R", (3, 3)), ("turn", (3,))):
+            value = finite_array(getattr(self, name), shape, "The rotation of a curve")
+            object.__setattr__(self, name, frozen(value))
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The joins of the curve of the point."""
+        return self.points.joins
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        x, y, z = self.points.at(sigma)[:3]
+        angle, terms = self._terms
+        if not angle:
+            one, two, three = (tuple(map(Jet.constant, column)) for column in self.R.T.tolist())
+        else:
+            s, c = sin_cos(angle * sigma)
+            one, two, three = (tuple(c * u + s * v + f for u, v, f in rows) for rows in terms)
+        return PoseJets(x, y, z, (one, two, three))  # type: ignore[arg-type]
+
+    @cached_property
+    def _terms(self) -> tuple[float, list[list[list[float]]]]:
+        """The angle, and for each column the terms of x, y, z: with cosine, with sine, constant."""
+        angle = math.hypot(*self.turn)
+        axis = self.turn / (angle or 1.0)
+        rows = []
+        for column in self.R.T:
+            along = (axis @ column) * axis
+            rows.append(np.stack((column - along, np.cross(axis, column), along), axis=1).tolist())
+        return angle, rows
+
+
+@dataclass(frozen=True, eq=False)
+class PoseLines:
+    """Straight lines from pose to pose with rounded corners.
+
+    On each line the tool turns about one axis. Corners are those of `Polyline`; the rotations are
+    quaternions along a polyline, divided by their length.
+
+    Attributes:
+        vias: two or more poses, the first and last are start and end.
+        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
+            1.
+    """
+
+    vias: tuple[ToolPose, ...]
+    blend: FloatArray
+    _line: Polyline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        turns = [so3.to_quaternion(via.R) for via in self.vias]
+        for number, after in enumerate(turns[1:], start=1):
+            # A quaternion and its opposite are the same rotation; the nearer one is taken.
+            turns[number] = math.copysign(1.0, float(turns[number - 1] @ after)) * after
+        rows = np.array(
+            [[*via.position, *turn] for via, turn in zip(self.vias, turns, strict=True)]
+        )
+        numbers = finite_array(rows, (len(rows), 7), "The vias of lines")
+        apart = [one.apart(other) for one, other in pairwise(self.vias)]
+        lengths = np.array([max(distance, TURN_LENGTH * angle) for distance, angle in apart])
+        if len(rows) < 2 or (lengths <= VIA_TOLERANCE).any():
+            raise InputError("Lines need at least two vias, each different from the one before.")
+        line = Polyline(frozen(numbers), lengths, self.blend)
+        object.__setattr__(self, "blend", line.blend)
+        object.__setattr__(self, "_line", line)
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places where legs and corners meet."""
+        return self._line.joins
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        x, y, z, *turn = self._line.at(sigma)
+        length = sqrt(sum((each * each for each in turn), start=Jet.constant(0.0)))
+        w, a, b, c = (each / length for each in turn)
+        one = (1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b + w * c), 2.0 * (a * c - w * b))
+        two = (2.0 * (a * b - w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c + w * a))
+        three = (2.0 * (a * c + w * b), 2.0 * (b * c - w * a), 1.0 - 2.0 * (a * a + b * b))
+        return PoseJets(x, y, z, (one, two, three))
