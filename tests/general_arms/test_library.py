@@ -1,4 +1,4 @@
-"""Arms of other kinds in the library: what works, and what is refused."""
+"""Arms of other kinds in the library: kinematics, plans, and what is refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.maths.geometry import se3
+from katana450.maths.geometry import se3, so3
 from tests.robot.public_arms import PX100, two_sided, written
 
 Urdf = Callable[[str], Path]
@@ -110,24 +110,77 @@ def test_five_axis_arm_of_the_family_stays_what_it_was(urdf: Urdf) -> None:
     assert arm.ik(arm.fk(arm.ready)).branches[0] == katana450.Branch("front", "up")
 
 
-REFUSED: dict[str, Callable[[katana450.GeneralArm], Any]] = {
-    "plan": lambda arm: arm.plan(arm.ready),
-    "line": lambda arm: arm.line(by=(0.0, 0.0, 0.1)),
-    "circle": lambda arm: arm.circle((0.3, 0.0, 0.0), 0.1),
-    "reachability": lambda arm: arm.reachability(),
-    "show": lambda arm: arm.show(),
-    "standing": lambda arm: arm.standing(arm.ready),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_needs_five_axes_is_refused_with_what_works(urdf: Urdf, case: str) -> None:
-    arm = load(urdf("ur5"))
+def test_map_of_reachability_needs_five_axes(urdf: Urdf) -> None:
     with pytest.raises(katana450.RobotDescriptionError) as caught:
-        REFUSED[case](arm)
+        load(urdf("ur5")).reachability()
     for words in ("ur5", "is not possible", "five-axis arm", "6 axes", "`fk`, `ik`", "serve"):
         assert words in str(caught.value)
 
+
+PLANS: dict[str, Callable[[katana450.GeneralArm], Any]] = {
+    "plan": lambda arm: arm.plan(arm.ready),
+    "line": lambda arm: arm.line(by=(0.0, 0.0, 0.1)),
+    "circle": lambda arm: arm.circle((0.3, 0.0, 0.0), 0.1),
+    "show": lambda arm: arm.show(),
+    "ready": lambda arm: arm.plan(arm.fk(np.zeros(2))),
+}
+
+
+@pytest.mark.parametrize("case", PLANS)
+def test_two_axes_have_no_plans(tmp_path: Path, case: str) -> None:
+    arm = load(written(tmp_path, "two", PX100[:2]))
+    assert arm.n == 2
+    with pytest.raises(katana450.RobotDescriptionError, match=r"three or more turning axes|2 axes"):
+        PLANS[case](arm)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("frame", ["shoulder", "base"])
+def test_line_of_the_library_is_straight(urdf: Urdf, name: str, frame: str) -> None:
+    arm = load(urdf(name), frame=frame)
+    by = np.array((-0.02, 0.02, -0.02))
+    plan = arm.line(by=by)
+    assert plan.length == pytest.approx(np.linalg.norm(by), abs=1e-9)
+    samples = plan.sample()
+    off = samples.points - samples.points[0]
+    assert np.abs(off - np.outer(off @ by, by) / (by @ by)).max() < 1e-9
+    np.testing.assert_allclose(off[-1], by, atol=1e-9)
+    if arm.n >= 6:
+        np.testing.assert_allclose(samples.T[-1, :3, :3], samples.T[0, :3, :3], atol=1e-9)
+    if arm.n != 5:
+        back = arm.line(to=samples.points[0], start=plan.end)
+        np.testing.assert_allclose(back.end, plan.start, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["px100", "vx300s", "ur5", "seven"])
+def test_circle_of_the_library_closes(urdf: Urdf, name: str) -> None:
+    arm = load(urdf(name), frame="base")
+    centre, radius = arm.fk(arm.ready)[:3, 3] - (0.02, 0.0, 0.02), 0.02
+    plan = arm.circle(centre, radius, normal=(1.0, 0.0, 1.0))
+    np.testing.assert_allclose(plan.end, plan.start, atol=1e-9)
+    off = plan.sample().points - centre
+    np.testing.assert_allclose(np.linalg.norm(off, axis=1), radius, atol=1e-9)
+    assert off[0][2] > 0.0
+    assert plan.plot() is not None
+
+
+def test_plan_leads_to_a_pose_and_a_line_turns_to_angles(urdf: Urdf) -> None:
+    arm = load(urdf("ur5"), frame="base")
+    T = arm.fk(arm.ready + 0.1)
+    np.testing.assert_allclose(arm.fk(arm.plan(T).end), T, atol=1e-8)
+    R = so3.exp((0.1, -0.1, 0.2)) @ arm.fk(arm.ready)[:3, :3]
+    roll, pitch, yaw = so3.to_rpy(R)
+    line = arm.line(roll=roll, pitch=pitch, yaw=yaw)
+    np.testing.assert_allclose(arm.fk(line.end)[:3, :3], R, atol=1e-9)
+    centre = arm.fk(arm.ready)[:3, 3]
+    circle = arm.circle(centre, 0.02, rpy=(roll, pitch, yaw), branch="back-up-minus", turns=0.5)
+    np.testing.assert_allclose(arm.fk(circle.start)[:3, :3], R, atol=1e-9)
+    with arm.show(line) as viewer:
+        assert viewer.url.startswith("http://127.0.0.1:")
+
+
+FAR = np.zeros((4, 4))
+FAR[0, 3] = 3.0
 
 WRONG: dict[str, tuple[Callable[[katana450.GeneralArm], Any], str]] = {
     "angles of another arm": (lambda arm: arm.fk([0.0] * 5), r"shape \(5,\)"),
@@ -139,6 +192,11 @@ WRONG: dict[str, tuple[Callable[[katana450.GeneralArm], Any], str]] = {
     "nearest to nothing": (lambda arm: arm.nearest(np.zeros((4, 4))), "last row"),
     "priority": (lambda arm: arm.nearest(np.eye(4), priority="pitch"), "for five-axis arms"),
     "branch": (lambda arm: arm.nearest(np.eye(4), branch="front-up"), "for five-axis arms"),
+    "goal out of reach": (lambda arm: arm.plan(np.diag([1.0, 1, 1, 1]) + FAR), "cannot take this"),
+    "pitch of five axes": (lambda arm: arm.circle((0.3, 0, 0), 0.1, rpy=(0.1, 0.2)), "`rpy` has 2"),
+    "branch of a circle": (lambda arm: arm.circle((0.3, 0, 0), 0.1, branch="left"), "no branch"),
+    "line to nowhere": (lambda arm: arm.line(by=(0.0, 0.0, 0.0)), "moves nothing"),
+    "long line": (lambda arm: arm.line(by=(3.0, 0.0, 0.0)), "leaves the reach"),
     "short jacobian": (lambda arm: arm.jacobian([0.0]), "shape"),
 }
 
@@ -155,9 +213,10 @@ def test_wrong_arguments_of_load_are_refused(urdf: Urdf, tmp_path: Path) -> None
     with pytest.raises(katana450.InputError, match="no frame 'world'"):
         katana450.load(path, frame="world")  # type: ignore[arg-type]
     scene = tmp_path / "scene.yaml"
-    scene.write_text("objects: []\n", encoding="utf-8")
+    scene.write_text("scene: 1\nobjects: []\n", encoding="utf-8")
+    assert load(path, scene=scene).objects == ()
     with pytest.raises(katana450.InputError, match="A scene is for plans"):
-        katana450.load(path, scene=scene)
+        katana450.load(written(tmp_path, "two", PX100[:2]), scene=scene)
     with pytest.raises(katana450.RobotDescriptionError, match="'base' is carried by 0"):
         katana450.load(path, tool="base")
     assert "ur5" in repr(load(path))

@@ -32,7 +32,7 @@ def test_names_and_units_stand_wherever_a_number_stands() -> None:
     assert isinstance(move, Move)
     assert move.place.position is not None
     assert move.place.position.tolist() == pytest.approx([0.3, -0.02, 0.24])
-    assert move.place.pitch == pytest.approx(0.5)
+    assert move.place.angles.pitch == pytest.approx(0.5)
     assert isinstance(line, Line)
     assert line.by is not None
     assert line.by.tolist() == pytest.approx([0.0, 0.02, -0.01])

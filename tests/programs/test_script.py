@@ -47,7 +47,7 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
     assert isinstance(move, Move)
     assert move.place.position is not None
     assert move.place.position.tolist() == [0.3, 0.0, 0.2]
-    assert move.place.pitch == math.radians(45.0)
+    assert move.place.angles.pitch == math.radians(45.0)
     assert move.place.in_base
     assert isinstance(line, Line)
     assert line.by is not None

@@ -260,8 +260,9 @@ class Arm:
         start: npt.ArrayLike | None = None,
         pitch: float | None = None,
         roll: float | None = None,
+        yaw: float | None = None,
     ) -> MotionPlan:
-        """Plan a straight line of the tool point, on which pitch and roll change evenly.
+        """Plan a straight line of the tool point, on which the orientation changes evenly.
 
         Args:
             to: (3,) end of the line [m].
@@ -270,6 +271,7 @@ class Arm:
             start: (n,) joint angles where it begins [rad]; None for `ready`.
             pitch: pitch of the tool at the end [rad], positive downwards; None to keep it.
             roll: roll of the tool at the end [rad]; None to keep it.
+            yaw: yaw of the tool at the end [rad], of an arm with six or more axes; None to keep it.
 
         Raises:
             InputError: the line leaves the arm's reach or its limits.
@@ -279,7 +281,7 @@ class Arm:
         >>> round(plan.length, 6)
         0.070711
         """
-        return MotionPlan(self, self._planner.line(to, by, start, pitch, roll))
+        return MotionPlan(self, self._planner.line(to, by, start, (pitch, roll, yaw)))
 
     def circle(
         self,
@@ -316,7 +318,7 @@ class Arm:
         >>> bool(abs(plan.length - 2.0 * np.pi * 0.1) < 1e-5)
         True
         """
-        core = self._planner.circle(centre, radius, normal, start, pitch, roll, turns, branch)
+        core = self._planner.circle(centre, radius, normal, start, (pitch, roll), turns, branch)
         return MotionPlan(self, core)
 
     def reachability(
@@ -395,4 +397,4 @@ class Arm:
 
     @cached_property
     def _planner(self) -> Planner:
-        return Planner(self.session, self._mounted.T_base_shoulder, self.pose_frame, self.standing)
+        return Planner(self, self.session, self._mounted.T_base_shoulder, self.pose_frame)

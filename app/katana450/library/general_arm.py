@@ -1,20 +1,24 @@
-"""An arm outside the five-axis family: its kinematics, without plans."""
+"""An arm outside the five-axis family."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.described_arm import DescribedArm, described_arm
 from katana450.extensions.general_arms.nearest import BestPosture, nearest_posture
+from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.library.arm import Arm, Priority
+from katana450.library.motion_plan import MotionPlan
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry.arrays import FloatArray
@@ -24,23 +28,23 @@ from katana450.maths.kinematics.kinematics import FiveAxisKinematics
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
-    from katana450.arm.control.state import State
     from katana450.arm.robot.mounted_arm import MountedArm
     from katana450.extensions.reachability.map import ReachabilityMap
-    from katana450.library.planner import Planner
-    from katana450.library.viewer import Viewer
 
-ROOM = 0.05
-"""Distance of `ready` from each limit, as a fraction of the joint's range."""
+NEEDED: Final = (
+    "it needs three or more turning axes, whose tool is named if the file has other joints than "
+    "those of fingers"
+)
+"""What plans need, as a clause."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GeneralArm(Arm):
     """An arm of any number of turning axes, made by `katana450.load`.
 
-    `fk`, `ik`, `nearest` and `jacobian` are those of an `Arm`, with n axes in place of five, and
-    with the branches that `method` names. Functions that need the five-axis family (plans, maps of
-    reachability, scenes) raise RobotDescriptionError.
+    Its functions are those of an `Arm`, with n axes in place of five, and with the branches that
+    `method` names. Plans need three or more axes, and no other joints than those of fingers. A map
+    of reachability needs the five-axis family. Without that, RobotDescriptionError is raised.
 
     Attributes:
         described: the arm in its file.
@@ -62,12 +66,6 @@ class GeneralArm(Arm):
     def tool(self) -> str:
         """Link to which poses refer."""
         return self.described.default_tool
-
-    @property
-    def ready(self) -> FloatArray:
-        """(n,) the posture nearest to zero with some room to the limits [rad]."""
-        room = ROOM * (self.upper - self.lower)
-        return np.clip(np.zeros(self.n), self.lower + room, self.upper - room)
 
     @property
     def T_base_frame(self) -> FloatArray:
@@ -124,53 +122,77 @@ class GeneralArm(Arm):
         seed: int = 0,
     ) -> ReachabilityMap:
         """Raise RobotDescriptionError: maps count pitches and rolls of five axes."""
-        raise self._refusal("a map of reachability")
+        raise self._refusal(
+            "a map of reachability",
+            "it needs a five-axis arm with a pan axis, three parallel axes and a roll axis",
+        )
 
-    def show(self, what: object = None, *, port: int = 8090, host: str = "127.0.0.1") -> Viewer:
-        """Raise RobotDescriptionError: the scene shows five-axis arms."""
-        raise self._refusal("the scene")
+    def circle(  # type: ignore[override]  # A pitch alone is no orientation of these arms.
+        self,
+        centre: npt.ArrayLike,
+        radius: float,
+        *,
+        normal: npt.ArrayLike = (1.0, 0.0, 0.0),
+        rpy: Sequence[float | None] = (None, None, None),
+        turns: float = 1.0,
+        branch: str | None = None,
+        start: npt.ArrayLike | None = None,
+    ) -> MotionPlan:
+        """Plan a circle of the tool point, from its highest point, as `Arm.circle`.
 
-    def standing(self, q: npt.ArrayLike) -> State:
-        """Raise RobotDescriptionError: states are those of five-axis arms."""
-        raise self._refusal("a state")
-
-    @cached_property
-    def _planner(self) -> Planner:
-        raise self._refusal("a plan")
+        ``rpy`` are roll, pitch and yaw [rad] of the tool in the frame of poses; what is None stays
+        as it is. Fewer than six axes have no yaw of their own.
+        """
+        if len(rpy) != 3:
+            raise InputError(f"`rpy` has {len(rpy)} values; give roll, pitch and yaw, or None.")
+        roll, pitch, yaw = rpy
+        angles = pitch, roll, yaw
+        core = self._planner.circle(centre, radius, normal, start, angles, turns, branch)
+        return MotionPlan(self, core)
 
     @property
     def _mounted(self) -> MountedArm:
-        raise self._refusal("this")
+        if self.robot.arm is None:
+            raise self._refusal("a plan")
+        return self.robot.arm
 
-    def _refusal(self, what: str) -> RobotDescriptionError:
+    def _refusal(self, what: str, why: str = NEEDED) -> RobotDescriptionError:
         return RobotDescriptionError(
-            f"For {self.name}, {what} is not possible: it needs a five-axis arm with a pan axis, "
-            f"three parallel axes and a roll axis, and this arm has {self.n} axes ({self.method}). "
-            "`fk`, `ik`, `nearest` and `jacobian` work; `katana450 serve` drives its joints."
+            f"For {self.name}, {what} is not possible: {why}. This arm has {self.n} axes "
+            f"({self.method}). `fk`, `ik`, `nearest` and `jacobian` work; `katana450 serve` drives "
+            "it."
         )
 
 
-def general_arm(urdf: Path, tool: str | None, frame: str) -> GeneralArm | None:
+def general_arm(
+    urdf: Path, tool: str | None, frame: str, scene: Path | None = None
+) -> GeneralArm | None:
     """Return the arm of another kind in a URDF file; None for a five-axis arm of the family.
 
-    Raises RobotDescriptionError for a mechanism without an arm, InputError for an unknown frame.
+    ``scene``: see `load`. Raises RobotDescriptionError for a mechanism without an arm, InputError
+    for an unknown frame, and for a scene that is invalid or of no use because nothing is planned.
     """
     described = described_arm(urdf, tool)
     if isinstance(described.kinematics, FiveAxisKinematics):
         return None
-    robot, session, _ = find_robot(Settings(), urdf, None)
+    try:
+        robot, session, _ = find_robot(Settings(), urdf, tool)
+    except RobotDescriptionError:
+        # Its tool cannot be driven, so it has kinematics, but no plans.
+        robot, session, _ = find_robot(Settings(), urdf, None)
+    objects: tuple[SceneObject, ...] = ()
+    if robot.arm is not None:
+        objects = load_initial_scene(session, scene, ())[0].scene.objects
+    elif scene is not None:
+        raise InputError(
+            f"A scene is for plans, and for {robot.name} there are none: {NEEDED}. Load this arm "
+            "without it."
+        )
     return GeneralArm(
         robot=robot,
         session=session,
         notes=(*described.notes, *robot.notes),
         pose_frame=PoseFrame.of(described.T_base_shoulder, frame),
-        objects=(),
+        objects=objects,
         described=described,
-    )
-
-
-def refuse(what: str) -> NoReturn:
-    """Raise InputError: an argument of `load` needs plans, which this arm does not have."""
-    raise InputError(
-        f"{what} is for plans, which need a five-axis arm of the family. Load this arm without it."
     )

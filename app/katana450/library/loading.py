@@ -9,7 +9,7 @@ from katana450.assembly.robot_session import describe_robot
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.library.arm import Arm
-from katana450.library.general_arm import general_arm, refuse
+from katana450.library.general_arm import general_arm
 from katana450.library.pose_frame import PoseFrame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -27,8 +27,9 @@ def load(
     """Load an arm from a URDF file.
 
     Five-axis arms with a pan axis, three parallel axes and a roll axis can do everything that an
-    `Arm` can. Of other arms `fk`, `ik`, `nearest` and `jacobian` work: in closed form for the arms
-    listed in docs/library.md, else numerically. ``notes`` of the arm says which.
+    `Arm` can. Other arms can do all but a map of reachability, with the kinematics that suit them:
+    in closed form for the arms listed in docs/library.md, else numerically. ``notes`` of the arm
+    says which.
 
     Args:
         urdf: the file; None for the Katana450.
@@ -55,13 +56,11 @@ def load(
         robot, session, notes = describe_robot(Settings(), path, tool)
     except RobotDescriptionError as error:
         try:
-            found = general_arm(path, tool, frame)
+            found = general_arm(path, tool, frame, None if scene is None else Path(scene))
         except RobotDescriptionError:
             found = None
         if found is None:
             raise error from None
-        if scene is not None:
-            refuse("A scene")
         return found
     stored, _ = load_initial_scene(session, None if scene is None else Path(scene), ())
     return Arm(

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.places import ROOMIEST
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, UntimedPath
+from katana450.extensions.programs.step_target import Angles
 from katana450.extensions.programs.tool_moves import ArcGeometry, Circle, Line
-from katana450.library.nearest import nearest
 from katana450.library.pose_frame import PoseFrame, dimensions
-from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
-from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from katana450.library.arm import Arm
 
 MAX_TURNS = 20.0
 
@@ -30,16 +32,16 @@ class Planner:
     """Makes plans in coordinates of ``frame``; see `katana450.Arm`.
 
     Attributes:
+        arm: the arm.
         session: the rules of motion.
         T_base_shoulder: (4, 4) frame {S} in the base [m].
         frame: frame of poses and points.
-        standing: returns the state of an arm at rest at joint angles (n,) [rad].
     """
 
+    arm: Arm
     session: Session
     T_base_shoulder: FloatArray
     frame: PoseFrame
-    standing: Callable[[npt.ArrayLike], State]
 
     def to(self, goal: npt.ArrayLike, start: npt.ArrayLike | None, seed: int) -> Plan:
         """Plan to joint angles (n,) [rad] or to a pose (4, 4)."""
@@ -57,8 +59,7 @@ class Planner:
         to: npt.ArrayLike | None,
         by: npt.ArrayLike | None,
         start: npt.ArrayLike | None,
-        pitch: float | None,
-        roll: float | None,
+        angles: Sequence[float | str | None],
     ) -> Plan:
         """Plan a straight line of the tool point."""
         if to is not None and by is not None:
@@ -66,8 +67,7 @@ class Planner:
         step = Line(
             None if to is None else finite_array(to, (3,), "The end of the line"),
             None if by is None else finite_array(by, (3,), "The vector `by` of the line"),
-            _angle(pitch, "pitch"),
-            _angle(roll, "roll"),
+            _checked(angles),
             self.frame.in_base,
         )
         builder = self._builder(start)
@@ -80,10 +80,9 @@ class Planner:
         radius: float,
         normal: npt.ArrayLike,
         start: npt.ArrayLike | None,
-        pitch: float | str | None,
-        roll: float | None,
+        angles: Sequence[float | str | None],
         turns: float,
-        branch: Branch | str | None,
+        branch: AnyBranch | None,
     ) -> Plan:
         """Plan a circle of the tool point, with the path to it from ``start``, if given."""
         axis = finite_array(normal, (3,), "The normal of the circle")
@@ -98,35 +97,25 @@ class Planner:
             raise InputError(
                 f"The number of turns is {count:g}; it must be at most {MAX_TURNS:g} and not 0."
             )
+        is_roomiest = angles[0] == ROOMIEST
         arc = ArcGeometry(
             finite_array(centre, (3,), "The centre of the circle"),
             axis / length,
-            pitch if pitch == ROOMIEST else _angle(pitch, "pitch"),
-            _angle(roll, "roll"),
+            _checked((None, *angles[1:]) if is_roomiest else angles),
             self.frame.in_base,
+            is_roomiest,
         )
-        chosen_branch = None if branch is None else Branch.parse(str(branch))
         builder = self._builder(start)
-        Circle(arc, size, count, chosen_branch).build(builder)
+        Circle(arc, size, count, branch).build(builder)
         if start is None:
             del builder.actions[:-1]
         return _timed(builder)
 
     def _to_pose(self, builder: PlanBuilder, goal: npt.ArrayLike) -> None:
         """Plan to the nearest reachable posture that takes the pose ``goal`` (4, 4)."""
-        chain = builder.chain
-        found = IKSolutions.of_pose(chain, self.frame.to_shoulder(goal), builder.q).feasible
+        found = self.arm.ik(goal, builder.q).feasible
         if not found:
-            best = nearest(
-                chain,
-                self.frame,
-                goal,
-                priority="pose",
-                branch=None,
-                q_hint=builder.q,
-                within_limits=True,
-            )
-            why = best.reason or "only the nearest pose is"
+            why = self.arm.nearest(goal, q_hint=builder.q).reason or "only the nearest pose is"
             raise InputError(
                 f"The arm cannot take this pose: {why}. `Arm.nearest` returns the nearest feasible "
                 "pose."
@@ -138,7 +127,7 @@ class Planner:
     def _builder(self, start: npt.ArrayLike | None, seed: int = 0) -> PlanBuilder:
         plan_context = PlanContext(self.session, self.T_base_shoulder, seed)
         return PlanBuilder(
-            plan_context, self.standing(self.session.ready if start is None else start)
+            plan_context, self.arm.standing(self.session.ready if start is None else start)
         )
 
 
@@ -155,6 +144,11 @@ def _number(value: float, name: str) -> float:
     if not math.isfinite(number):
         raise InputError(f"{name} is {number}; give a finite number.")
     return number
+
+
+def _checked(angles: Sequence[float | str | None]) -> Angles:
+    """Return pitch, roll and yaw as floats. Raises InputError, which names a wrong one."""
+    return Angles(*map(_angle, angles, Angles._fields))
 
 
 def _angle(value: float | str | None, name: str) -> float | None:

@@ -18,7 +18,7 @@ Point = Sequence[Number] | FloatArray | Mapping[str, Number] | str
 """A point: three numbers, {x, y, z}, or the name of a pose."""
 
 Place = Mapping[str, Any] | str
-"""A place: the name of a pose, {"joints": [...]}, or {x, y, z, pitch, roll, branch}."""
+"""A place: the name of a pose, {"joints": [...]}, or {x, y, z, pitch, roll, yaw, branch}."""
 
 
 def given(**values: Any) -> dict[str, Any]:
@@ -38,9 +38,10 @@ def place_value(
     pitch: Number | None,
     roll: Number | None,
     branch: str | None,
+    yaw: Number | None = None,
 ) -> dict[str, Any]:
     """Return a place as a mapping. Raises InputError for a point that is none."""
-    angles = given(pitch=pitch, roll=roll, branch=branch)
+    angles = given(pitch=pitch, roll=roll, yaw=yaw, branch=branch)
     if joints is not None:
         return {"joints": plain(list(joints)), **angles}
     point = plain(at)

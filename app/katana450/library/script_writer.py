@@ -75,10 +75,11 @@ class ScriptWriter:
         joints: Sequence[Number] | None = None,
         pitch: Number | None = None,
         roll: Number | None = None,
+        yaw: Number | None = None,
         branch: str | None = None,
     ) -> str:
         """Name a place, by a point or by five joint angles, and return its name."""
-        self._poses[name] = place_value(at, joints, pitch, roll, branch)
+        self._poses[name] = place_value(at, joints, pitch, roll, branch, yaw)
         return name
 
     def expect(
@@ -143,15 +144,16 @@ class ScriptWriter:
         by: Point | None = None,
         pitch: Number | None = None,
         roll: Number | None = None,
+        yaw: Number | None = None,
         branch: str | None = None,
     ) -> None:
         """Move to a pose or a point [mm], or by an offset [mm], on any path round obstacles."""
-        if isinstance(to, str) and (by, pitch, roll, branch) == (None,) * 4:
+        if isinstance(to, str) and (by, pitch, roll, yaw, branch) == (None,) * 5:
             self._add("move", to)
         elif by is not None and to is None:
-            self._add("move", {"by": by, **given(pitch=pitch, roll=roll, branch=branch)})
+            self._add("move", {"by": by, **given(pitch=pitch, roll=roll, yaw=yaw, branch=branch)})
         elif by is None:
-            self._add("move", place_value(to, None, pitch, roll, branch))
+            self._add("move", place_value(to, None, pitch, roll, branch, yaw))
         else:
             raise InputError("A move takes `to` or `by`, not both.")
 
@@ -166,9 +168,10 @@ class ScriptWriter:
         by: Point | None = None,
         pitch: Number | None = None,
         roll: Number | None = None,
+        yaw: Number | None = None,
     ) -> None:
         """Move the tool point on a straight line, to a point or by an offset [mm]."""
-        self._add("line", given(to=to, by=by, pitch=pitch, roll=roll))
+        self._add("line", given(to=to, by=by, pitch=pitch, roll=roll, yaw=yaw))
 
     def lines(self, *places: Place, blend: float | None = None) -> None:
         """Move the tool point on straight lines through places with rounded corners."""
@@ -183,10 +186,11 @@ class ScriptWriter:
         climb: Number | None = None,
         pitch: Number | None = None,
         roll: Number | None = None,
+        yaw: Number | None = None,
     ) -> None:
         """Move the tool point round an axis through ``centre`` [mm] by an angle [deg]."""
         value = {"centre": centre, "axis": axis, "angle": angle}
-        self._add("arc", {**value, **given(climb=climb, pitch=pitch, roll=roll)})
+        self._add("arc", {**value, **given(climb=climb, pitch=pitch, roll=roll, yaw=yaw)})
 
     def circle(
         self,
@@ -197,11 +201,12 @@ class ScriptWriter:
         turns: Number | None = None,
         pitch: Number | None = None,
         roll: Number | None = None,
+        yaw: Number | None = None,
         branch: str | None = None,
     ) -> None:
         """Move to the highest point of a circle [mm], then round it."""
         value = {"centre": centre, "normal": normal, "radius": radius}
-        more = given(turns=turns, pitch=pitch, roll=roll, branch=branch)
+        more = given(turns=turns, pitch=pitch, roll=roll, yaw=yaw, branch=branch)
         self._add("circle", {**value, **more})
 
     def screw(

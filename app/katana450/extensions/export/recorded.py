@@ -13,11 +13,11 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.conduit.rings import ConduitLayer
+from katana450.extensions.joint_view.machine_nodes import MachineNodes
 from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.water.nodes import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
-from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import Preset

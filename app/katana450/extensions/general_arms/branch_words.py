@@ -29,6 +29,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -40,6 +41,16 @@ from katana450.maths.kinematics.forward import forward, jacobian_space
 
 ZERO: Final = 1e-6
 """[1] or [m] Sine or distance that counts as zero."""
+
+SHOULDERS: Final = ("front", "back", "left", "right")
+ELBOWS: Final = ("up", "down")
+WRISTS: Final = ("noflip", "flip")
+BRANCH_NAMES: Final = tuple(
+    "-".join(words)
+    for parts in ((SHOULDERS, ELBOWS), (SHOULDERS, ELBOWS, WRISTS))
+    for words in product(*parts)
+)
+"""The words, and all names, of arms with four or five axes and with more."""
 
 SECOND: Final = ("right", "back", "down", "flip")
 """The second word of each pair."""

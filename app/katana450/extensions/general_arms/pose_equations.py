@@ -20,7 +20,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from katana450.extensions.general_arms.descent import Descent, Look
-from katana450.extensions.general_arms.pose_curve import PoseJets
 from katana450.extensions.general_arms.regularity import Regularity
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry.arrays import FloatArray
@@ -42,6 +41,25 @@ SOLVED: Final = 1e-12
 
 WILD: Final = 1.0
 """[rad] Step after which the method is given up."""
+
+
+class PoseJets(NamedTuple):
+    """The pose of the tool as jets: the tool point x, y, z, and the columns of its rotation."""
+
+    x: Jet
+    y: Jet
+    z: Jet
+    columns: tuple[ThreeJets, ThreeJets, ThreeJets]
+
+    @property
+    def T(self) -> FloatArray:
+        """The poses at N places, or at one, (N, 4, 4)."""
+        numbers = [*(each for column in self.columns for each in column), *self[:3]]
+        rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(each.c0) for each in numbers)), axis=1)
+        T = np.zeros((len(rows), 4, 4))
+        T[:, :3] = rows.reshape(-1, 4, 3).swapaxes(1, 2)
+        T[:, 3, 3] = 1.0
+        return T
 
 
 class RegularPosture(NamedTuple):

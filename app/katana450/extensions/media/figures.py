@@ -16,13 +16,12 @@ from katana450.extensions.media.measures import PathTrace
 from katana450.extensions.media.pour_record import PourRecord
 from katana450.extensions.programs.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.velocity import tool_speed
 
 INK, FAINT, DESIRED, ERROR = "#1f2933", "#cbd2d9", "#9aa5b1", "#c2410c"
 """Colours of text, grid, desired paths and errors."""
 MEASURED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 2))}
 """Lines of measured values over those of setpoints."""
-AXES = ("#0b6e99", "#c2410c", "#2f855a", "#7c3aed", "#a16207")
+AXES = ("#0b6e99", "#c2410c", "#2f855a", "#7c3aed", "#a16207", "#be185d", "#475569")
 """Colours of the joints."""
 
 STYLE = {
@@ -156,10 +155,12 @@ def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
         upper.set_title("Joint speeds as fractions of their limits")
         upper.set_ylabel("speed (% of limit)")
         above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
-        upper.legend(**above, ncols=fractions.shape[1], fontsize=8.0)
-        chains = [arm.chain_to(tool) for tool in trace.tools]
-        rows = zip(chains, trace.q, trace.qd, strict=True)
-        speeds = 1e3 * np.array([tool_speed(chain, q, qd) for chain, q, qd in rows])
+        upper.legend(
+            **above, ncols=fractions.shape[1], fontsize=8.0, handlelength=1.1, columnspacing=1.0
+        )
+        tools = [arm.kinematics_to(tool) for tool in trace.tools]
+        rows = zip(tools, trace.q, trace.qd, strict=True)
+        speeds = 1e3 * np.array([tool.tool_speed(q, qd) for tool, q, qd in rows])
         lower.fill_between(trace.t, speeds, color=AXES[0], alpha=0.15, linewidth=0.0)
         lower.plot(trace.t, speeds, color=AXES[0], linewidth=1.2)
         lower.set_title("Speed of the tool point")

@@ -17,6 +17,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.curve import ToolCoordinates
 from katana450.extensions.programs.motion_measures import motion_measures, water_measures
+from katana450.extensions.programs.pose_path import PosePath
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
@@ -27,7 +28,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.path import joint_derivatives
+from katana450.maths.planning.path import CurvePath, joint_derivatives, point_derivatives
 
 PATH_SAMPLES = 2000
 """Number of intervals of each path at whose ends the kinematics are compared."""
@@ -42,7 +43,8 @@ class PathTrace:
         sigma: (N,) places on the path.
         desired: (N, 3) desired points in {S} [m].
         traced: (N, 3) points of the planned joints in {S} [m].
-        turned: (N,) error of pitch or roll, the larger one [rad].
+        turned: (N,) error of pitch or roll, the larger one, or of the rotation for an arm outside
+            the five-axis family [rad].
     """
 
     name: str
@@ -96,8 +98,9 @@ def alongs(program: Program, trace: Trace) -> tuple[PathTrace, ...]:
         if not isinstance(task.action, FollowPlan):
             continue
         for segment in task.action.plan.segments:
-            if isinstance(segment.path, ToolPath) and id(segment.path) not in found:
-                found[id(segment.path)] = _along(task.name, segment.path)
+            path = segment.path
+            if isinstance(path, ToolPath | PosePath) and id(path) not in found:
+                found[id(path)] = _along(task.name, path)
     return tuple(found.values())
 
 
@@ -167,39 +170,46 @@ def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]
     )
 
 
-def _along(name: str, path: ToolPath) -> PathTrace:
+def _along(name: str, path: ToolPath | PosePath) -> PathTrace:
     sigma = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
-    tool = path.curve.at(Jet.variable(sigma))
-    columns = [np.broadcast_to(jet.c0, sigma.shape) for jet in tool]
-    desired = np.stack(columns[:3], axis=1)
-    traced = np.empty_like(desired)
-    turned = np.empty_like(sigma)
-    for number, q in enumerate(joint_derivatives(path, sigma)[0]):
-        traced[number] = forward(path.chain, q)[:3, 3]
-        found = ToolTarget.at(path.chain, q)
-        off = (found.pitch - columns[3][number], found.roll - columns[4][number])
-        turned[number] = max(abs(math.remainder(each, math.tau)) for each in off)
-    return PathTrace(name, sigma, desired, traced, turned)
+    q = joint_derivatives(path, sigma)[0]
+    traced = np.array([_point(path, each) for each in q])
+    return PathTrace(
+        name, sigma, point_derivatives(path, sigma)[0], traced, _turned(path, sigma, q)
+    )
 
 
-def _path_at(program: Program, trace: Trace, tick: int) -> ToolPath | None:
+def _turned(path: ToolPath | PosePath, sigma: FloatArray, q: FloatArray) -> FloatArray:
+    """Return the errors (N,) [rad] of the orientation of the tool at joint angles `q` (N, n)."""
+    if isinstance(path, PosePath):
+        return path.turned_off(sigma, q)
+    tool: ToolCoordinates = path.curve.at(Jet.variable(sigma))
+    pitch, roll = (np.broadcast_to(each.c0, sigma.shape) for each in tool[3:])
+    found = [ToolTarget.at(path.chain, each) for each in q]
+    off = [
+        (each.pitch - pitch[number], each.roll - roll[number]) for number, each in enumerate(found)
+    ]
+    return np.array([max(abs(math.remainder(angle, math.tau)) for angle in each) for each in off])
+
+
+def _path_at(program: Program, trace: Trace, tick: int) -> CurvePath | None:
     action, segment = program.tasks[int(trace.task[tick])].action, int(trace.segment[tick])
     if segment < 0 or not isinstance(action, FollowPlan):
         return None
     path = action.plan.segments[segment].path
-    return path if isinstance(path, ToolPath) else None
+    return path if isinstance(path, CurvePath) else None
 
 
-def _point(path: ToolPath, q: FloatArray) -> FloatArray:
+def _point(path: CurvePath, q: FloatArray) -> FloatArray:
     p: FloatArray = forward(path.chain, q)[:3, 3]
     return p
 
 
-def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
+def _curve(path: CurvePath, sigma: float) -> tuple[FloatArray, FloatArray]:
     """Return point (3,) [m] and unit tangent (3,) at ``sigma``; no motion gives a zero tangent."""
-    tool: ToolCoordinates = path.curve.at(Jet.variable(sigma))
+    point = path.point(Jet.variable(sigma))
     p, rate = (
-        np.array([each.derivatives()[order] for each in tool[:3]], dtype=float) for order in (0, 1)
+        np.array([each.derivatives()[order] for each in point], dtype=float) for order in (0, 1)
     )
     length = float(np.linalg.norm(rate))
     return p, rate / length if length > 0.0 else rate

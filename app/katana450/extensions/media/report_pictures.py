@@ -24,10 +24,9 @@ from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.server.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.extensions.programs.simulation import Trace
-from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.path import point_derivatives
+from katana450.maths.planning.path import CurvePath, point_derivatives
 from katana450.server.viser_bridge.themes import LIGHT
 
 SIZE = 880, 550
@@ -114,12 +113,12 @@ def _ticks(trace: Trace, task: int) -> list[int]:
     return [int(tick) for tick in np.flatnonzero(trace.task == task)]
 
 
-def _path(program: Program, trace: Trace, tick: int) -> ToolPath | None:
+def _path(program: Program, trace: Trace, tick: int) -> CurvePath | None:
     action = program.tasks[int(trace.task[tick])].action
     if not isinstance(action, FollowPlan):
         return None
     path = action.plan.segments[int(trace.segment[tick])].path
-    return path if isinstance(path, ToolPath) else None
+    return path if isinstance(path, CurvePath) else None
 
 
 def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item]:
@@ -144,5 +143,5 @@ def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item
     return [item for item in tubes if item is not None]
 
 
-def _is_on(program: Program, trace: Trace, tick: int, path: ToolPath) -> bool:
+def _is_on(program: Program, trace: Trace, tick: int, path: CurvePath) -> bool:
     return int(trace.segment[tick]) >= 0 and _path(program, trace, tick) is path

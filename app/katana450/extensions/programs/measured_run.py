@@ -12,10 +12,9 @@ import numpy as np
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.state import State
-from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
-from katana450.maths.planning.path import point_derivatives
+from katana450.maths.planning.path import CurvePath, point_derivatives
 
 MAX_LAG = 1.0
 """[s] Maximum lag in the search."""
@@ -50,7 +49,7 @@ class Deviation:
         commanded: (M,) distances of the setpoints from the points of the path that were due [m].
     """
 
-    path: ToolPath
+    path: CurvePath
     t: FloatArray
     measured: FloatArray
     nearest: FloatArray
@@ -192,13 +191,13 @@ class MeasuredRun:
         return tuple(found)
 
 
-def path_of(state: State) -> ToolPath | None:
+def path_of(state: State) -> CurvePath | None:
     """Return the desired path of the tool on which the setpoint of ``state`` is; None without."""
     path = None if state.following is None else state.following.segment.path
-    return path if isinstance(path, ToolPath) else None
+    return path if isinstance(path, CurvePath) else None
 
 
-def commanded_errors(path: ToolPath, states: Sequence[State]) -> FloatArray:
+def commanded_errors(path: CurvePath, states: Sequence[State]) -> FloatArray:
     """Return the distances (N,) [m] of the setpoints from the points of ``path`` that were due."""
     sigma = []
     for state in states:
@@ -210,7 +209,7 @@ def commanded_errors(path: ToolPath, states: Sequence[State]) -> FloatArray:
     return np.asarray(np.linalg.norm(points - desired, axis=1))
 
 
-def nearest_points(path: ToolPath, points: FloatArray) -> FloatArray:
+def nearest_points(path: CurvePath, points: FloatArray) -> FloatArray:
     """Return the point (N, 3) of ``path`` nearest to each of ``points`` (N, 3) [m]."""
     places = np.linspace(0.0, 1.0, PLACES + 1)
     coarse = point_derivatives(path, places)[0]

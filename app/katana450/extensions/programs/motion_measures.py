@@ -28,9 +28,8 @@ def motion_measures(
     limits = arm.chain
     room = np.minimum(q - limits.lower, limits.upper - q)
     singular = [singular_values(chain, row)[-1] for chain, row in zip(chains, q, strict=True)]
-    speeds = [
-        arm.kinematics_to(tool).tool_speed(*each) for tool, *each in zip(tools, q, qd, strict=True)
-    ]
+    rows = zip(tools, q, qd, strict=True)
+    speeds = [arm.kinematics_to(tool).tool_speed(*each) for tool, *each in rows]
     return {
         "smallest_singular_value": float(min(singular)),
         "margin_to_limits_deg": float(np.degrees(room.min())),

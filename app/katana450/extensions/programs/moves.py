@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Self
 
@@ -17,7 +17,7 @@ from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step, nothing
 from katana450.extensions.programs.step_target import StepTarget
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.planning.joint_path import JointPath
 
 MIN_BLEND = 0.01
@@ -32,7 +32,7 @@ class Move:
     """Move to a place on a free path round obstacles.
 
     Attributes:
-        place: the place; with ``by`` its pitch, roll and branch.
+        place: the place; with ``by`` its orientation and branch.
         by: (3,) motion of the tool point from its present place [m]; None to move to ``place``.
     """
 
@@ -41,22 +41,25 @@ class Move:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read a place, or {by, pitch, roll, branch}. Raises ScriptError."""
+        """Read a place, or {by, pitch, roll, yaw, branch}. Raises ScriptError."""
         if value.kind != "mapping" or all(name.held != "by" for name, _ in value.fields):
             return cls(places.place(value, setting))
         fields = Fields(value, "a relative move")
         by = fields.need("by", read.vector(read.millimetres(), partly=True), np.zeros(3))
         angles, branch = places.angles(fields), places.branch(fields)
         fields.done()
-        return cls(StepTarget(None, None, *angles, branch, setting.in_base), by)
+        return cls(StepTarget(None, None, angles, branch, setting.in_base), by)
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the motion. Raises InputError if the place cannot be reached."""
         place = self.place
         if self.by is not None:
             by = builder.direction(self.by, in_base=place.in_base)
-            place = replace(place, position=builder.tool_point + by, in_base=False)
-        builder.move_to(builder.joints_at(place), "move")
+            there = builder.target_at(place)
+            q = builder.joints_of(there.moved(frozen(there.position + by)), place.branch)
+        else:
+            q = builder.joints_at(place)
+        builder.move_to(q, "move")
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from katana450.extensions.general_arms.branch_words import BRANCH_NAMES
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
-from katana450.extensions.programs.step_target import StepTarget
+from katana450.extensions.programs.step_target import Angles, StepTarget
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.branch import AnyBranch
 
 ROOMIEST = "roomiest"
 """The word for the pitch that keeps the joints farthest from their limits along an arc."""
@@ -22,7 +23,7 @@ LEAST_JOINTS, MAX_JOINTS = 3, 32
 
 
 def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
-    """Read the name of a pose, {joints: [...]}, or {x, y, z, pitch, roll, branch}.
+    """Read the name of a pose, {joints: [...]}, or {x, y, z, pitch, roll, yaw, branch}.
 
     Raises ScriptError.
     """
@@ -37,7 +38,7 @@ def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
         fields.done()
         return StepTarget(joints=found)
     position = np.array([fields.need(name, read.millimetres(), 0.0) for name in read.XYZ])
-    at = StepTarget(None, position, *angles(fields), branch(fields), setting.in_base)
+    at = StepTarget(None, position, angles(fields), branch(fields), setting.in_base)
     fields.done()
     return at
 
@@ -63,7 +64,7 @@ def _position(pose: StepTarget, value: YamlValue) -> FloatArray:
 
 
 def pose(value: YamlValue, setting: ScriptContext) -> StepTarget:
-    """Read a point as ``point`` does; a named pose also gives its pitch and roll.
+    """Read a point as ``point`` does; a named pose also gives its orientation.
 
     Raises ScriptError.
     """
@@ -87,14 +88,12 @@ def pitch(value: YamlValue) -> float | str | None:
     return None if named == "keep" else named
 
 
-def angles(fields: Fields) -> tuple[float | None, float | None]:
-    """Read pitch and roll [rad]; None where they are absent."""
+def angles(fields: Fields) -> Angles:
+    """Read pitch, roll and yaw [rad]; None where they are absent."""
     each: Callable[[YamlValue], float | None] = read.degrees(-360.0, 360.0)
-    return fields.take("pitch", each, None), fields.take("roll", each, None)
+    return Angles(*(fields.take(name, each, None) for name in Angles._fields))
 
 
-def branch(fields: Fields) -> Branch | None:
+def branch(fields: Fields) -> AnyBranch | None:
     """Read a branch; None if it is absent."""
-    names = [str(each) for each in BRANCHES]
-    named = fields.take("branch", read.choice(*names), "")
-    return Branch.parse(named) if named else None
+    return fields.take("branch", read.choice(*BRANCH_NAMES), None)

@@ -16,21 +16,17 @@ from katana450.arm.control.scene_objects import SceneObject, named
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs import other_arms
 from katana450.extensions.programs.actions import Action, FollowPlan
-from katana450.extensions.programs.curve import Curve
-from katana450.extensions.programs.out_of_reach import unreached
-from katana450.extensions.programs.reaching import branches_near, reaching
+from katana450.extensions.programs.planning_choice import OF_FIVE_AXES, planning_of
 from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.step_target import StepTarget
-from katana450.extensions.programs.tool_path import ToolPath
+from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.branch import Branch, branch_of
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.path import Path, joint_derivatives
@@ -77,7 +73,7 @@ class PlanContext:
 
     @property
     def ready(self) -> FloatArray:
-        """The ready posture (5,) [rad], the target of ``home``."""
+        """The ready posture (n,) [rad], the target of ``home``."""
         return self.session.ready
 
 
@@ -185,19 +181,26 @@ class PlanBuilder:
 
     @property
     def q(self) -> FloatArray:
-        """The present joints (5,) [rad]."""
+        """The present joints (n,) [rad]."""
         return self.state.setpoint
 
     @property
     def at(self) -> ToolTarget:
         """The present tool pose. Raises InputError for an arm outside the five-axis family."""
-        other_arms.need_five_axes(self.plan_context.arm)
-        return ToolTarget.at(self.chain, self.q)
+        found = self.target
+        if not isinstance(found, ToolTarget):
+            raise InputError(OF_FIVE_AXES)
+        return found
 
     @property
-    def tool_point(self) -> FloatArray:
-        """The present tool point (3,) [m] in {S}."""
-        return forward(self.chain, self.q)[:3, 3]
+    def planning(self) -> ToolPlanning:
+        """The planning of the present tool."""
+        return planning_of(self.plan_context.arm.kinematics_to(self.state.tool))
+
+    @property
+    def target(self) -> DragTarget:
+        """The present target of the tool, of any arm."""
+        return self.planning.at(self.q)
 
     def point(self, p: FloatArray, *, in_base: bool) -> FloatArray:
         """Return the point ``p`` (3,) [m] in {S}; ``in_base``: it is given in the base frame."""
@@ -214,7 +217,7 @@ class PlanBuilder:
         self.state = state
 
     def move_to(self, q: FloatArray, name: str) -> None:
-        """Append a free motion to ``q`` (5,) [rad] round obstacles; nothing if the arm is there."""
+        """Append a free motion to ``q`` (n,) [rad] round obstacles; nothing if the arm is there."""
         if float(np.abs(self.q - q).max()) <= JOIN_TOLERANCE:
             return
         self.follow(
@@ -222,22 +225,22 @@ class PlanBuilder:
             name,
         )
 
-    def lead(self, curves: Sequence[Curve], name: str) -> None:
+    def lead(self, curves: Sequence[AnyCurve], name: str) -> None:
         """Append the tool's motion along ``curves``, from its present pose, on the same branch."""
-        other_arms.need_five_axes(self.plan_context.arm)
+        planning = self.planning
         paths: list[Path] = []
         made: dict[int, Path] = {}
         q = self.q
         for curve in curves:
             path = made.get(id(curve))
             if path is None or float(np.abs(path.start - q).max()) > JOIN_TOLERANCE:
-                path = ToolPath(self.chain, curve, branch_of(self.chain, q), q)
+                path = planning.path(self.state, q, curve, planning.branches(q)[0])
                 made[id(curve)] = path
             paths.append(path)
             q = path.end
         self.follow(paths, name)
 
-    def pace(self, curve: Curve, duration: float, name: str) -> None:
+    def pace(self, curve: AnyCurve, duration: float, name: str) -> None:
         """Append the tool's motion along ``curve``, evenly in ``duration`` [s].
 
         Raises as ``follow``.
@@ -308,7 +311,7 @@ class PlanBuilder:
         return found
 
     def standing(self, q: FloatArray) -> State:
-        """Return the state of the arm at rest at ``q`` (5,) [rad]."""
+        """Return the state of the arm at rest at ``q`` (n,) [rad]."""
         q, branch = frozen(q), self.plan_context.arm.kinematics.branch_of(q)
         return self._with_still_water(
             replace(self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE)
@@ -342,40 +345,39 @@ class PlanBuilder:
         return replace(state, poured=still)
 
     def joints_at(self, place: StepTarget) -> FloatArray:
-        """Return the joints (5,) [rad] for ``place``. Raises InputError if it cannot be reached."""
+        """Return the joints (n,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
             self.plan_context.session.check(SetJoints(place.joints))
             return self.plan_context.arm.chain.check_q(place.joints)
-        if other_arms.has_five_axes(self.plan_context.arm):
-            return self.joints_of(self.target_at(place), place.branch)
-        p = self.point(other_arms.point_of(place), in_base=place.in_base)
-        return other_arms.joints_at_point(self.plan_context.arm, self.state, p)
+        return self.joints_of(self.target_at(place), place.branch)
 
-    def target_at(self, place: StepTarget, now: ToolTarget | None = None) -> ToolTarget:
-        """Return the tool pose at ``place``, which has no joints; ``now`` gives absent values."""
-        now = self.at if now is None else now
+    def target_at(self, place: StepTarget, now: DragTarget | None = None) -> DragTarget:
+        """Return the target at ``place``, which has no joints; ``now`` gives absent values."""
+        now = self.target if now is None else now
         p = now.position
         if place.position is not None:
             p = self.point(place.position, in_base=place.in_base)
-        pitch = now.pitch if place.pitch is None else place.pitch
-        return ToolTarget(p, pitch, now.roll if place.roll is None else place.roll)
+        R = self.plan_context.T_base_shoulder[:3, :3] if place.in_base else np.eye(3)
+        return self.planning.oriented(now.moved(p), place.angles, R)
 
-    def joints_of(self, target: ToolTarget, branch: Branch | None = None) -> FloatArray:
-        """Return the joints (5,) [rad] for ``target``, on the present branch if possible.
+    def joints_of(self, target: DragTarget, branch: AnyBranch | None = None) -> FloatArray:
+        """Return the joints (n,) [rad] for ``target``, on the present branch if possible.
 
         Raises InputError with the nearest places.
         """
-        found = reaching(self.chain, self.q, target, branch)
+        branch = None if branch is None else self.planning.branch(branch)
+        found = self.planning.joints(self.state, self.q, target, branch)
         if found is None:
             raise InputError(self.unreached(target, branch))
         return found
 
-    def unreached(self, target: ToolTarget, branch: Branch | None) -> str:
+    def unreached(self, target: DragTarget, branch: AnyBranch | None) -> str:
         """Return why the tool cannot be at ``target``, on ``branch`` or any, and what it can do."""
         T = self.plan_context.T_base_shoulder
         frame = ScriptFrame.of(T, in_base=False) if self.frame is None else self.frame
-        return unreached(self.chain, self.q, target, branch, self.state.tool, frame)
+        return self.planning.unreached(self.state, self.q, target, branch, frame)
 
-    def branches(self, wanted: Branch | None) -> tuple[Branch, ...]:
+    def branches(self, wanted: AnyBranch | None) -> Sequence[AnyBranch]:
         """Return the branches to try, in their order; only ``wanted`` if it is given."""
-        return branches_near(self.chain, self.q) if wanted is None else (wanted,)
+        planning = self.planning
+        return planning.branches(self.q) if wanted is None else (planning.branch(wanted),)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from katana450.extensions.general_arms.branch_words import BRANCH_NAMES
 from katana450.extensions.programs.fields import MAX_ANGLE, MAX_COORDINATE, XYZ
 from katana450.extensions.programs.places import MAX_JOINTS
-from katana450.maths.kinematics.branch import BRANCHES
 
 Schema = dict[str, Any]
 
@@ -53,10 +53,11 @@ ANGLE = number_or_text(-360.0, 360.0, "deg, or a text such as 0.5 rad")
 TURN = number_or_text(-MAX_ANGLE, MAX_ANGLE, "deg, or a text such as 0.5 rad")
 PITCH = {**ANGLE, "description": "Pitch of the tool, deg: 0 is level, 90 points down"}
 ROLL = {**ANGLE, "description": "Roll of the tool about its own axis, deg"}
-BRANCH: Schema = {"enum": [str(each) for each in BRANCHES], "description": "Branch of the arm"}
+YAW = {**ANGLE, "description": "Yaw of the tool, deg, of arms with six or more axes"}
+BRANCH: Schema = {"enum": list(BRANCH_NAMES), "description": "Branch of the arm"}
 OBJECT = {**TEXT, "description": "Name of an object"}
 POINT_FIELDS = dict.fromkeys(XYZ, LENGTH)
-ORIENTATION = {"pitch": PITCH, "roll": ROLL}
+ORIENTATION = {"pitch": PITCH, "roll": ROLL, "yaw": YAW}
 OFFSET = any_of(
     "Motion of the tool point, mm; what is absent is 0",
     list_of(LENGTH, 3, 3),

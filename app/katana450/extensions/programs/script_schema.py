@@ -139,6 +139,7 @@ STEP_VALUES: dict[str, Schema] = {
             "climb": {**LENGTH, "description": "Motion along the axis, mm"},
             "pitch": ARC_PITCH,
             "roll": TURN,
+            "yaw": TURN,
         },
     ),
     "circle": mapping(
@@ -151,6 +152,7 @@ STEP_VALUES: dict[str, Schema] = {
             "turns": number_or_text(-20.0, 20.0, "Number of turns, 1 unless given"),
             "pitch": ARC_PITCH,
             "roll": TURN,
+            "yaw": TURN,
             "branch": BRANCH,
         },
     ),

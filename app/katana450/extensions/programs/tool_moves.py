@@ -13,22 +13,19 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
-from katana450.extensions.programs.curve import Linear, ToolArc, ToolLine
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.moves import through
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.reaching import reaching
-from katana450.extensions.programs.roomiest_pitch import roomiest
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
-from katana450.extensions.programs.step_target import StepTarget
-from katana450.extensions.programs.tool_curves import ToolLines, ToolScrew
-from katana450.extensions.programs.tool_path import ToolPath
-from katana450.extensions.programs.unfollowed import arc_remedies, line_remedies, unfollowed
-from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import Branch
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.extensions.programs.step_target import Angles, StepTarget
+from katana450.extensions.programs.tool_planning import AnyCurve
+from katana450.extensions.programs.unfollowed import ANGLE, arc_remedies, line_remedies, unfollowed
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.planning.path import Path
 
 LEVEL_TOLERANCE = 1e-6
 """[1] Maximum horizontal component of the normal of a level circle."""
@@ -36,47 +33,43 @@ LEVEL_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Line:
-    """Move the tool on a straight line; pitch and roll change evenly."""
+    """Move the tool on a straight line; its orientation changes evenly."""
 
     to: FloatArray | None
     by: FloatArray | None
-    pitch: float | None
-    roll: float | None
+    angles: Angles
     in_base: bool
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {to, by, pitch, roll}. Raises ScriptError."""
+        """Read {to, by, pitch, roll, yaw}. Raises ScriptError."""
         fields = Fields(value, "a line")
         to = fields.take("to", lambda each: places.pose(each, setting), None)
         by = fields.take("by", read.vector(read.millimetres(), partly=True), None)
         if to is not None and by is not None:
             fields.problems += value.wrong("A line takes `to` or `by`, not both.").problems
-        pitch, roll = places.angles(fields)
+        angles = places.angles(fields)
         if to is not None:
-            pitch = to.pitch if pitch is None else pitch
-            roll = to.roll if roll is None else roll
-        found = cls(None if to is None else to.position, by, pitch, roll, setting.in_base)
+            angles = angles.or_else(to.angles)
+        found = cls(None if to is None else to.position, by, angles, setting.in_base)
         fields.done()
         return found
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the line. Raises InputError if the tool cannot follow it."""
-        start = builder.at
-        end = builder.target_at(
-            StepTarget(None, self.to, self.pitch, self.roll, None, self.in_base)
-        )
+        start = builder.target
+        end = builder.target_at(StepTarget(None, self.to, self.angles, None, self.in_base))
         if self.by is not None:
             offset = builder.direction(self.by, in_base=self.in_base)
-            end = ToolTarget(start.position + offset, end.pitch, end.roll)
-        line = ToolLine(start, end)
+            end = end.moved(frozen(start.position + offset))
+        line = builder.planning.line(start, end)
         try:
             builder.lead([line], "line")
         except InputError as error:
             branch, frame = builder.branches(None)[0], builder.frame
             if self.to is not None and frame is not None and frame.looks_like_metres(end.position):
                 raise InputError(builder.unreached(end, branch)) from error
-            remedies = line_remedies(builder, start, end)
+            remedies = line_remedies(builder, start, end, error)
             raise unfollowed(builder, error, line, branch, remedies) from error
 
 
@@ -100,17 +93,17 @@ class Lines:
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the lines. Raises InputError if the tool cannot follow them."""
-        vias = [builder.at]
+        vias, planning = [builder.target], builder.planning
         branch = builder.branches(None)[0]
         for number, each in enumerate(self.through, start=1):
             vias.append(builder.target_at(each, vias[-1]))
-            if reaching(builder.chain, builder.q, vias[-1], branch) is None:
+            if planning.joints(builder.state, builder.q, vias[-1], branch) is None:
                 raise InputError(f"Place {number}: {builder.unreached(vias[-1], branch)}")
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
-            builder.lead([ToolLines(tuple(vias), blend)], "lines")
+            builder.lead([planning.lines(vias, blend)], "lines")
         else:
-            builder.lead([ToolLine(a, b) for a, b in pairwise(vias)], "lines")
+            builder.lead([planning.line(a, b) for a, b in pairwise(vias)], "lines")
 
 
 @dataclass(frozen=True)
@@ -120,46 +113,48 @@ class ArcGeometry:
     Attributes:
         centre: (3,) [m].
         axis: (3,) unit vector.
-        pitch: [rad], ROOMIEST, or None to keep it.
-        roll: [rad]; None to keep it.
-        in_base: whether centre and axis are in the base frame, not in {S}.
+        angles: pitch, roll and yaw [rad]; None to keep one.
+        in_base: whether centre, axis and angles are in the base frame, not in {S}.
+        is_roomiest: whether the pitch is the one farthest from the limits.
     """
 
     centre: FloatArray
     axis: FloatArray
-    pitch: float | str | None
-    roll: float | None
+    angles: Angles
     in_base: bool
+    is_roomiest: bool = False
 
     @classmethod
     def read(cls, fields: Fields, axis: str, setting: ScriptContext) -> Self:
-        """Read centre, axis, pitch and roll. ``axis`` is the name of the axis field."""
-        return cls(
-            fields.need("centre", lambda each: places.point(each, setting), np.zeros(3)),
-            fields.need(axis, read.direction, np.eye(3)[0]),
-            fields.take("pitch", places.pitch, None),
+        """Read centre, axis, pitch, roll and yaw. ``axis`` is the name of the axis field."""
+        centre = fields.need("centre", lambda each: places.point(each, setting), np.zeros(3))
+        direction = fields.need(axis, read.direction, np.eye(3)[0])
+        pitch = fields.take("pitch", places.pitch, None)
+        angles = Angles(
+            pitch if isinstance(pitch, float) else None,
             fields.take("roll", read.degrees(), None),
-            setting.in_base,
+            fields.take("yaw", read.degrees(), None),
         )
+        return cls(centre, direction, angles, setting.in_base, pitch == places.ROOMIEST)
 
     def seen(self, builder: PlanBuilder) -> tuple[FloatArray, FloatArray]:
         """Return centre [m] and axis, each (3,), in {S}."""
         centre = builder.point(self.centre, in_base=self.in_base)
         return centre, builder.direction(self.axis, in_base=self.in_base)
 
-    def angles(self, now: ToolTarget) -> tuple[float, float]:
-        """Return pitch and roll [rad], from ``now`` where they are not given."""
-        pitch = self.pitch if isinstance(self.pitch, float) else now.pitch
-        return pitch, now.roll if self.roll is None else self.roll
+    def turned(self, builder: PlanBuilder) -> DragTarget:
+        """Return the present target with the orientation at the end of the curve."""
+        return builder.target_at(StepTarget(None, None, self.angles, None, self.in_base))
 
     def follow(
-        self, builder: PlanBuilder, arc: ToolArc, name: str, branch: Branch | None = None
+        self, builder: PlanBuilder, arc: AnyCurve, name: str, branch: AnyBranch | None = None
     ) -> None:
         """Move to the start of ``arc`` if the arm is not there, then along it."""
+        planning = builder.planning
 
-        def path(tried: Branch) -> ToolPath:
-            found = roomiest(builder.chain, tried, arc) if self.pitch == places.ROOMIEST else arc
-            return ToolPath(builder.chain, found, tried, builder.q)
+        def path(tried: AnyBranch) -> Path:
+            found = planning.roomiest(arc, tried) if self.is_roomiest else arc
+            return planning.path(builder.state, builder.q, found, tried)
 
         tool_path = builder.first(builder.branches(branch), path)
         builder.move_to(tool_path.start, f"{name}: to its start")
@@ -168,28 +163,28 @@ class ArcGeometry:
     def follow_or_advise(
         self,
         builder: PlanBuilder,
-        arc: Callable[[float, float], ToolArc],
-        pitch: float,
+        arc: Callable[[DragTarget, float], AnyCurve],
+        end: DragTarget,
         size: tuple[str, float],
-        branch: Branch | None = None,
+        branch: AnyBranch | None = None,
     ) -> None:
-        """Follow ``arc`` with ``pitch`` [rad]. Raises InputError with what works instead.
+        """Follow ``arc`` to the orientation of ``end``. Raises InputError with what works instead.
 
-        ``arc`` gives the arc for a pitch and a fraction of its ``size``; see ``arc_remedies``.
+        ``arc`` gives the arc for a target and a fraction of its ``size``; see ``arc_remedies``.
         """
-        name = "circle" if size[0] == "radius" else "arc"
+        name = "arc" if size[0] == ANGLE else "circle"
 
-        def build(angle: float, fraction: float) -> None:
-            self.follow(builder, arc(angle, fraction), name, branch)
+        def build(target: DragTarget, fraction: float) -> None:
+            self.follow(builder, arc(target, fraction), name, branch)
 
         try:
-            build(pitch, 1.0)
+            build(end, 1.0)
         except InputError as error:
-            if self.pitch == places.ROOMIEST:
+            if self.is_roomiest:
                 raise
-            remedies = arc_remedies(builder, pitch, build, size)
+            remedies = arc_remedies(builder, end, build, size, error)
             first = builder.branches(branch)[0]
-            raise unfollowed(builder, error, arc(pitch, 1.0), first, remedies) from error
+            raise unfollowed(builder, error, arc(end, 1.0), first, remedies) from error
 
 
 @dataclass(frozen=True)
@@ -202,7 +197,7 @@ class Arc:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {centre, axis, angle, climb, pitch, roll}. Raises ScriptError."""
+        """Read {centre, axis, angle, climb, pitch, roll, yaw}. Raises ScriptError."""
         fields = Fields(value, "an arc")
         found = cls(
             ArcGeometry.read(fields, "axis", setting),
@@ -214,16 +209,15 @@ class Arc:
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the arc. Raises InputError if the tool cannot follow it."""
-        start = builder.at
-        pitch, roll = self.turn.angles(start)
-        seen, rolls = self.turn.seen(builder), Linear(start.roll, roll)
+        start, end = builder.target, self.turn.turned(builder)
+        centre, axis = self.turn.seen(builder)
+        arc_of = builder.planning.arc
 
-        def arc(pitch: float, fraction: float) -> ToolArc:
+        def arc(end: DragTarget, fraction: float) -> AnyCurve:
             angle, climb = fraction * self.angle, fraction * self.climb
-            pitches = Linear(start.pitch, pitch)
-            return ToolArc(start.position, *seen, angle, pitches, rolls, climb)
+            return arc_of(centre, axis, angle, climb, start, end)
 
-        self.turn.follow_or_advise(builder, arc, pitch, ("angle", math.degrees(self.angle)))
+        self.turn.follow_or_advise(builder, arc, end, (ANGLE, math.degrees(self.angle)))
 
 
 @dataclass(frozen=True)
@@ -233,11 +227,11 @@ class Circle:
     turn: ArcGeometry
     radius: float
     turns: float
-    branch: Branch | None
+    branch: AnyBranch | None
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {centre, normal, radius, turns, pitch, roll, branch}. Raises ScriptError."""
+        """Read {centre, normal, radius, turns, pitch, roll, yaw, branch}. Raises ScriptError."""
         fields = Fields(value, "a circle")
         found = cls(
             ArcGeometry.read(fields, "normal", setting),
@@ -259,20 +253,20 @@ class Circle:
             # A level circle has no highest point: start at the point farthest in front.
             ahead = builder.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
             out = ahead - (ahead @ normal) * normal
-        pitch, roll = self.turn.angles(builder.at)
-        turn, rolls = math.tau * self.turns, Linear(roll, roll)
+        turn, arc_of = math.tau * self.turns, builder.planning.arc
 
-        def arc(pitch: float, fraction: float) -> ToolArc:
+        def arc(end: DragTarget, fraction: float) -> AnyCurve:
             start = centre + fraction * self.radius / math.hypot(*out) * out
-            return ToolArc(start, centre, normal, turn, Linear(pitch, pitch), rolls)
+            there = end.moved(frozen(start))
+            return arc_of(centre, normal, turn, 0.0, there, there)
 
         size = "radius", 1e3 * self.radius
-        self.turn.follow_or_advise(builder, arc, pitch, size, self.branch)
+        self.turn.follow_or_advise(builder, arc, self.turn.turned(builder), size, self.branch)
 
 
 @dataclass(frozen=True)
 class Screw:
-    """Move the tool as one rigid body about an axis and along it, as far as five axes can."""
+    """Move the tool as one rigid body about an axis and along it, as far as its axes can."""
 
     point: FloatArray
     axis: FloatArray
@@ -302,7 +296,7 @@ class Screw:
         omega = self.angle * axis
         v = np.cross(builder.point(self.point, in_base=self.in_base), omega) + self.climb * axis
         branch = builder.branches(None)[0]
-        screw = ToolScrew(builder.chain, branch, builder.q, np.append(omega, v))
+        screw = builder.planning.screw(builder.q, np.append(omega, v))
         try:
             builder.lead([screw], "screw")
         except InputError as error:

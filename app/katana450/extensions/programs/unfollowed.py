@@ -9,24 +9,17 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.errors import BlockedError, InputError, PathError
-from katana450.extensions.programs.curve import Curve, ToolLine
-from katana450.extensions.programs.out_of_reach import (
-    NearestPlace,
-    binding,
-    millimetres,
-    near_points,
-    nearest_place,
-)
+from katana450.extensions.programs.following import LostPathError
+from katana450.extensions.programs.out_of_reach import near_points
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.reaching import EXACT
-from katana450.maths.kinematics.branch import Branch
-from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.extensions.programs.tool_planning import AnyCurve
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
 from katana450.maths.planning.checkpoint import checkpoint
-from katana450.maths.planning.jet import Jet
 
-SAMPLES = 65
-"""Number of places of a path that are compared."""
+ANGLE = "angle"
+"""Name of the field with the size of an arc that is no circle."""
 
 HALVINGS = 12
 """Number of halvings that find how far a path can go."""
@@ -47,8 +40,8 @@ LEFT = 1e-4
 def unfollowed(
     builder: PlanBuilder,
     refused: InputError,
-    curve: Curve,
-    branch: Branch,
+    curve: AnyCurve,
+    branch: AnyBranch,
     remedies: Iterator[str],
 ) -> InputError:
     """Return ``refused`` with the amount by which the path is out of reach, and what works.
@@ -68,63 +61,71 @@ def unfollowed(
     if builder.given_up:
         # With another grasp. Only the refusal with the first one is shown.
         return refused
-    text = refused.text
-    sigma, target, nearest = _worst(builder, curve, branch)
-    missed = nearest.projection.position_error
-    if missed > EXACT:
-        text += (
-            f" Farthest out of reach is {frame.words(target.position)}, {100.0 * sigma:.0f} % "
-            f"along it: {millimetres(missed)}, because {binding(builder.chain, nearest)}."
-        )
+    text = refused.text + builder.planning.farthest(builder.state, builder.q, curve, branch, frame)
     if works := list(remedies):
         text += f" It can be followed {' or '.join(works)}."
     return PathError(text, refused.point, parts=refused.parts)
 
 
-def line_remedies(builder: PlanBuilder, start: ToolTarget, end: ToolTarget) -> Iterator[str]:
-    """Yield texts to copy, with each of which the line from ``start`` to ``end`` is possible."""
+def line_remedies(
+    builder: PlanBuilder, start: DragTarget, end: DragTarget, refused: InputError
+) -> Iterator[str]:
+    """Yield texts to copy, with each of which the line from ``start`` to ``end`` is possible.
 
-    def possible(tried: ToolTarget) -> bool:
-        return _possible(builder, lambda: builder.lead([ToolLine(start, tried)], "line"))
+    ``refused``: why the whole line is not.
+    """
+    line = builder.planning.line
 
-    for pitch in _other_pitch(end.pitch, lambda angle: possible(replace(end, pitch=angle))):
+    def possible(tried: DragTarget) -> bool:
+        return _possible(builder, lambda: builder.lead([line(start, tried)], "line"))
+
+    for pitch in _other_pitch(end, possible):
         yield f"with `pitch: {pitch:g}` at its end"
     length = math.dist(start.position, end.position)
     if length <= MIN_LENGTH or builder.frame is None:
         return
-    reached = _farthest(lambda fraction: possible(_shortened(start, end, fraction)))
+    if isinstance(refused, LostPathError):
+        reached = refused.sigma
+    else:
+        reached = _farthest(lambda fraction: possible(end.moved(_between(start, end, fraction))))
     if reached * length > MIN_LENGTH + LEFT:
-        last = _shortened(start, end, reached - LEFT / length)
-        for text, p in near_points(builder.frame, last.position):
-            if possible(replace(end, position=p)):
+        last = _between(start, end, reached - LEFT / length)
+        for text, p in near_points(builder.frame, last):
+            if possible(end.moved(frozen(p))):
                 yield f"as far as `to: {text}`"
                 return
 
 
 def arc_remedies(
     builder: PlanBuilder,
-    pitch: float,
-    build: Callable[[float, float], None],
+    end: DragTarget,
+    build: Callable[[DragTarget, float], None],
     size: tuple[str, float],
+    refused: InputError,
 ) -> Iterator[str]:
     """Yield texts to copy, with each of which an arc is possible.
 
     Args:
         builder: the arm at the start.
-        pitch: the pitch of the arc [rad].
-        build: appends the arc with another pitch [rad], and a fraction of its size, to ``builder``.
-            Raises InputError.
+        end: the target at the end of the arc, whose orientation counts.
+        build: appends the arc to another orientation, and with a fraction of its size, to
+            ``builder``. Raises InputError.
         size: name and value of the field that gives its size, in the unit of a script.
+        refused: why the whole arc is not possible.
     """
 
-    def possible(angle: float, fraction: float) -> bool:
-        return _possible(builder, lambda: build(angle, fraction))
+    def possible(target: DragTarget, fraction: float) -> bool:
+        return _possible(builder, lambda: build(target, fraction))
 
-    for other in _other_pitch(pitch, lambda angle: possible(angle, 1.0)):
+    for other in _other_pitch(end, lambda target: possible(target, 1.0)):
         yield f"with `pitch: {other:g}`"
     name, value = size
-    shorter = math.trunc(_farthest(lambda fraction: possible(pitch, fraction)) * value)
-    if shorter and possible(pitch, shorter / value):
+    if name == ANGLE and isinstance(refused, LostPathError):
+        reached = refused.sigma
+    else:
+        reached = _farthest(lambda fraction: possible(end, fraction))
+    shorter = math.trunc(reached * value)
+    if shorter and possible(end, shorter / value):
         yield f"with `{name}: {shorter}`"
 
 
@@ -137,17 +138,22 @@ def _farthest(possible: Callable[[float], bool]) -> float:
     return reached
 
 
-def _shortened(start: ToolTarget, end: ToolTarget, fraction: float) -> ToolTarget:
-    """Return the end of a part of the line, with pitch and roll of the whole line's end."""
-    return replace(end, position=start.towards(end, fraction).position)
+def _between(start: DragTarget, end: DragTarget, fraction: float) -> FloatArray:
+    """Return the point (3,) [m] at ``fraction`` of the line."""
+    return frozen(start.position + fraction * (end.position - start.position))
 
 
-def _other_pitch(pitch: float, possible: Callable[[float], bool]) -> Iterator[float]:
-    """Yield the possible pitch [deg] that is nearest to ``pitch`` [rad], if there is one."""
-    here = math.degrees(pitch)
+def _other_pitch(end: DragTarget, possible: Callable[[DragTarget], bool]) -> Iterator[float]:
+    """Yield the pitch [deg] nearest to that of ``end`` that is ``possible``, if there is one.
+
+    Only targets of five axes have a pitch that can be changed alone.
+    """
+    if not isinstance(end, ToolTarget):
+        return
+    here = math.degrees(end.pitch)
     tried = np.arange(-MAX_PITCH, MAX_PITCH + PITCH_STEP, PITCH_STEP).tolist()
     for each in sorted(tried, key=lambda angle: abs(angle - here)):
-        if possible(math.radians(each)):
+        if possible(replace(end, pitch=math.radians(each))):
             yield each
             return
 
@@ -163,18 +169,3 @@ def _possible(builder: PlanBuilder, build: Callable[[], None]) -> bool:
     finally:
         builder.state, builder.actions = state, actions
     return True
-
-
-def _worst(
-    builder: PlanBuilder, curve: Curve, branch: Branch
-) -> tuple[float, ToolTarget, NearestPlace]:
-    """Return the place of ``curve`` that is farthest out of reach: sigma, target, nearest place."""
-    found = []
-    for sigma in np.linspace(0.0, 1.0, SAMPLES).tolist():
-        checkpoint()
-        tool = curve.at(Jet.variable(sigma))
-        x, y, z, pitch, roll = (float(np.asarray(each.c0)) for each in tool)
-        target = ToolTarget(np.array((x, y, z)), pitch, roll)
-        nearest = nearest_place(builder.chain, builder.q, target, branch, Priority.PITCH)
-        found.append((sigma, target, nearest))
-    return max(found, key=lambda each: each[2].projection.position_error)

@@ -24,6 +24,8 @@ from katana450.arm.control.following import Following
 from katana450.arm.control.lease import Person, Role
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
+from katana450.extensions.programs.pose_curve import PoseCurve, PoseLines, TurnedCurve
+from katana450.extensions.programs.pose_path import PosePath
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.programs.trajectory_path import TrajectoryPath
@@ -83,7 +85,7 @@ CLASSES: Final[tuple[type, ...]] = (
     *(pouring.MotionWithWater, Water, Slosh, Course),
     # Plans.
     *(Plan, Segment, Scaling, Nearest, Contact, Fingerprint, Chain, JointPath, ToolPath),
-    TrajectoryPath,
+    *(TrajectoryPath, PosePath, TurnedCurve, PoseLines),
     *(ToolLine, ToolLines, ToolArc, ToolScrew, ToolTurn, Linear, Swing),
 )
 """Frozen dataclasses that a recording can hold."""
@@ -92,8 +94,9 @@ CURVES: Final[Any] = ToolLine | ToolLines | ToolArc | ToolScrew | ToolTurn
 PROFILES: Final[Any] = Linear | Swing
 
 MEMBERS: Final[Mapping[Any, Any]] = {
-    Path: JointPath | ToolPath | TrajectoryPath,
+    Path: JointPath | ToolPath | TrajectoryPath | PosePath,
     Curve: CURVES,
+    PoseCurve: TurnedCurve | PoseLines,
     Callable: PROFILES,
     DragTarget: ToolTarget | ToolPose,
 }

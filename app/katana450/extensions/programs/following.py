@@ -17,15 +17,15 @@ import numpy as np
 from katana450 import tolerances
 from katana450.arm.control.messages import axis_names
 from katana450.errors import PathError
-from katana450.extensions.general_arms.pose_curve import PoseCurve, PoseJets
-from katana450.extensions.general_arms.pose_equations import PoseEquations, RegularPosture
-from katana450.extensions.general_arms.pose_path import PosePath, septics
+from katana450.extensions.general_arms.pose_equations import PoseEquations, PoseJets, RegularPosture
 from katana450.extensions.general_arms.regularity import WALL
+from katana450.extensions.programs.pose_curve import PoseCurve
+from katana450.extensions.programs.pose_path import PosePath, septics
+from katana450.extensions.programs.tool_path import at_place, peaks
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
-from katana450.maths.planning.tool_path import at_place, peaks
 
 FIRST_STEP: Final = 1.0 / 32.0
 """[1] Largest step from place to place."""

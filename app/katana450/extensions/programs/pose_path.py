@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.general_arms.pose_curve import PoseCurve
+from katana450.extensions.programs.pose_curve import PoseCurve
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.batch import forward_batch

@@ -1,6 +1,6 @@
 """Curves of poses: tool point and rotation of the tool as functions of one parameter.
 
-They are formulas of sigma, from 0 to 1, on jets, like the curves of maths/planning/curve.py. For an
+They are formulas of sigma, from 0 to 1, on jets, like those of `curve`. For an
 arm with fewer than six axes rotations are those with axis 1 at zero, as in `ToolPose`. Lengths in
 m, angles in rad, frame {S}.
 """
@@ -11,43 +11,24 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from katana450.errors import InputError
+from katana450.extensions.general_arms.pose_equations import PoseJets
 from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.programs.curve import Curve
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
-from katana450.maths.planning.curve import Curve
 from katana450.maths.planning.jet import Jet, sin_cos, sqrt
 from katana450.maths.planning.polyline import Polyline
-from katana450.maths.planning.posture import ThreeJets
 
 TURN_LENGTH: Final = 0.25
 """Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
 
 VIA_TOLERANCE: Final = 1e-9
 """Vias nearer to each other than this [m] are the same."""
-
-
-class PoseJets(NamedTuple):
-    """The pose of the tool as jets: the tool point x, y, z, and the columns of its rotation."""
-
-    x: Jet
-    y: Jet
-    z: Jet
-    columns: tuple[ThreeJets, ThreeJets, ThreeJets]
-
-    @property
-    def T(self) -> FloatArray:
-        """The poses at N places, or at one, (N, 4, 4)."""
-        numbers = [*(each for column in self.columns for each in column), *self[:3]]
-        rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(each.c0) for each in numbers)), axis=1)
-        T = np.zeros((len(rows), 4, 4))
-        T[:, :3] = rows.reshape(-1, 4, 3).swapaxes(1, 2)
-        T[:, 3, 3] = 1.0
-        return T
 
 
 class PoseCurve(Protocol):
