@@ -1,0 +1,105 @@
+"""Script files for arms outside the five-axis family, simulated with the links of their URDF."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from katana450.errors import KatanaError
+from katana450.extensions.media.measures import bounds, measurements
+from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import script_text
+from katana450.extensions.programs.script_schema import script_schema
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.kinematics.chain import Chain
+from tests.general_arms.chain_urdf import chain_urdf
+from tests.general_arms.links_of_arms import ur5e
+from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA
+from tests.programs.yaml_core import loaded
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = ROOT / "examples" / "programs" / "other_arms" / "ur5e.yaml"
+
+
+@pytest.fixture
+def ur5e_file(tmp_path: Path) -> Path:
+    path = tmp_path / "ur5e.urdf"
+    path.write_text(ur5e(), encoding="utf-8")
+    return path
+
+
+def test_example_is_valid_for_editors() -> None:
+    text = SCRIPT.read_text(encoding="utf-8")
+    assert Draft202012Validator(script_schema()).is_valid(loaded(text))
+    assert "$schema=../script.schema.json" in text
+
+
+def test_example_keeps_to_its_curves_and_limits(ur5e_file: Path) -> None:
+    plan = plan_script(parse(script_text(SCRIPT)), ur5e_file)
+    simulation = run_by_clock(plan)
+    arm = plan.robot.require_arm()
+    values = measurements(plan.program, arm, simulation.trace)
+    assert [str(each) for each in bounds(plan.script, values) if not each.held] == []
+    assert values["nearest_clearance_mm"] is not None
+    between = values["between_ticks_error_mm"]
+    assert between is not None
+    assert between < 0.1
+    np.testing.assert_allclose(simulation.states[-1].q, plan.session.ready, atol=1e-9)
+
+
+@pytest.mark.long
+def test_example_runs_at_the_terminal_with_a_report(ur5e_file: Path, tmp_path: Path) -> None:
+    command = ("run", str(SCRIPT), "--urdf", str(ur5e_file), "--report", "out", "--headless")
+    done = subprocess.run(
+        [sys.executable, "-m", "katana450", *command],
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "Max position error" in done.stdout
+    found = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"report.html", "trace.csv", "path.png", "speeds.png", "tracing.png"} <= found
+
+
+@pytest.mark.parametrize(
+    "chain",
+    [
+        pytest.param(OPENMANIPULATOR_X, id="OpenMANIPULATOR-X"),
+        pytest.param(KR_6, id="KR 6", marks=pytest.mark.long),
+        pytest.param(PANDA, id="Panda", marks=pytest.mark.long),
+    ],
+)
+def test_line_stops_short_of_what_stands_in_its_way(chain: Chain, tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(chain_urdf("arm", chain), encoding="utf-8")
+    free = plan_script(parse("frame: base\nsteps:\n  - wait: 0\n"), path)
+    tool = free.robot.require_arm().kinematics.target_at(free.start.q).position
+    base = free.robot.require_arm().T_base_shoulder
+    x, y, z = (1e3 * (base[:3, :3] @ tool + base[:3, 3])).tolist()
+    length = 40.0 if chain.n == 4 else 150.0
+    line = f"frame: base\nsteps:\n  - line: {{by: {{y: {length}}}}}\n"
+    plan_script(parse(line), path)
+    scene = (
+        f"scene:\n  - {{name: post, shape: box, size: [20, 20, {z + 40}], "
+        f"pose: [{x}, {y + 0.6 * length}, 0, 0, 0, 0]}}\n"
+    )
+    with pytest.raises(ScriptError, match=r"blocked \d+ % along it, .* post would"):
+        plan_script(parse(scene + line), path)
+
+
+def test_robot_without_a_tool_runs_no_script(tmp_path: Path) -> None:
+    path = tmp_path / "two.urdf"
+    path.write_text(chain_urdf("two", _first(OPENMANIPULATOR_X, 2)), encoding="utf-8")
+    with pytest.raises(KatanaError, match="axes"):
+        plan_script(parse("steps:\n  - home\n"), path)
+
+
+def _first(chain: Chain, n: int) -> Chain:
+    return Chain(
+        chain.M, chain.S[:, :n], chain.lower[:n], chain.upper[:n], chain.speed[:n], chain.names[:n]
+    )
