@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, cast
 
@@ -40,7 +41,7 @@ UPRIGHT: Final = 1e-9
 VERTICAL: Final = 1e-6
 """[1] Cosine of the pitch below which roll and yaw are not distinct."""
 
-SWINGS: Final = tuple(np.radians((0, 15, -15, 30, -30, 60, -60, 90, -90)).tolist())
+SWINGS: Final = tuple(np.radians((15, -15, 30, -30, 60, -60, 90, -90)).tolist())
 """[rad] Turns of the swivel along a path, in the order in which they are tried."""
 
 PROBES: Final = (1.0, 0.75, 0.5, 0.25)
@@ -198,35 +199,31 @@ class PosePlanning:
                 )
             q = begun
         equations = self.kinematics.equations(q)
-        refused: LostPathError | None = None
-        for slope in self._slopes(q, equations.locked):
-            try:
-                return CurveSearch(equations, poses, q, slope).path()
-            except LostPathError as error:
-                refused = refused or error
-            if not slope.any() and not self._reaches(state, q, poses, branch):
-                # Then no turn of the swivel helps.
-                break
-        assert refused is not None
+        try:
+            return CurveSearch(equations, poses, q, np.zeros(len(equations.locked))).path()
+        except LostPathError as error:
+            refused = error
+        if not equations.locked or not self._may_swing(state, q, poses, branch):
+            raise refused
+        chain, swivel = self.kinematics.chain, equations.locked[0]
+        for swing in SWINGS:
+            if chain.lower[swivel] <= q[swivel] + swing <= chain.upper[swivel]:
+                turns = np.zeros(len(equations.locked))
+                turns[0] = swing
+                with suppress(LostPathError):
+                    return CurveSearch(equations, poses, q, turns).path()
         raise refused
 
-    def _reaches(self, state: State, q: FloatArray, curve: PoseCurve, branch: AnyBranch) -> bool:
-        """Return whether some places all along the curve are in reach, each by itself."""
-        for sigma in PROBES:
-            target = ToolPose.of(curve.at(Jet.variable(sigma)).T[0])
-            if self._on_branch(state, q, target, branch) is None:
-                return False
-        return True
+    def _may_swing(self, state: State, q: FloatArray, curve: PoseCurve, branch: AnyBranch) -> bool:
+        """Return whether a turn of the swivel may help on a curve that is refused without.
 
-    def _slopes(self, q: FloatArray, locked: Sequence[int]) -> Iterator[FloatArray]:
-        """Yield how far the locked joints turn along a path (k,) [rad], not at all at first."""
-        if not locked:
-            yield np.zeros(0)
-            return
-        chain, first = self.kinematics.chain, locked[0]
-        for swing in SWINGS:
-            if chain.lower[first] <= q[first] + swing <= chain.upper[first]:
-                yield np.array([swing, *([0.0] * (len(locked) - 1))])
+        It does not where a place is out of reach with every swivel. A closed curve must close in
+        the joints too.
+        """
+        places = [ToolPose.of(curve.at(Jet.variable(each)).T[0]) for each in (0.0, *PROBES)]
+        if max(places[0].apart(places[1])) <= EXACT:
+            return False
+        return all(self._on_branch(state, q, each, branch) is not None for each in places[1:])
 
     def branches(self, q: FloatArray) -> Sequence[AnyBranch]:
         """Return all branches, that of `q` first."""

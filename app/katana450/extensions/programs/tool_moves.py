@@ -24,7 +24,7 @@ from katana450.extensions.programs.tool_planning import AnyCurve
 from katana450.extensions.programs.unfollowed import ANGLE, arc_remedies, line_remedies, unfollowed
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
 from katana450.maths.planning.path import Path
 
 LEVEL_TOLERANCE = 1e-6
@@ -174,16 +174,19 @@ class ArcGeometry:
         """
         name = "arc" if size[0] == ANGLE else "circle"
 
-        def build(target: DragTarget, fraction: float) -> None:
-            self.follow(builder, arc(target, fraction), name, branch)
-
         try:
-            build(end, 1.0)
+            self.follow(builder, arc(end, 1.0), name, branch)
         except InputError as error:
             if self.is_roomiest:
                 raise
-            remedies = arc_remedies(builder, end, build, size, error)
             first = builder.branches(branch)[0]
+            # Eight branches would take long.
+            tried = branch if isinstance(end, ToolTarget) else first
+
+            def build(target: DragTarget, fraction: float) -> None:
+                self.follow(builder, arc(target, fraction), name, tried)
+
+            remedies = arc_remedies(builder, end, build, size, error)
             raise unfollowed(builder, error, arc(end, 1.0), first, remedies) from error
 
 
