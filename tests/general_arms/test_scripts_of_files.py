@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+import viser
 from jsonschema import Draft202012Validator
 
 from katana450.errors import KatanaError
@@ -16,8 +20,10 @@ from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.script_schema import script_schema
+from katana450.extensions.programs.server.preview import Preview
 from katana450.extensions.programs.source import ScriptError
 from katana450.maths.kinematics.chain import Chain
+from katana450.server.view.traces import Traces, coloured
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.links_of_arms import ur5e
 from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA
@@ -51,6 +57,38 @@ def test_example_keeps_to_its_curves_and_limits(ur5e_file: Path) -> None:
     assert between is not None
     assert between < 0.1
     np.testing.assert_allclose(simulation.states[-1].q, plan.session.ready, atol=1e-9)
+
+
+def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
+    plan = plan_script(parse(script_text(SCRIPT)), ur5e_file)
+    states = run_by_clock(plan).states
+    with redirect_stdout(StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        preview = Preview(server, plan.robot, lambda: plan.session)
+        span = preview.show(plan.program, plan.start, ghosts=True)
+        assert span == pytest.approx(states[-1].t, abs=0.3)
+        preview.look(0.5 * span)
+        traces = Traces(server, plan.robot.require_arm())
+        for state in states:
+            traces.follow(state)
+        nodes = dict(server.scene._handle_from_node_name)
+        traced = nodes["/path/traced"]
+        assert isinstance(traced, viser.LineSegmentsHandle)
+        assert traced.visible
+        # Green all along: the tool is on its curve.
+        assert (traced.colors.reshape(-1, 3) == coloured(np.zeros(1))).all()
+        shown = nodes["/path/preview"]
+        assert isinstance(shown, viser.LineSegmentsHandle)
+        down = shown.points.reshape(-1, 3)[:, 2].min()
+        assert down == pytest.approx(0.2, abs=1e-3)
+        preview.begin()
+        for thread in threading.enumerate():
+            if thread.name == "preview":
+                thread.join(30.0)
+    finally:
+        with redirect_stdout(StringIO()):
+            server.stop()
 
 
 @pytest.mark.long
