@@ -15,11 +15,14 @@ from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.form import Form, form_of
 from katana450.extensions.general_arms.functions import ARRAYS, FLOATS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
+from katana450.extensions.general_arms.one_pose import one_pose
 from katana450.extensions.general_arms.parallel_axes import LOOSE, six_axes
-from katana450.extensions.general_arms.posture import GeneralPosture
+from katana450.extensions.general_arms.posture import Postures
 from katana450.extensions.general_arms.spherical_wrist import Angles, Solve
+from katana450.extensions.general_arms.straight_line import Code, another_turn_helps
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.se3 import Rows
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.turns import in_turn, nearest_turn
@@ -77,23 +80,27 @@ class ClosedForm:
         lower, upper = self.chain.lower.tolist(), self.chain.upper.tolist()
         order = range(self.chain.n - 1, -1, -1) if self.is_reversed else range(self.chain.n)
         shifts = [self.form.links.shift[k] for k in order]
-        # A joint with a range of at least one turn about zero holds every angle in (-pi, pi].
         narrow = [
             (k, low, high)
             for k, (low, high) in enumerate(zip(lower, upper, strict=True))
-            if low > -math.pi or high < math.pi
+            if another_turn_helps(low, high)
         ]
-        remainder, tau = math.remainder, math.tau
+        remainder, tau, pi = math.remainder, math.tau, math.pi
         places = list(zip(order, shifts, strict=True))
 
         def turned(alpha: Angles) -> tuple[float, ...]:
-            q = [remainder(alpha[k] - shift, tau) for k, shift in places]
+            q = [alpha[k] - shift for k, shift in places]
+            q = [x if -pi <= x <= pi else remainder(x, tau) for x in q]
             for k, low, high in narrow:
                 if not low <= q[k] <= high:
                     q[k] = in_turn(q[k], low, high)
             return tuple(q)
 
         return turned
+
+    @cached_property
+    def _one_pose(self) -> Code:
+        return one_pose(self.chain, self.form, is_reversed=self.is_reversed)
 
     def solve(self, T: FloatArray, free: Sequence[float] | None = None) -> list[tuple[float, ...]]:
         """Return the joint angles of all branches for the pose `T` (4, 4), without checks.
@@ -102,32 +109,35 @@ class ClosedForm:
         leaves them free; None for zeros. Each angle is in the turn inside its limits if there is
         one, else in [-pi, pi].
         """
-        if self.is_reversed:
-            T = se3.inverse(T)
-            free = None if free is None else free[::-1]
-        shift = self.form.links.shift
-        alpha = shift if free is None else tuple(map(float.__add__, free, shift))
-        turned = self._turned
-        return [turned(each) for each in self._solve(self.form.rows(T), alpha)]
+        return self._solved(T.tolist(), free)
 
-    def inverse(
-        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
-    ) -> list[GeneralPosture]:
+    def _solved(self, rows: Rows, free: Sequence[float] | None) -> list[tuple[float, ...]]:
+        alpha = shift = self.form.links.shift
+        if free is not None:
+            alpha = tuple(map(float.__add__, free[::-1] if self.is_reversed else free, shift))
+        found: list[tuple[float, ...]] | None = self._one_pose(rows, alpha)
+        return self._by_cases(np.array(rows), alpha) if found is None else found
+
+    def _by_cases(self, T: FloatArray, alpha: Sequence[float]) -> list[tuple[float, ...]]:
+        """Return `solve` with all cases that the formulas distinguish; ``alpha``: canonical."""
+        rows = self.form.rows(se3.inverse(T) if self.is_reversed else T)
+        return list(map(self._turned, self._solve(rows, alpha)))
+
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Postures:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.
 
         Where no exact posture exists, the postures come as near as the subproblems can: the tool
         point, or the wrist's centre, nearest along the links. Their errors give the difference.
         Two branches coincide where they meet.
         """
-        pose = np.array(se3.validated_rows(T))
-        hint = None if q_hint is None else self.chain.check_q(q_hint)
-        found = self.solve(pose, None if hint is None else hint.tolist())
-        if hint is not None and (self.chain.upper - self.chain.lower > math.tau).any():
+        rows = se3.validated_rows(T)
+        if q_hint is None:
+            return Postures(self.chain, rows, self._solved(rows, None), self.branches)
+        hint = self.chain.check_q(q_hint)
+        found = self._solved(rows, hint.tolist())
+        if (self.chain.upper - self.chain.lower > math.tau).any():
             found = [tuple(nearest_turn(self.chain, np.array(q), hint).tolist()) for q in found]
-        return [
-            GeneralPosture(self.chain, pose, q, branch)
-            for q, branch in zip(found, self.branches, strict=True)
-        ]
+        return Postures(self.chain, rows, found, self.branches)
 
     def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
         """Return the joint angles (N, branches, n) [rad] for poses `T` (N, 4, 4) [m].

@@ -31,6 +31,7 @@ class Operations(NamedTuple):
         root: sqrt(x), and 0 where x < 0.
         select: (condition, a, b) to a where the condition holds, else b.
         bounded: the nearest number in [-1, 1].
+        rare: whether a rare case begins, of which the caller takes care: of many poses at once.
     """
 
     atan2: Callable[[Number, Number], Number]
@@ -40,6 +41,7 @@ class Operations(NamedTuple):
     root: Callable[[Number], Number]
     select: Callable[[Number, Number, Number], Number]
     bounded: Callable[[Number], Number]
+    rare: Callable[[Number], bool]
 
 
 def _root(x: float) -> float:
@@ -54,7 +56,9 @@ def _bounded(x: float) -> float:
     return -1.0 if x < -1.0 else min(x, 1.0)
 
 
-FLOATS: Final = Operations(math.atan2, math.hypot, math.cos, math.sin, _root, _select, _bounded)
+FLOATS: Final = Operations(
+    math.atan2, math.hypot, math.cos, math.sin, _root, _select, _bounded, bool
+)
 
 ARRAYS: Final = Operations(
     np.arctan2,
@@ -64,6 +68,7 @@ ARRAYS: Final = Operations(
     lambda x: np.sqrt(np.maximum(x, 0.0)),
     np.where,
     lambda x: np.clip(x, -1.0, 1.0),
+    lambda _: False,
 )
 
 Facing = tuple[tuple[Number, Number, Number], tuple[Number, Number, Number]]

@@ -32,7 +32,6 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.extensions.general_arms.functions import (
-    FLOATS,
     FREE,
     Number,
     Operations,
@@ -85,7 +84,7 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
             first, second, radius = split((m11, m12, m13), (m21, m22, m23), m31, m33, 0.0)
             u, v = ahead - a1, up
             for psi, five, six, cp, sp in (first, second):
-                if f is FLOATS and radius <= LOOSE:
+                if f.rare(radius <= LOOSE):
                     psi, six = loosened(u, v, psi, six, free[5], radius, m33)  # noqa: PLW2901
                     cp, sp = f.cos(psi), f.sin(psi)  # noqa: PLW2901
                 towards, opening, bend = bent(u - ex * cp + ey * sp, v - ex * sp - ey * cp)
@@ -145,7 +144,7 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
     length, _, over = links.T_n_tool[:3, 3].tolist()
     height = links.d[1] + flip2 * (links.d[2] + flip3 * over)
     turns, bent = facing(f), two_links(f, links.a[1], links.a[2])
-    near = (tolerances.NEAR_AXIS_1 * links.reach) ** 2
+    near = tolerances.NEAR_AXIS_1 * links.reach
     atan2, hypot, cos, sin = f.atan2, f.hypot, f.cos, f.sin
 
     def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
@@ -154,7 +153,7 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
         beside = (c1 * z - height) / s1
         up = c1 * beside + s1 * z
         planes = list(turns(x, y, beside, free[0]))
-        if f is FLOATS and planes[0][2] ** 2 <= near:
+        if f.rare(planes[0][2] <= near):
             planes = _by_axes(planes, x, y, beside, -flip * s1 * r23, flip * s1 * r13)
         found = []
         for c, s, ahead in planes:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Final, overload
 
 import numpy as np
 
 from katana450 import tolerances
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.se3 import Rows
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 
@@ -93,6 +94,53 @@ class GeneralPosture:
     def __repr__(self) -> str:
         """Return a short description."""
         return f"GeneralPosture(angles={self.angles}, branch={self.branch!r})"
+
+
+class Postures(Sequence[GeneralPosture]):
+    """The postures of one pose in the order of the branches, created on first access."""
+
+    __slots__ = ("_angles", "_branches", "_chain", "_made", "_rows")
+
+    def __init__(
+        self,
+        chain: Chain,
+        rows: Rows,
+        angles: Sequence[tuple[float, ...]],
+        branches: Sequence[str],
+    ) -> None:
+        self._chain = chain
+        self._rows = rows
+        self._angles = angles
+        self._branches = branches
+        self._made: tuple[GeneralPosture, ...] | None = None
+
+    def _all(self) -> tuple[GeneralPosture, ...]:
+        if self._made is None:
+            T = np.array(self._rows)
+            self._made = tuple(
+                GeneralPosture(self._chain, T, angles, branch)
+                for angles, branch in zip(self._angles, self._branches, strict=True)
+            )
+        return self._made
+
+    def __len__(self) -> int:
+        return len(self._angles)
+
+    @overload
+    def __getitem__(self, index: int) -> GeneralPosture: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[GeneralPosture, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> GeneralPosture | tuple[GeneralPosture, ...]:
+        return self._all()[index]
+
+    def __iter__(self) -> Iterator[GeneralPosture]:
+        return iter(self._all())
+
+    def __repr__(self) -> str:
+        """Return the postures as text."""
+        return repr(self._all())
 
 
 def scaled_jacobian(chain: Chain, q: Sequence[float] | FloatArray) -> FloatArray:

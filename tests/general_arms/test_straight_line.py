@@ -1,0 +1,144 @@
+"""Closed forms written out for one arm give what the formulas give, and nothing is lost."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.closed_form import ClosedForm
+from katana450.extensions.general_arms.links import reversed_chain
+from katana450.extensions.general_arms.straight_line import Trace, compiled
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from tests.general_arms.published_arms import FOUR, KR_6, PUMA_560, SIX, UR5E
+
+ARMS = FOUR | SIX | {"Puma 560 seen from the tool": reversed_chain(PUMA_560)}
+POSTURES = 100
+
+
+def closed_form(chain: Chain) -> ClosedForm:
+    found = kinematics_of(chain)
+    assert isinstance(found, ClosedForm)
+    return found
+
+
+def both(solver: ClosedForm, q: FloatArray) -> tuple[Any, Any]:
+    """Return the solutions of the written-out function, None for a rare case, and by cases."""
+    T = forward(solver.chain, q)
+    angles = q[::-1] if solver.is_reversed else q
+    alpha = (angles + solver.form.links.shift).tolist()
+    return solver._one_pose(T.tolist(), alpha), solver._by_cases(T, alpha)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_written_out_function_gives_what_the_formulas_give(name: str) -> None:
+    solver = closed_form(ARMS[name])
+    chain = solver.chain
+    rare = 0
+    for q in np.random.default_rng(1).uniform(chain.lower, chain.upper, (POSTURES, chain.n)):
+        written, by_cases = both(solver, q)
+        if written is None:
+            rare += 1
+            continue
+        away = np.array(written) - by_cases
+        away -= math.tau * np.round(away / math.tau)
+        # Beside a stretched elbow rounding is magnified to its root.
+        assert np.sort(np.abs(away).max(axis=1))[: len(away) // 2].max() < 1e-9
+        assert np.abs(away).max() < 1e-6
+        for each in written:
+            inside = (each >= chain.lower) & (each <= chain.upper)
+            assert (inside | (np.abs(each) <= math.pi)).all()
+    assert rare <= POSTURES / 20
+
+
+@pytest.mark.parametrize("five", [0.0, 1e-12, 1e-7, math.pi])
+def test_rare_case_is_left_to_the_formulas(five: float) -> None:
+    solver = closed_form(UR5E)
+    q = np.array([0.3, -1.0, 1.2, 0.4, five, 0.6])
+    written, by_cases = both(solver, q)
+    assert written is None
+    assert solver.solve(forward(UR5E, q), q.tolist()) == by_cases
+
+
+@pytest.mark.parametrize("joint", [3, 5])
+def test_free_angle_of_a_singular_wrist_is_that_of_the_caller(joint: int) -> None:
+    q = np.array([0.3, -0.9, 1.2, 0.4, 0.0, 0.6])
+    written, _ = both(closed_form(KR_6), q)
+    assert min(abs(each[joint] - q[joint]) for each in written) < 1e-9
+
+
+def test_products_with_zero_and_one_vanish_and_equal_terms_are_computed_once() -> None:
+    trace = Trace()
+    a, b = trace.term("a"), trace.term("b")
+    assert 0.0 * a + 1.0 * b is b
+    assert b + 0.0 is b
+    assert b - 0.0 is b
+    negative = -a
+    assert -negative is a
+    assert a * 0.0 == 0.0
+    assert a - b is -(b - a)
+    assert a + -b is a - b
+    assert np.float64(1.0) * a is a
+    assert a * b is a * b
+    text = trace.text("a, b = rows", [[a * b + a * b, -2.0 * (-a)]])
+    assert text.count("a * b") == 1
+    assert compiled(text)((3.0, 5.0), ()) == [(30.0, 6.0)]
+
+
+def test_only_the_value_that_a_condition_selects_is_computed() -> None:
+    trace = Trace()
+    operations = trace.operations()
+    a = trace.term("a")
+    root = operations.root(a)
+    chosen = operations.select(a <= 0.0, 1.0, 1.0 / a)
+    solve = compiled(trace.text("a, = rows", [[root, chosen]]))
+    assert solve((0.0,), ()) == [(0.0, 1.0)]
+    assert solve((4.0,), ()) == [(2.0, 0.25)]
+    assert operations.select(True, a, root) is a
+    assert operations.bounded(2.0) == 1.0
+    assert operations.hypot(3.0, 4.0) == 5.0
+
+
+@pytest.mark.parametrize(
+    ("span", "angles", "expected"),
+    [
+        ((-math.pi, math.pi), (3.0, -3.0), (3.0, -3.0)),
+        ((0.0, math.tau), (4.0, 1.0), (4.0 - math.tau, 1.0)),
+        ((-math.tau, 0.0), (-4.0, -1.0), (math.tau - 4.0, -1.0)),
+        ((-9.0, 9.0), (9.0, -9.0), (9.0 - math.tau, math.tau - 9.0)),
+        ((0.0, 16.0), (16.0, 1.0), (16.0 - 3.0 * math.tau, 1.0)),
+    ],
+)
+def test_angle_is_brought_into_a_turn_from_where_it_can_be(
+    span: tuple[float, float], angles: tuple[float, ...], expected: tuple[float, ...]
+) -> None:
+    trace = Trace()
+    a = trace.term("a", span=span)
+    solve = compiled(trace.text("a, = rows", [[trace.turned(a, -math.pi, math.pi)]]))
+    for angle, turned in zip(angles, expected, strict=True):
+        assert solve((angle,), ())[0][0] == pytest.approx(turned, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("limits", "angle", "expected"),
+    [
+        ((-4.0, 1.0), 2.9, 2.9 - math.tau),
+        ((-4.0, 1.0), 2.0, 2.0),
+        ((-1.0, 4.0), -2.9, math.tau - 2.9),
+        ((-math.pi, 3.0), math.pi, -math.pi),
+        ((-1.0, 1.0), 2.0, 2.0),
+        ((-7.0, 7.0), 3.0, 3.0),
+    ],
+)
+def test_angle_is_brought_into_the_turn_inside_its_limits(
+    limits: tuple[float, float], angle: float, expected: float
+) -> None:
+    trace = Trace()
+    a = trace.term("a", span=(-math.pi, math.pi))
+    solve = compiled(trace.text("a, = rows", [[trace.turned(a, *limits)]]))
+    assert solve((angle,), ())[0][0] == pytest.approx(expected, abs=1e-15)
