@@ -207,6 +207,29 @@ def test_a_joint_beside_a_tool_frame_is_a_finger(tmp_path: Path) -> None:
     assert arm.gripper.moves
 
 
+@pytest.mark.parametrize(
+    ("links", "tools"),
+    [
+        (("flange", "tool0"), ["tool0", "flange"]),
+        (("tool0", "gripper_tcp"), ["gripper_tcp", "tool0"]),
+        (("panda_hand", "panda_hand_tcp"), ["panda_hand_tcp"]),
+        (("px/ee_gripper_link", "px/fingers_link"), ["px/ee_gripper_link"]),
+        (("left_tool0", "left_camera"), ["left_tool0"]),
+        (("tool_frame", "end_effector_link"), ["end_effector_link", "tool_frame"]),
+        (("ee_link", "tool0"), ["ee_link", "tool0"]),
+        (("wedge", "mytool0"), ["mytool0"]),
+    ],
+)
+def test_tool_is_the_link_that_its_maker_calls_so(
+    tmp_path: Path, links: tuple[str, str], tools: list[str]
+) -> None:
+    one, other = links
+    frames = [J("a", "fixed", "hand", one), J("b", "fixed", one, other, (0.1, 0.0, 0.0))]
+    arm = load(written(tmp_path, "arm", [*PX150[:5], *frames])).require_arm()
+    assert list(arm.tools) == tools
+    assert arm.default_tool == tools[0]
+
+
 def test_a_wheeled_base_does_not_hide_its_arm(tmp_path: Path) -> None:
     wheels = [
         J(f"wheel_{n}", "continuous", "base", f"w{n}", axis=(0.0, 1.0, 0.0)) for n in range(4)

@@ -10,8 +10,21 @@ from pathlib import Path
 from katana450.arm.robot.urdf import Urdf, UrdfJoint
 from katana450.errors import RobotDescriptionError
 
-TOOL_FRAMES = ("tcp", "grasp", "flange")
-"""Links to which targets can refer, if the file has them; the first is the default."""
+TOOL_FRAMES = (
+    *("tcp", "grasp", "gripper_frame_link", "ee_gripper_link"),
+    *("end_effector_link", "tool_frame", "tool_link", "ee_link", "link_eef", "link_ee"),
+    *("tool0", "flange"),
+)
+"""Links to which targets can refer, if the file has them; the first is the default.
+
+Points between the fingers come first, then ends of the arm, then the place where a tool is mounted:
+``tool0`` by the convention of ROS-Industrial, with z out of the flange. The names are those of the
+descriptions of Universal Robots, Franka, KUKA, Kinova, UFACTORY, ROBOTIS, Trossen and LeRobot. A
+prefix that ends in ``_`` or ``/`` is that of one of several robots, or of the hand.
+"""
+
+OWN_TOOL_FRAMES = ("tcp", "grasp", "flange")
+"""Tool links by which a file shows that its other joints are fingers."""
 
 TURNING = ("revolute", "continuous")
 """Types of joints of an arm; a continuous one gets half a turn in each direction."""
@@ -41,7 +54,8 @@ class Structure:
     Attributes:
         axes: the turning joints that carry the tool, from the root.
         tools: the tool links, the default one first.
-        chosen: whether the default tool is only the outermost link, because no tool is named.
+        chosen: whether the default tool is found by the names of other makers or as the outermost
+            link, so that fingers are assumed.
         hand: every movable joint behind the last axis, parents first.
         others: every other movable joint.
     """
@@ -80,7 +94,7 @@ def structure_of(
         for link in urdf.links
         if tree.movable_to(link) == axes and all(_carries(j) for j in tree.joints_to(link))
     }
-    named = [link for link in TOOL_FRAMES if link in carried]
+    named = [link for frame in TOOL_FRAMES for link in carried if _is_called(link, frame)]
     if tool is not None:
         tools = [tool, *(link for link in named if link != tool)]
     else:
@@ -88,7 +102,7 @@ def structure_of(
         tools = named or [max(carried, key=lambda link: (carried[link], leaf[link]))]
     hand = [j for link in tree.order(axes[-1].child) for j in tree.below.get(link, ()) if _moves(j)]
     others = [j for j in urdf.joints.values() if _moves(j) and j not in axes and j not in hand]
-    chosen = tool is None and not named
+    chosen = tool is None and tools[0] not in OWN_TOOL_FRAMES
     return Structure(tuple(axes), tuple(tools), chosen, tuple(hand), tuple(others))
 
 
@@ -151,6 +165,11 @@ class _Tree:
             passed.append(leader.name)
             leader = self.joints.get(leader.mimic.joint)
         return leader
+
+
+def _is_called(link: str, frame: str) -> bool:
+    """Return whether ``link`` is called ``frame``, with or without a prefix."""
+    return link == frame or link.endswith((f"_{frame}", f"/{frame}"))
 
 
 def _moves(joint: UrdfJoint) -> bool:
