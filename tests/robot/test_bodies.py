@@ -10,7 +10,9 @@ import trimesh
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import find_arm
 from katana450.extensions.bodies.robot_world import robot_world
+from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld
 from tests.exchange.trees import tree
 from tests.robot.hands import hand, rail
@@ -84,6 +86,75 @@ def test_neighbours_are_found_across_links_without_shapes(tmp_path: Path) -> Non
         assert frozenset((f"{finger}_link1", f"{finger}_link2")) not in found
         assert frozenset(("palm", f"{finger}_link2")) in found
     assert frozenset(("finger1_link1", "finger2_link1")) in found
+
+
+def folded(height: float) -> str:
+    """Return an arm that is folded at zero: its forearm hangs beside its upper arm to the post.
+
+    height: of the post [m]; a low one does not reach the forearm. A cuff around the elbow rolls
+    with the tool, so it touches the upper arm in every posture.
+    """
+    links = {
+        "post": ((0.0, 0.0, 0.5 * height), (0.06, 0.06, height)),
+        "upper": ((0.0, 0.0, 0.15), (0.04, 0.04, 0.3)),
+        "forearm": ((0.045, 0.0, -0.17), (0.04, 0.04, 0.28)),
+        "cuff": ((0.0, 0.0, 0.0), (0.06, 0.08, 0.06)),
+    }
+    joints = (
+        ("pan", "base", "post", (0.0, 0.0, 0.0), "0 0 1", 3.0),
+        ("lift", "post", "upper", (0.0, 0.0, 0.1), "0 1 0", 2.0),
+        ("bend", "upper", "forearm", (0.0, 0.0, 0.3), "0 1 0", 2.8),
+        ("roll", "forearm", "cuff", (0.0, 0.0, 0.0), "0 0 1", 3.0),
+    )
+    parts = ['<robot name="folded"><link name="base"/>']
+    for name, (at, size) in links.items():
+        x, y, z = at
+        a, b, c = size
+        parts.append(
+            f'<link name="{name}"><collision><origin xyz="{x} {y} {z}"/>'
+            f'<geometry><box size="{a} {b} {c}"/></geometry></collision></link>'
+        )
+    for name, above, link, (x, y, z), axis, end in joints:
+        parts.append(
+            f'<joint name="{name}" type="revolute"><parent link="{above}"/><child link="{link}"/>'
+            f'<origin xyz="{x} {y} {z}"/><axis xyz="{axis}"/>'
+            f'<limit lower="-{end}" upper="{end}" velocity="1" effort="1"/></joint>'
+        )
+    parts.append(
+        '<link name="tool0"/><joint name="tip" type="fixed"><parent link="cuff"/>'
+        '<child link="tool0"/><origin xyz="0.045 0 -0.35"/></joint></robot>'
+    )
+    return "".join(parts)
+
+
+def test_parts_that_touch_at_zero_and_are_apart_at_home_are_checked(tmp_path: Path) -> None:
+    path = tmp_path / "folded.urdf"
+    path.write_text(folded(0.16))
+    robot = load(path, find=find_arm)
+    world, notes = robot_world(robot)
+    assert world is not None
+    assert frozenset(("post", "forearm")) in pairs(world)
+    assert frozenset(("upper", "cuff")) not in pairs(world)
+    assert notes == ("Not checked, because they touch at rest: upper and cuff.",)
+    arm = robot.require_arm()
+    # Folded, the forearm is in the post; at Home it is not.
+    for q, meet in ((np.zeros(4), True), (arm.ready(()), False)):
+        nearest = world.nearest(np.append(q, 0.0))
+        assert (nearest is not None and nearest.distance < STOP) == meet
+    # Driven joint by joint the robot has no Home, so what touches at zero is not checked.
+    world, notes = robot_world(load(path))
+    assert world is not None
+    assert frozenset(("post", "forearm")) not in pairs(world)
+    assert "post and forearm" in notes[0]
+
+
+def test_parts_that_are_apart_at_zero_are_checked_as_before(tmp_path: Path) -> None:
+    path = tmp_path / "folded.urdf"
+    path.write_text(folded(0.05))
+    world, notes = robot_world(load(path, find=find_arm))
+    assert world is not None
+    assert frozenset(("post", "forearm")) in pairs(world)
+    assert notes == ("Not checked, because they touch at rest: upper and cuff.",)
 
 
 @pytest.mark.parametrize("form", ["obj", "stl", "dae", "ply"])

@@ -23,7 +23,7 @@ class RestPairs(NamedTuple):
     Attributes:
         checked: the pairs that may meet.
         close: half of the distance at rest [m] of each of these that is nearer than ``STOP``.
-        touching: the pairs that touch or overlap at rest.
+        touching: the pairs that are not checked, because they touch or overlap at rest.
     """
 
     checked: list[tuple[int, int]]
@@ -31,12 +31,16 @@ class RestPairs(NamedTuple):
     touching: list[tuple[int, int]]
 
 
-def pairs_at_rest(linkage: Linkage, parts: Sequence[Part], x: FloatArray) -> RestPairs:
+def pairs_at_rest(
+    linkage: Linkage, parts: Sequence[Part], x: FloatArray, home: FloatArray | None = None
+) -> RestPairs:
     """Return the pairs of parts that may meet, judged by the posture at rest ``x`` (k,).
 
     Nothing is sampled, because no number of postures represents those of a hand with many joints.
     Two kinds of pairs are left out, with those that touch at ``x``: parts with one variable between
-    them, whose limits keep them apart, and parts between which the tree has no other part.
+    them, whose limits keep them apart, and parts between which the tree has no other part. Parts
+    that touch at ``x`` are checked nevertheless if they are at least ``STOP`` apart at ``home``
+    (k,): an arm that is folded at ``x`` brings parts together that can meet in use.
     """
     above = _parts_above(linkage, parts)
     candidates = [
@@ -46,20 +50,32 @@ def pairs_at_rest(linkage: Linkage, parts: Sequence[Part], x: FloatArray) -> Res
         and parts[a].mover != above[b]
         and parts[b].mover != above[a]
     ]
-    world = CollisionWorld(linkage, parts, candidates)
-    placed, nearest = world.at(x), dict.fromkeys(candidates, np.inf)
-    for pair in placed.nearer_than(STOP)[0].tolist():
-        owner = int(world.part_of[world.first[pair]]), int(world.part_of[world.second[pair]])
-        nearest[owner] = min(nearest[owner], placed.distance(pair))
+    nearest = _nearest(linkage, parts, candidates, x)
+    touching = [pair for pair, distance in nearest.items() if distance < TOUCH_DISTANCE]
+    if home is not None and touching:
+        then = _nearest(linkage, parts, touching, home)
+        touching = [pair for pair, distance in then.items() if distance < STOP]
     return RestPairs(
-        [pair for pair, distance in nearest.items() if distance >= TOUCH_DISTANCE],
+        [pair for pair in candidates if pair not in touching],
         {
             pair: 0.5 * distance
             for pair, distance in nearest.items()
             if TOUCH_DISTANCE <= distance < STOP
         },
-        [pair for pair, distance in nearest.items() if distance < TOUCH_DISTANCE],
+        touching,
     )
+
+
+def _nearest(
+    linkage: Linkage, parts: Sequence[Part], pairs: Sequence[tuple[int, int]], x: FloatArray
+) -> dict[tuple[int, int], float]:
+    """Return the distance [m] of each pair at ``x`` (k,), or infinity from ``STOP`` on."""
+    world = CollisionWorld(linkage, parts, pairs)
+    placed, nearest = world.at(x), dict.fromkeys(pairs, np.inf)
+    for pair in placed.nearer_than(STOP)[0].tolist():
+        owner = int(world.part_of[world.first[pair]]), int(world.part_of[world.second[pair]])
+        nearest[owner] = min(nearest[owner], placed.distance(pair))
+    return nearest
 
 
 def _parts_above(linkage: Linkage, parts: Sequence[Part]) -> list[int]:

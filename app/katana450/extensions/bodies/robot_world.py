@@ -14,6 +14,7 @@ from katana450.extensions.bodies.pieces import pieces
 from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.settings import Settings
 
 
 def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
@@ -28,7 +29,7 @@ def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
     touching: list[str] = []
 
     def make(linkage: Linkage, parts: Sequence[Part]) -> CollisionWorld:
-        found = pairs_at_rest(linkage, parts, _at_rest(robot))
+        found = pairs_at_rest(linkage, parts, _at_rest(robot), _at_home(robot))
         touching.extend(f"{parts[a].name} and {parts[b].name}" for a, b in found.touching)
         return CollisionWorld(linkage, parts, found.checked, found.close)
 
@@ -45,3 +46,10 @@ def _at_rest(robot: Robot) -> FloatArray:
         return np.append(robot.joint_group.ready, 0.0)
     chain, gripper = robot.arm.chain, robot.arm.gripper
     return np.append(np.clip(0.0, chain.lower, chain.upper), gripper.clamp(0.0))
+
+
+def _at_home(robot: Robot) -> FloatArray | None:
+    """Return x where an arm starts and Home leads; None for a robot that is driven by joints."""
+    if robot.arm is None:
+        return None
+    return np.append(robot.arm.ready(Settings.ready), robot.arm.gripper.clamp(0.0))
