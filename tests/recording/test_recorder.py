@@ -41,7 +41,7 @@ from tests.conftest import LONG
 from tests.gateway.client import ask, enter
 from tests.recording.recorded import header, run
 
-KILLS = 50 if LONG else 1
+KILLS = 5 if LONG else 1
 RECORDER = "katana450 rec"
 MAX_LOSS = 1.1
 """[s] Maximum time at the end of a recording that a kill can lose."""
@@ -253,6 +253,41 @@ def test_disk_that_takes_nothing_is_reported_in_the_next_file(
     assert b'"missing"' in first.data
     assert b'"ticks":21' in first.data
     assert verified(path) > 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of a process")
+def test_ticks_that_a_full_disk_did_not_take_are_counted(folder: Path) -> None:
+    """They were given to the file, but the sync failed; so was the note of those before."""
+    import resource  # noqa: PLC0415 - not on Windows
+
+    now = [0.0]
+    kept = Ring(folder, header(), lambda: now[0])
+    records: list[TickRecord] = []
+    run(400, 6, records.append, odd=False)
+    kept.put_all(records[:100])
+    kept.sync()
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for place in (100, 140, 180):
+        now[0] += ring.RETRY_SECONDS
+        kept.put_all(records[place : place + 40])
+        (*_, path) = recordings_in(folder)
+        size = path.stat().st_size
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size + 100, before[1]))
+        try:
+            kept.sync()
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert "Nothing is recorded now" in kept.problem
+    now[0] += ring.RETRY_SECONDS
+    kept.put_all(records[220:260])
+    kept.sync()
+    kept.close()
+    (*_, path) = recordings_in(folder)
+    with RecordingFile.open(path) as file:
+        found = json.loads(next(iter(file.messages(COMMANDS))).data)
+    assert found["ticks"] == 120
+    assert "The disk took nothing: File too large" in found["missing"]
+    assert len(tick_times(path)) == 1 + 40
 
 
 def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyPatch) -> None:

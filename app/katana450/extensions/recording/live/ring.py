@@ -61,6 +61,8 @@ class Ring:
         self._writer: RecordingWriter | None = None
         self._ticks = 0
         self._lost, self._lost_why = 0, ""
+        # Ticks since the last sync, also those of which only the loss is noted.
+        self._unwritten = 0
         self._retry_at = float("-inf")
         self._before: State | None = None
         self._newest = ""
@@ -93,6 +95,7 @@ class Ring:
         try:
             if self._lost:
                 self._writer.lost(record.t, self._lost, self._lost_why)
+                self._unwritten += self._lost
                 self._lost = 0
             self._writer.put(record)
             self._note_findings(record)
@@ -103,6 +106,7 @@ class Ring:
             self._lost += 1
             return
         self._ticks += 1
+        self._unwritten += 1
         self.unsynced = True
         self.last_t = record.t
 
@@ -167,6 +171,7 @@ class Ring:
             os.fsync(self._file.fileno())
             full = self._file.tell() >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
             self.problem = ""
+            self._unwritten = 0
         except OSError as error:
             self._fail(error)
             return
@@ -214,6 +219,8 @@ class Ring:
     def _fail(self, error: OSError) -> None:
         """Give up the present file; what was synced of it can be recovered."""
         self._report(error)
+        self._lost += self._unwritten
+        self._unwritten = 0
         self._lost_why = f"The disk took nothing: {error.strerror or error}."
         self.problem = f"Nothing is recorded now: {error.strerror or error}. Free some disk space."
         self._retry_at = self._clock() + RETRY_SECONDS

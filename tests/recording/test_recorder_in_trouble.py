@@ -1,0 +1,221 @@
+"""A server whose recording is killed in mid-motion, hangs, or has a full disk: nothing waits."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import katana450
+from katana450.cli.main import main
+from katana450.client import RefusedError, connect
+from katana450.extensions.recording.files.keeping import whole_copy
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.live import record_end, ring
+from katana450.extensions.recording.places import recordings_in
+from katana450.extensions.recording.topics import COMMANDS
+from katana450.server.api import answers, requests
+from tests.browser.server import RECORDING_APP, AppServer, ServerError
+from tests.conftest import LONG
+from tests.recording.recorded import PERIOD
+from tests.recording.test_recorder import MAX_LOSS, POSTURES, RECORDER, tick_times, waited_for
+
+KILLS = 50 if LONG else 1
+
+SMALL_DISK = 'mount -t tmpfs -o size=1m none {folder} && exec "$@"'
+"""Command of a shell that begins with a disk of 1 MB at a folder."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "ring"
+
+
+def command(folder: Path) -> tuple[str, ...]:
+    return (*RECORDING_APP, "--silence", "2.0", "--no-idle-planning", "--record", str(folder))
+
+
+@contextmanager
+def swinging(server: AppServer) -> Iterator[None]:
+    """Turn the arm to and fro without a rest inside the block."""
+    ended = threading.Event()
+
+    def swing() -> None:
+        with connect(server.url, "Ada") as arm:
+            for number in range(10_000):
+                with suppress(RefusedError):
+                    arm.ask(requests.Joints(q=list(POSTURES[number % 2])))
+                if ended.wait(0.6):
+                    break
+
+    thread = threading.Thread(target=swing)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def recorder(server: AppServer) -> int | None:
+    """Return the id of the process that records; None while there is none."""
+    with suppress(ServerError, OSError):
+        return server.child(RECORDER)
+    return None
+
+
+def whole_times(path: Path, copy: Path) -> list[float]:
+    """Return the times of the ticks in ``path``, which may have no end yet."""
+    found = whole_copy(path, copy)
+    if found is None:
+        return []
+    with suppress(katana450.InputError):
+        return tick_times(found)
+    return []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_recorder_killed_in_motion_loses_a_second(folder: Path, tmp_path: Path) -> None:
+    """The next tick that is recorded follows the last one by 1.1 s at most."""
+    chance, gaps = random.Random(1), []
+    with AppServer(command(folder)) as server, swinging(server):
+        waited_for(lambda: recordings_in(folder), "the first file", 60.0)
+        for _ in range(KILLS):
+            time.sleep(chance.uniform(0.7, 2.5))
+            before, killed = recordings_in(folder)[-1], recorder(server)
+            assert killed is not None
+            os.kill(killed, signal.SIGKILL)
+            waited_for(lambda old=before: recordings_in(folder)[-1] != old, "a new file", 60.0)  # type: ignore[misc]
+            copy = tmp_path / "copy.mcap"
+            waited_for(partial(whole_times, recordings_in(folder)[-1], copy), "ticks", 60.0)
+            broken, after = recordings_in(folder)[-2:]
+            assert broken == before
+            gaps.append(whole_times(after, copy)[0] - tick_times(broken)[-1])
+    assert max(gaps) <= MAX_LOSS, gaps
+    # Something was lost each time, so the kills were in the motion.
+    assert min(gaps) > 0.0
+
+
+def gap_of(path: Path) -> tuple[float, int, str]:
+    """Return length [s], number of ticks and reason of the only gap in ``path``."""
+    before, gaps = 0.0, []
+    with RecordingFile.open(path) as file:
+        for message in file.messages(COMMANDS):
+            found = json.loads(message.data)
+            if "missing" in found:
+                gaps.append((found["t"] - before, found["ticks"], found["missing"]))
+            before = found["t"]
+    ((length, ticks, why),) = gaps
+    return length, ticks, why
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGSTOP")
+def test_recorder_that_hangs_delays_no_tick(folder: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "kept.mcap"
+    with AppServer(command(folder)) as server, swinging(server):
+        waited_for(lambda: recordings_in(folder), "the first file", 60.0)
+        process = recorder(server)
+        assert process is not None
+        with server.frozen(process), connect(server.url, "Look") as look:
+            # What the arm's process and the pipe hold, and 5 s more.
+            time.sleep(PERIOD * record_end.MAX_WAITING + 8.0)
+            timing = look.query(answers.Loop)
+        # A tick that waited for its reader would be late by seconds.
+        assert timing.late_p50 < PERIOD
+        waited_for(lambda: "were not recorded" in server.output, "the report", 60.0)
+        time.sleep(2.0)
+    assert "could not keep up" in server.output
+    assert main(["record", "keep", str(folder), "--out", str(kept)]) == 0
+    length, ticks, why = gap_of(kept)
+    assert "could not keep up" in why
+    assert 0.5 * length < ticks * PERIOD < length + 0.5
+    result = katana450.open(kept).verify()
+    assert result.identical
+    assert result.unknown == ticks
+
+
+def mounted(folder: Path, line: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Return ``line`` with a disk of 1 MB at ``folder``; None where that is not allowed."""
+    folder.mkdir()
+    found = ("unshare", "-rm", "sh", "-c", SMALL_DISK.format(folder=folder), "sh")
+    with suppress(OSError):
+        if subprocess.run([*found, "true"], capture_output=True, check=False).returncode == 0:
+            return (*found, *line)
+    return None
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of other processes")
+@pytest.mark.parametrize("disk", ["full", "limited"])
+def test_full_disk_delays_no_tick_and_is_reported(folder: Path, tmp_path: Path, disk: str) -> None:
+    line = command(folder)
+    if disk == "full":
+        found = mounted(folder, line)
+        if found is None:
+            pytest.skip("no file system can be mounted here; `limited` shows the same")
+        line = found
+    with AppServer(line) as server, swinging(server):
+        there = Path(f"/proc/{server.pid}/root/{folder}")
+        waited_for(lambda: recordings_in(there), "the first file", 60.0)
+        first, copy = recordings_in(there)[0], tmp_path / "copy.mcap"
+        waited_for(lambda: whole_times(first, copy), "its first ticks", 60.0)
+        process = recorder(server)
+        assert process is not None
+        fill, free = actions(disk, process, there)
+        fill()
+        waited_for(lambda: "is interrupted" in server.output, "the report", 60.0)
+        with connect(server.url, "Look") as look:
+            time.sleep(1.0)
+            begin = look.query(answers.State)
+            time.sleep(ring.RETRY_SECONDS)
+            end, timing = look.query(answers.State), look.query(answers.Loop)
+        assert end.t - begin.t > 0.8 * ring.RETRY_SECONDS
+        assert timing.late_p50 < PERIOD
+        free()
+        newest = recordings_in(there)[-1].name
+
+        def again() -> bool:
+            last = recordings_in(there)[-1]
+            return last.name > newest and bool(whole_times(last, copy))
+
+        waited_for(again, "a file after it", 60.0)
+        kept = tmp_path / "kept.mcap"
+        assert main(["record", "keep", str(there), "--out", str(kept)]) == 0
+        reason = {"full": "No space left on device", "limited": "File too large"}[disk]
+        assert f"is interrupted: {reason}" in server.output
+    length, ticks, why = gap_of(kept)
+    assert f"The disk took nothing: {reason}" in why
+    # An arm that rests for a moment on a busy machine makes no ticks.
+    assert 0.5 * length < ticks * PERIOD < length + 0.7
+    assert katana450.open(kept).verify().identical
+
+
+def actions(
+    disk: str, process: int, folder: Path
+) -> tuple[Callable[[], object], Callable[[], object]]:
+    """Return what fills the disk of ``folder`` for ``process``, and what frees it again."""
+    if disk == "full":
+        filler = folder / "filler"
+
+        def fill() -> None:
+            with suppress(OSError), filler.open("wb", buffering=0) as file:
+                while True:
+                    file.write(bytes(4096))
+
+        return fill, filler.unlink
+    unlimited = resource.RLIM_INFINITY
+    limit = partial(resource.prlimit, process, resource.RLIMIT_FSIZE)
+    return partial(limit, (1000, unlimited)), partial(limit, (unlimited, unlimited))
