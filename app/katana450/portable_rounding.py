@@ -1,9 +1,9 @@
 """Environment of processes in which numbers are rounded alike on every x86-64 processor.
 
-OpenBLAS and glibc's libm choose other code for other processors, with sums in another order and
-with or without fused multiply-add. The last bits of a result then depend on the machine. With these
-variables both use the code that every x86-64 processor runs. They are read when a process begins,
-so they are for processes that are yet to be started.
+OpenBLAS, numpy and glibc's libm choose other code for other processors, with sums in another order
+and with or without fused multiply-add. The last bits of a result then depend on the machine. With
+these variables they use the code that every x86-64 processor runs. They are read when a process
+begins, so they are for processes that are yet to be started.
 """
 
 from __future__ import annotations
@@ -23,6 +23,11 @@ BLAS_CORE = "Nehalem"
 LIBM = "GLIBC_TUNABLES"
 LIBM_CHOICE = "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"
 
+NUMPY = "NPY_DISABLE_CPU_FEATURES"
+NUMPY_CHOICE = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR AVX2 FMA3 AVX512F AVX512_SKX"
+"""All extensions with code of their own for sine and others in numpy 2.1 and later. Those that a
+version or a processor lacks are left out by numpy."""
+
 
 def can_round_portably() -> bool:
     """Return whether this processor is one of those that can round alike."""
@@ -40,7 +45,7 @@ def portable_rounding(environment: Mapping[str, str]) -> dict[str, str]:
         if not tunables.endswith(LIBM_CHOICE):
             # The last one counts.
             found[LIBM] = f"{tunables}:{LIBM_CHOICE}".lstrip(":")
-        found[BLAS] = BLAS_CORE
+        found[BLAS], found[NUMPY] = BLAS_CORE, NUMPY_CHOICE
     return found
 
 
@@ -57,7 +62,7 @@ matter."""
 @contextmanager
 def starting_portable_processes() -> Iterator[None]:
     """Let processes that are started in the block round alike on all processors."""
-    before = {name: os.environ.get(name) for name in (BLAS, LIBM)}
+    before = {name: os.environ.get(name) for name in (BLAS, LIBM, NUMPY)}
     os.environ.update(portable_rounding(os.environ))
     try:
         yield

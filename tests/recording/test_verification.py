@@ -15,6 +15,7 @@ import pytest
 
 import katana450
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import Reason
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
@@ -57,6 +58,9 @@ def test_random_session_is_identical_to_the_bit(path: Path, records: list[TickRe
     assert any(each.failed for each in records)
     assert sum(each.state.following is not None for each in records) > 40
     assert any(r.t_before != b.state.t for b, r in pairwise(records))
+    if LONG:
+        assert any(found.reason is Reason.CONTACT for r in records for found in r.state.findings)
+        assert any(r.state.poured and r.state.poured.water.parcels for r in records)
     with RecordingFile.open(path) as file:
         result = verify_recording(file, fresh().session)
     assert str(result) == f"identical to the bit over {len(records) - 1} ticks"

@@ -12,7 +12,7 @@ import math
 import platform
 import struct
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,12 @@ from katana450.portable_rounding import ROUNDS_PORTABLY
 
 RELEVANT = (
     *("version", "python", "numpy", "blas", "blas_core", "libc", "machine", "cpu"),
-    *("libm_rounding", "blas_rounding"),
+    *("libm_rounding", "blas_rounding", "numpy_rounding"),
 )
 """Entries that show why a simulation may not give the same bits."""
+
+OF_PROCESS = ("blas_core", "libm_rounding", "blas_rounding", "numpy_rounding")
+"""Those that the environment of a process changes."""
 
 PROBES = 2000
 """Number of arguments with which the rounding of functions is tried."""
@@ -53,16 +56,20 @@ def fingerprint() -> dict[str, str]:
         ROUNDING: PORTABLE if ROUNDS_PORTABLY else "of the processor",
         "libm_rounding": _libm_rounding(),
         "blas_rounding": _blas_rounding(),
+        "numpy_rounding": _numpy_rounding(),
     }
 
 
-def differences(recorded: Mapping[str, str]) -> list[str]:
-    """Return in words what in ``recorded`` differs from this machine, of the relevant entries."""
+def differences(recorded: Mapping[str, str], left_out: Collection[str] = ()) -> list[str]:
+    """Return in words what in ``recorded`` differs from this machine, of the relevant entries.
+
+    ``left_out``: entries that do not count.
+    """
     here = fingerprint()
     return [
         f"{name}: {recorded.get(name, UNKNOWN)} there, {here[name]} here"
         for name in RELEVANT
-        if recorded.get(name, UNKNOWN) != here[name]
+        if name not in left_out and recorded.get(name, UNKNOWN) != here[name]
     ]
 
 
@@ -86,6 +93,13 @@ def _blas_rounding() -> str:
             digest.update(np.ascontiguousarray(result).tobytes())
         digest.update(np.linalg.lstsq(A, numbers[:20], rcond=None)[0].tobytes())
     return digest.hexdigest()[:HASH_DIGITS]
+
+
+def _numpy_rounding() -> str:
+    """Return a hash of functions of whole arrays, for which numpy has code of its own."""
+    x = np.arange(1.0, 1.0 + PROBES) / 317.0
+    results = (np.sin(x), np.cos(x), np.tan(x), np.arctan2(x, 3.0), np.exp(-x), np.log(x), x**0.3)
+    return hashlib.sha256(b"".join(each.tobytes() for each in results)).hexdigest()[:HASH_DIGITS]
 
 
 def _blas() -> str:

@@ -17,12 +17,12 @@ from katana450.extensions.recording.datasets.export_command import check_options
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_command import episodes
 from katana450.extensions.recording.episodes.episode_file import episodes_in
-from katana450.extensions.recording.files.fingerprint import differences
+from katana450.extensions.recording.files.fingerprint import OF_PROCESS, differences
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.trimming import Trimmed, trim
-from katana450.extensions.recording.files.verifying import verified
+from katana450.extensions.recording.files.verifying import simulates_apart, verified
 from katana450.extensions.recording.places import recordings_in
 
 PROGRESS_STEP = 0.02
@@ -111,7 +111,8 @@ def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
             raise InputError(f"{path} has no tick that can be simulated.")
         if result.identical:
             return 0
-        others = differences(file.metadata)
+        # The process that simulated it rounds as the one that recorded it.
+        others = differences(file.metadata, OF_PROCESS if simulates_apart(file) else ())
         if others:
             print("It was made by another program or machine, whose rounding can differ:")
             for each in others:

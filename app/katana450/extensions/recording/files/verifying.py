@@ -37,12 +37,17 @@ def verified(
         RobotDescriptionError: the files of the robot cannot be read.
     """
     with RecordingFile.open(path) as file:
-        portable = file.metadata.get(ROUNDING) == PORTABLE
-        if portable and can_round_portably() and not ROUNDS_PORTABLY:
+        if simulates_apart(file):
             return _verified_apart(path, urdf, shows=progress is not None)
         start, length = file.start, file.end - file.start
         inner = None if progress is None else lambda t: progress(t - start, length)
         return verify_recording(file, session_for(file, urdf).session, inner)
+
+
+def simulates_apart(file: RecordingFile) -> bool:
+    """Return whether ``file`` is simulated in a process that rounds otherwise than this one."""
+    portable = file.metadata.get(ROUNDING) == PORTABLE
+    return portable and can_round_portably() and not ROUNDS_PORTABLY
 
 
 def _verified_apart(path: Path, urdf: Path | None, *, shows: bool) -> Verification:
