@@ -144,7 +144,7 @@ const Fit = (() => {
         const before = count;
         count = viewer()?.cameraControl && node("") ? corners().length : 0;
         steady = count && count === before ? steady + 1 : 0;
-        if (count || tries === TRIES - 1) drawn();
+        if ((count && Viser.isDrawn()) || tries === TRIES - 1) drawn();
         if (steady < STEADY && ++tries < TRIES) return;
         clearInterval(timer);
         if (count) new ResizeObserver(refit).observe(viewer().canvas);

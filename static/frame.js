@@ -15,8 +15,9 @@
   document.documentElement.dataset.loading = "";
   Viser.keepFocus();
   Viser.forgoCode();
+  Viser.hold();
   const sheet = new CSSStyleSheet();
-  sheet.replaceSync(`${Viser.STEADY}
+  sheet.replaceSync(`${Viser.STEADY} ${Viser.HELD}
     html[data-theme=dark] { color-scheme: dark; background: #14181d }
     html[data-used] ${Viser.HINT} { visibility: hidden !important }
     input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
@@ -150,6 +151,7 @@
   });
 
   window.katanaScene = { ...Viser, ...Fit };
+  Viser.start();
   Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

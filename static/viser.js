@@ -50,6 +50,59 @@ const Viser = (() => {
     );
   }
 
+  // Start viser's program as soon as the decoder of its messages, which it expects, is compiled, and
+  // the document is there.
+  async function start() {
+    const decoder = WebAssembly.compileStreaming(fetch("zstd.wasm"));
+    if (document.readyState === "loading")
+      await new Promise((done) => document.addEventListener("DOMContentLoaded", done));
+    window.__viserZstdWasm = await decoder;
+    await import("../viser/program.js");
+  }
+
+  // Draw nothing before the whole scene is there. viser draws each step on the way, compiles programs
+  // for it, and eases its panel into its place; the surrounding page covers all of it.
+  const HELD = "html[data-held] * { transition: none !important }";
+  const HOLD = 5000; // ms after the replay until which the scene is waited for
+  let held = false;
+  let since = null; // time of the end of the replay
+  function hold() {
+    const { documentElement } = document;
+    documentElement.dataset.held = "";
+    held = true;
+    const before = Object.getOwnPropertyDescriptor(window, "__viserMutable");
+    let mine;
+    Object.defineProperty(window, "__viserMutable", {
+      configurable: true,
+      get: () => mine,
+      set(value) {
+        mine = value;
+        before?.set?.(value);
+        const { gl } = value.scene.__r3f.root.getState();
+        const render = gl.render;
+        gl.render = (scene, camera) => {
+          if (held && scene === value.scene && gl.getRenderTarget() === null) {
+            if (!isWhole()) return;
+            held = false;
+            delete documentElement.dataset.held;
+          }
+          render.call(gl, scene, camera);
+        };
+      },
+    });
+  }
+
+  // Whether all that the server shows, and the light of the room, is loaded.
+  function isWhole() {
+    if (since === null) return false;
+    if (performance.now() - since > HOLD) return true;
+    const { firstMessageBatch, messageQueue, nodeRefFromName: nodes, scene } = viewer();
+    if (firstMessageBatch || messageQueue.length) return false;
+    const hidden = [...shown].filter(([, visible]) => !visible).map(([name]) => name);
+    const isHidden = (name) => hidden.some((each) => name === each || name.startsWith(`${each}/`));
+    return [...shown.keys()].every((name) => nodes[name] || isHidden(name));
+  }
+
   // viser's socket is in a worker. `server` returns the address for it. `sends` gets each message of
   // the page and returns whether it is sent. `connected` and `hears` are called before the page gets
   // the same event. A line has `say`, which sends to the server, and `show`, which shows to the page.
@@ -78,6 +131,7 @@ const Viser = (() => {
               shown.set(name, visible);
               if (veiled?.(name)) message.visible = false;
             }
+            if (replayed(data.messages)) since ??= performance.now();
             hears(data.messages, this.#line);
           }
         });
@@ -225,7 +279,9 @@ const Viser = (() => {
 
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
-    keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
+    HELD, start, hold, keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
+    // Return whether the scene has been drawn.
+    isDrawn: () => !held,
     // Return whether nodes are hidden in this page alone.
     isVeiled: () => veiled !== null,
     // Return {camera, canvas, cameraControl} of three.js once the page draws.

@@ -86,6 +86,50 @@ def test_page_offers_its_scene(page: ViserPage) -> None:
         assert ask(page, "Viser.node('/none') === undefined")
 
 
+def test_page_publishes_its_decoder(page: ViserPage) -> None:
+    with part("start"):
+        assert ask(page, "window.__viserZstdWasm instanceof WebAssembly.Module")
+        assert ask(page, "typeof Viser.start") == "function"
+
+
+HELD = """
+    window.drawings = [];
+    // After the harness has defined the same property, and before viser's program runs.
+    addEventListener("DOMContentLoaded", () => {
+        const before = Object.getOwnPropertyDescriptor(window, "__viserMutable");
+        let mine;
+        Object.defineProperty(window, "__viserMutable", {
+            configurable: true,
+            get: () => mine,
+            set(value) {
+                before.set(mine = value);
+                const { gl } = value.scene.__r3f.root.getState();
+                const render = gl.render;
+                gl.render = (scene, camera) => {
+                    const there = Boolean(value.nodeRefFromName["/box"]);
+                    if (scene === value.scene) drawings.push(there);
+                    render.call(gl, scene, camera);
+                };
+            },
+        });
+        CALL
+    });
+"""
+
+
+def test_page_draws_nothing_before_its_scene_is_whole(
+    server: AppServer, open_page: OpenPage
+) -> None:
+    with part("hold"), part("isDrawn"), part("HELD"):
+        page = open_page(server.url, nodes=NODES, script=script(HELD.replace("CALL", "")))
+        assert ask(page, "drawings.includes(false) && drawings.includes(true)")
+        held = HELD.replace("CALL", "Viser.hold();")
+        page = open_page(server.url, nodes=NODES, script=script(held))
+        assert ask(page, "drawings.length > 0 && !drawings.includes(false)")
+        assert ask(page, "Viser.isDrawn() && !document.documentElement.matches('[data-held]')")
+        assert ask(page, "Viser.HELD.includes('[data-held]')")
+
+
 def test_page_finds_what_is_under_a_pixel(page: ViserPage) -> None:
     def found(name: str, others: str = "") -> bool:
         """Return whether the ray to the middle of a node meets its surface."""

@@ -6,6 +6,8 @@ interface Window {
   katanaScene?: { pixelOf(place: string | number[]): number[] | null; fold?(): void };
   /** The state of viser's own client. */
   __viserMutable?: any;
+  /** The decoder of zstd that its program expects. */
+  __viserZstdWasm?: WebAssembly.Module;
 }
 interface Navigator {
   /** WebHID, which only some browsers have. */

@@ -63,9 +63,7 @@ def application(
     """Return the application with all routes of the port; ``provided``: those of the extensions."""
     static = static_files.load()
     index = static.pop("index.html")
-    viser = viser_page.load()
-    viser_file = static_files.File.of(viser.html, static_files.TYPES[".html"])
-    page_policy, viser_policy = security.page_policy(), viser_page.policy(viser.script_hashes)
+    page_policy = security.page_policy()
     bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, hub.clock())
 
     async def page(request: Request) -> Response:
@@ -78,15 +76,6 @@ def application(
             raise HTTPException(404)
         # A web worker has the policy of its own file.
         return found.answer(request, page_policy)
-
-    async def viser_index(request: Request) -> Response:
-        _signed_in(authenticator, request)
-        scheme = "wss" if address.cookies_are_secure else "ws"
-        origin = f"{scheme}://{request.headers['host']}"
-        why = viser_page.objection(request.query_params, origin)
-        if why is not None:
-            raise HTTPException(400, why)
-        return viser_file.answer(request, viser_policy)
 
     async def enter(request: Request) -> Response:
         """Sign in, with the token of an access link if the server requires one."""
@@ -123,7 +112,7 @@ def application(
     routes = [
         Route("/", page),
         Route("/static/{name:path}", file),
-        Route("/viser/", viser_index),
+        *_viser_routes(authenticator, address),
         Route("/enter", enter, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),
         _leave_route(hub, authenticator),
@@ -142,6 +131,27 @@ async def _muted(_request: Request, error: Exception) -> Response:
     assert isinstance(error, MutedError)
     retry = {"Retry-After": str(math.ceil(error.retry))}
     return PlainTextResponse(str(error), TOO_MANY, retry)
+
+
+def _viser_routes(authenticator: Authenticator, address: Address) -> list[Route]:
+    viser, policy = viser_page.load(), viser_page.policy()
+
+    async def page(request: Request) -> Response:
+        _signed_in(authenticator, request)
+        scheme = "wss" if address.cookies_are_secure else "ws"
+        origin = f"{scheme}://{request.headers['host']}"
+        why = viser_page.objection(request.query_params, origin)
+        if why is not None:
+            raise HTTPException(400, why)
+        return viser.html.answer(request, policy)
+
+    async def file(request: Request) -> Response:
+        found = viser.files.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        return found.answer(request)
+
+    return [Route("/viser/", page), Route("/viser/{name}", file)]
 
 
 def _control_route(hub: Hub, authenticator: Authenticator, budgets: Budgets) -> WebSocketRoute:

@@ -1,13 +1,17 @@
-"""viser's own page with our scripts before its own, and the hashes that allow its scripts."""
+"""viser's own page, unpacked, with our scripts before its own.
+
+viser's page unpacks itself in the browser, from its own attribute: the program is then compiled in
+one piece while nothing else happens. As a file of its own it is compiled while it arrives.
+"""
 
 from __future__ import annotations
 
 import base64
-import hashlib
+import gzip
 import io
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -20,9 +24,11 @@ import zstandard
 from PIL import Image
 from starlette.datastructures import QueryParams
 
+from katana450.disk_cache import kept
 from katana450.errors import ConfigurationError
 from katana450.server.viser_bridge.themes import THEMES, gradient
 from katana450.server.web.security import content_policy
+from katana450.server.web.static_files import File
 
 INDEX = Path(viser.__file__).parent / "client" / "build" / "index.html"
 
@@ -34,49 +40,69 @@ LOADER = re.compile(
 DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
 """Digits of the base 88 in which viser's page contains its packed program."""
 
+DECODER = re.compile(r'const gzWasm="((?:[^"\\]|\\.)*)"')
+"""The decoder of zstd in the loader, packed by gzip. viser's program expects it compiled."""
+
+PROGRAM, DECODER_FILE = "program.js", "zstd.wasm"
+"""Names of the files beside the page."""
+
+LOADING = f"""<link rel="modulepreload" href="{PROGRAM}">
+<link rel="preload" href="{DECODER_FILE}" as="fetch" crossorigin>"""
+"""Elements that load the files before ``static/viser.js`` needs them."""
+
 OUR_SCRIPTS = ("theme", "viser", "fields", "fit", "sheet", "names", "frame")
 """Names of our files in the order in which they run. The last one gets the themes."""
 
 
 @dataclass(frozen=True)
 class ViserPage:
-    """The page as it is served, and the hashes of its inline scripts."""
+    """The page as it is served, and the files beside it by name."""
 
-    html: bytes
-    script_hashes: tuple[str, ...]
+    html: File
+    files: Mapping[str, File]
 
 
 def load() -> ViserPage:
     """Read the page from the installed viser.
 
-    Its loader creates a script element with the program. A browser that runs only scripts with
-    known hashes therefore needs the hashes of both. Raises ConfigurationError if the page has
-    another structure.
+    Raises ConfigurationError if the page has another structure.
     """
-    html = INDEX.read_text(encoding="utf-8")
+    data = INDEX.read_bytes()
+
+    def unpacked() -> tuple[str, str, Mapping[str, File]]:
+        return _unpacked(data.decode())
+
+    head, rest, files = kept(unpacked, data, zstandard.__version__)
+    html = f"{head}{LOADING}{_our_scripts()}{rest}".encode()
+    return ViserPage(File.of(html, "text/html; charset=utf-8"), files)
+
+
+def _unpacked(html: str) -> tuple[str, str, Mapping[str, File]]:
+    """Return the page before and after the place of our scripts, and its files."""
     found = LOADER.search(html)
-    if found is None or html.count("<script") != 1:
+    decoder = DECODER.search("" if found is None else found[4])
+    if found is None or decoder is None or html.count("<script") != 1:
         raise ConfigurationError(
             f"{INDEX} is not the page of the pinned viser: install the pinned version."
         )
-    packed, style, program, loader = found.groups()
-    unpacked = zstandard.ZstdDecompressor().decompress(
-        _bytes(packed), max_output_size=int(style) + int(program)
-    )
-    ours = html[: found.start()] + _our_scripts() + html[found.start() :]
-    hashes = (_hash(loader.encode()), _hash(unpacked[int(style) :]))
-    return ViserPage(ours.encode(), hashes)
+    packed, style_size, size = found[1], int(found[2]), int(found[3])
+    decompress = zstandard.ZstdDecompressor().decompress
+    both = decompress(_bytes(packed), max_output_size=style_size + size)
+    style, program = both[:style_size].decode(), both[style_size:]
+    wasm = gzip.decompress(_bytes(decoder[1].replace("\\\\", "\\")))
+    files = {
+        PROGRAM: File.of(program, "text/javascript; charset=utf-8", zstd=True),
+        DECODER_FILE: File.of(wasm, "application/wasm"),
+    }
+    head, rest = html[: found.start()], html[found.end() :]
+    return f"{head}<style>{style}</style>", rest, files
 
 
-def policy(script_hashes: Sequence[str]) -> str:
-    """Return the content security policy of viser's page.
-
-    It allows the two scripts of the page by their hashes, and everything that they create.
-    """
+def policy() -> str:
+    """Return the content security policy of viser's page."""
     return content_policy(
         default=("'none'",),
-        script=("'self'", "'wasm-unsafe-eval'", "blob:", *script_hashes),
-        # The loader creates the style sheet.
+        script=("'self'", "'wasm-unsafe-eval'", "blob:"),
         style=("'unsafe-inline'",),
         img=("'self'", "data:", "blob:"),
         font=("data:",),
@@ -125,10 +151,6 @@ def _png(pixels: npt.NDArray[np.uint8]) -> str:
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, "png")
     return base64.b64encode(file.getvalue()).decode()
-
-
-def _hash(script: bytes) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script).digest()).decode()}'"
 
 
 def _bytes(text: str) -> bytes:

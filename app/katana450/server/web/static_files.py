@@ -8,6 +8,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import zstandard
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -20,24 +21,37 @@ TYPES = {
     ".svg": "image/svg+xml",
 }
 
+ZSTD_LEVEL = 19
+"""Level of compression by zstd."""
+
 COMMENT = re.compile(rb"^[ \t]*//.*$", re.MULTILINE)
 """Pattern of a comment that has a line of its own, in a script."""
 
 
 @dataclass(frozen=True)
 class File:
-    """A static file, ready to be sent. ``packed``: content compressed by gzip. ``tag``: ETag."""
+    """A static file, ready to be sent.
+
+    Attributes:
+        content: its content.
+        packed: content compressed by gzip.
+        media_type: type of its content.
+        tag: ETag.
+        zstd: content compressed by zstd, a fifth smaller and slow to make; None without.
+    """
 
     content: bytes
     packed: bytes
     media_type: str
     tag: str
+    zstd: bytes | None = None
 
     @classmethod
-    def of(cls, content: bytes, media_type: str) -> File:
-        """Return the file with ``content``."""
+    def of(cls, content: bytes, media_type: str, *, zstd: bool = False) -> File:
+        """Return the file with ``content``. ``zstd``: whether it is compressed by zstd too."""
         tag = f'"{hashlib.sha256(content).hexdigest()[:20]}"'
-        return cls(content, gzip.compress(content, mtime=0), media_type, tag)
+        packed = zstandard.compress(content, ZSTD_LEVEL) if zstd else None
+        return cls(content, gzip.compress(content, mtime=0), media_type, tag, packed)
 
     def answer(self, request: Request, policy: str | None = None) -> Response:
         """Return the response to ``request``: 304 if the browser already has the content."""
@@ -46,7 +60,11 @@ class File:
             headers["Content-Security-Policy"] = policy
         if self.tag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)
-        if "gzip" in request.headers.get("accept-encoding", ""):
+        accepted = request.headers.get("accept-encoding", "")
+        if self.zstd is not None and "zstd" in accepted:
+            headers["Content-Encoding"] = "zstd"
+            return Response(self.zstd, headers=headers, media_type=self.media_type)
+        if "gzip" in accepted:
             headers["Content-Encoding"] = "gzip"
             return Response(self.packed, headers=headers, media_type=self.media_type)
         return Response(self.content, headers=headers, media_type=self.media_type)
