@@ -59,6 +59,7 @@ def serve() -> None:
     port = listening.getsockname()[1]
     hub, authenticator = Hub(time.monotonic), Authenticator(None, port, address)
     proxy = Proxy(hub, authenticator, Guard(server), server.get_port(), KEY)
+    proxy.complete.set()
     config = uvicorn.Config(
         application(hub, authenticator, Budgets(hub.clock), proxy, address, Acceptor(listening)),
         ws="websockets-sansio",

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
 from typing import Any
 
+import imageio.v3 as imageio
 import msgspec
 import numpy as np
 import pytest
@@ -19,8 +20,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from katana450.server.viser_bridge import viser_page
+from katana450.server.viser_bridge.frames import MAX_WINDOW
 from katana450.server.viser_bridge.proxy import SUBPROTOCOL
 from katana450.server.viser_bridge.recording_page import TITLE, titled
+from katana450.server.viser_bridge.themes import LIGHT, set_sky
 from tests.gateway.client import UPRIGHT, Peer
 from tests.viser_bridge.internals import sent
 from tests.viser_bridge.parts import part
@@ -166,11 +169,13 @@ def test_producer_of_frames_can_be_replaced(
 ) -> None:
     server.scene.add_frame("/frame")
     received: list[str] = []
+    sizes: list[int] = []
 
     async def produce(
         line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None
     ) -> None:
         assert line.request.headers["X-Test"] == "here"
+        sizes.append(buffer.max_window_size)
         windows = buffer.window_generator(client_id, backlog_done_message=backlog_done_message)
         try:
             async for window in windows:
@@ -183,8 +188,10 @@ def test_producer_of_frames_can_be_replaced(
         async with browser(server):
             await until(lambda: "ReplayDoneMessage" in received, "the scene")
         assert "FrameMessage" in received
+        # More than a scene may have in one frame is sent in parts.
+        assert all(0 < size < MAX_WINDOW for size in sizes)
 
-    with part("_message_producer"), part("window_generator"):
+    with part("_message_producer"), part("window_generator"), part("max_window_size"):
         run(trial())
 
 
@@ -255,6 +262,22 @@ def test_message_of_ours_is_packed(
         assert packed["type"] == kind
         assert packed["name"] == "/n"
         assert {name: packed[name] for name in fields} == fields
+
+
+def test_sky_is_sent_as_viser_sends_an_image(server: viser.ViserServer) -> None:
+    def sent_last() -> Any:
+        return next(each for each in reversed(sent(server)) if hasattr(each, "rgb_data"))
+
+    with part("BackgroundImageMessage"):
+        set_sky(server, LIGHT)
+        ours = sent_last()
+        pixels = imageio.imread(ours.rgb_data, extension=".png")
+        np.testing.assert_array_equal(pixels[[0, -1]], [[LIGHT.sky] * 2, [LIGHT.floor] * 2])
+        server.scene.set_background_image(pixels, format="png")
+        visers = sent_last()
+        assert visers is not ours
+        assert (visers.format, visers.depth_data) == (ours.format, ours.depth_data)
+        np.testing.assert_array_equal(imageio.imread(visers.rgb_data, extension=".png"), pixels)
 
 
 def test_arrays_of_a_message_are_taken_out_of_it() -> None:

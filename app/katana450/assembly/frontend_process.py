@@ -100,6 +100,7 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
         from katana450.assembly.frontend import build_frontend
 
         front_end, view, detours = build_frontend(gateway, config, meshes, supervisor.ended)
+        gateway.show()
         view.start()
         supervisor.report(READY)
         while not supervisor.ended.wait(WAKE_INTERVAL) and not front_end.cut.is_set():

@@ -137,10 +137,10 @@ class Gateway:
             authenticator = Authenticator(access, self.port, self.address, people)
             guard = Guard(self.viser)
             self.gestures = Gestures(self.viser, guard, self.hub)
-            proxy = Proxy(self.hub, authenticator, guard, self.viser.get_port(), key)
+            self._proxy = Proxy(self.hub, authenticator, guard, self.viser.get_port(), key)
             acceptor, budgets = Acceptor(listening), Budgets(self.hub.clock)
             app = application(
-                self.hub, authenticator, budgets, proxy, self.address, acceptor, routes
+                self.hub, authenticator, budgets, self._proxy, self.address, acceptor, routes
             )
             self._lines = LineServer(self.hub, authenticator, budgets)
         except BaseException:
@@ -179,6 +179,10 @@ class Gateway:
         """Let clients drive ``arm`` from now on."""
         arm.listen(self.hub.recorder.outcomes)
         self.hub.gate.arm = arm
+
+    def show(self) -> None:
+        """Let browsers have the scene, which is complete."""
+        self.soon(self._proxy.complete.set)
 
     def announce(self, why: str) -> None:
         """Notify all clients why a request is not executed. Can be called in any thread."""

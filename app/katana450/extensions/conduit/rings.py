@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,6 +13,7 @@ import viser
 
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
+from katana450.disk_cache import kept
 from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -46,7 +48,9 @@ class _StretchNode:
     def __init__(self, server: viser.ViserServer, stretch: ConduitStretch, path: str) -> None:
         """Add the rings to the scene as the node ``path``."""
         self.stretch = stretch
-        self._poses = poses(stretch, round(stretch.length / PITCH))
+        count = round(stretch.length / PITCH)
+        made = pickle.dumps(stretch)
+        self._poses = kept(lambda: poses(stretch, count), made, str(count))
         self._steps = np.diff(self._poses, axis=0)
         self._shown = 0.0
         rings = self._at(0.0)

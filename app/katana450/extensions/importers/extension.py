@@ -46,9 +46,15 @@ def _initial_scene(options: Namespace, session: Callable[[], Session]) -> Initia
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
-    from katana450.extensions.importers.uploads import Uploads
+    from katana450.server.api.fields import ROOT
+    from katana450.server.web.late_routes import LateRoutes
 
-    return Uploads(context.hub, context.authenticator, context.identity).routes()
+    def make() -> list[BaseRoute]:
+        from katana450.extensions.importers.uploads import Uploads
+
+        return Uploads(context.hub, context.authenticator, context.identity).routes()
+
+    return LateRoutes([f"{ROOT}/mesh", f"{ROOT}/scene"], make).routes()
 
 
 EXTENSION = Extension(

@@ -58,15 +58,22 @@ def _check_installed(options: Namespace, _facts: ServerFacts) -> None:
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
-    from katana450.extensions.rosbridge.routes import RosRoutes
+    from katana450.server.web.late_routes import LateRoutes
 
     assert context.options is not None
+    urdf = context.options.urdf
     context.authenticator.address.guests.update(context.options.ros_page)
     if context.options.foxglove is not None:
         from katana450.extensions.rosbridge.foxglove_server import start
 
         start(context.hub, context.options.foxglove)
-    return RosRoutes(context, context.options.urdf).routes()
+
+    def make() -> list[BaseRoute]:
+        from katana450.extensions.rosbridge.routes import RosRoutes
+
+        return RosRoutes(context, urdf).routes()
+
+    return LateRoutes(["/rosbridge"], make).routes()
 
 
 EXTENSION = Extension(

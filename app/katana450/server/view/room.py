@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import viser
 
-from katana450.server.viser_bridge.themes import LIGHT, Theme, gradient
+from katana450.server.viser_bridge.themes import LIGHT, Theme, set_sky
 
 FLOOR_AT = -0.0255
 """Height [m] of the floor, slightly below the table so that the two do not flicker."""
@@ -22,6 +22,7 @@ def set_up_room(server: viser.ViserServer) -> None:
     scene.add_light_directional("/light/fill", intensity=0.35, position=FILL)
     scene.configure_environment_map("studio", environment_intensity=0.45)
     _paint(scene, LIGHT)
+    set_sky(server, LIGHT)
 
 
 KEY, RIM, FILL = (0.7, -0.9, 1.9), (-1.0, 1.4, 0.9), (1.2, 1.0, 0.6)
@@ -44,4 +45,3 @@ def _paint(scene: viser.SceneApi, theme: Theme) -> None:
         shadow_opacity=theme.shadow,
         position=(0.0, 0.0, FLOOR_AT),
     )
-    scene.set_background_image(gradient(theme.sky, theme.floor), format="png")

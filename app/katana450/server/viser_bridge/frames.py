@@ -26,6 +26,10 @@ MAX_KEPT_FRAMES = 4
 FRESH_SECONDS = 0.03
 """Time [s] after which a window is packed again, because its messages may have changed."""
 
+MAX_WINDOW = 1024
+"""Maximum number of messages in a frame, more than those of a whole scene: a page that gets it in
+parts draws every part."""
+
 ALIGNED = 8
 """Alignment of arrays in a frame [bytes]."""
 
@@ -161,6 +165,7 @@ class Packer:
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:
     """Send a browser the windows of a buffer, as viser's own ``_message_producer`` does."""
     packer = buffer.__dict__.setdefault("packer", Packer())
+    buffer.max_window_size = MAX_WINDOW
     slot = slot_of(line.request.headers)
     send = line.send
     if slot is not None:

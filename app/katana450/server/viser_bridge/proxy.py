@@ -45,12 +45,20 @@ MAX_BROWSERS, MAX_BROWSERS_EACH, RESERVED_BROWSERS = 64, 16, 2
 """Maximum number of browsers with the scene at one time, in total and per identity, and number
 reserved for the driver and for each admin."""
 
+SCENE_TIMEOUT = 4.0
+"""Timeout [s] of a browser for the scene of a new server. viser's page tries again after 5 s."""
+
 REFUSAL_INTERVAL = 0.5
 """Minimum time [s] between two shown refusals: a drag sends 20 messages a second."""
 
 
 class Proxy:
-    """Connects each browser to viser by a connection of its own."""
+    """Connects each browser to viser by a connection of its own.
+
+    Attributes:
+        complete: set in the server's thread when the scene is complete. Before, browsers wait: a
+            page that gets the scene in parts draws every part.
+    """
 
     def __init__(
         self, hub: Hub, authenticator: Authenticator, guard: Guard, port: int, key: str
@@ -61,6 +69,7 @@ class Proxy:
         self._guard = guard
         self._port = port
         self._key = key
+        self.complete = asyncio.Event()
         self._places = ConnectionLimit(MAX_BROWSERS, MAX_BROWSERS_EACH)
 
     async def serve(self, browser: WebSocket) -> None:
@@ -84,6 +93,8 @@ class Proxy:
         # Without our page around it, viser's page can only show the scene.
         key = key_of(identity, page) if PAGE.fullmatch(page) else ""
         line = _Line(self._hub, self._guard, browser, key)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self.complete.wait(), SCENE_TIMEOUT)
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+import viser
+from viser import _messages as wire
 
 from katana450.arm.control.solid import Colour
 
@@ -37,7 +40,20 @@ DARK = Theme((38, 42, 48), (50, 55, 62), (70, 77, 87), (22, 24, 28), 0.6, dark=T
 THEMES = {"Light": LIGHT, "Dark": DARK}
 
 
-def gradient(top: Colour, bottom: Colour) -> npt.NDArray[np.uint8]:
-    """Return the sky as an image (128, 2, 3) with a gradient from ``top`` to ``bottom``."""
-    rows: npt.NDArray[np.uint8] = np.linspace(top, bottom, 128).round().astype(np.uint8)
-    return np.repeat(rows[:, None, :], 2, axis=1)
+def sky(theme: Theme) -> bytes:
+    """Return the sky as a PNG file, 2 by 128 pixels, with a gradient down to the floor's colour."""
+    colours = np.linspace(theme.sky, theme.floor, 128).round().astype(np.uint8)
+    # Each line begins with its filter, which is none.
+    lines = b"".join(b"\0" + colour.tobytes() * 2 for colour in colours)
+    header = struct.pack(">IIBBBBB", 2, len(colours), 8, 2, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(lines)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in chunks
+    )
+
+
+def set_sky(server: viser.ViserServer, theme: Theme) -> None:
+    """Show the sky. viser's own method imports every file format of its library of images."""
+    message = wire.BackgroundImageMessage(format="png", rgb_data=sky(theme), depth_data=None)
+    server._websock_server.queue_message(message)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import gzip
-import io
 import json
 import re
 from collections.abc import Mapping
@@ -21,12 +20,11 @@ import numpy as np
 import numpy.typing as npt
 import viser
 import zstandard
-from PIL import Image
 from starlette.datastructures import QueryParams
 
 from katana450.disk_cache import kept
 from katana450.errors import ConfigurationError
-from katana450.server.viser_bridge.themes import THEMES, gradient
+from katana450.server.viser_bridge.themes import THEMES, sky
 from katana450.server.web.security import content_policy
 from katana450.server.web.static_files import File
 
@@ -137,20 +135,13 @@ def _our_scripts() -> str:
             "plane_color": theme.floor,
             "shadow_opacity": theme.shadow,
             "dark": theme.dark,
-            "sky": _png(gradient(theme.sky, theme.floor)),
+            "sky": base64.b64encode(sky(theme)).decode(),
         }
         for name, theme in THEMES.items()
     }
     *first, last = (f'src="../static/{name}.js"' for name in OUR_SCRIPTS)
     last += f' data-rooms="{escape(json.dumps(rooms))}"'
     return "".join(f"<script {each}></script>" for each in (*first, last))
-
-
-def _png(pixels: npt.NDArray[np.uint8]) -> str:
-    """Return ``pixels`` (height, width, 3) as a PNG file in base 64."""
-    file = io.BytesIO()
-    Image.fromarray(pixels).save(file, "png")
-    return base64.b64encode(file.getvalue()).decode()
 
 
 def _bytes(text: str) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 
-from starlette.routing import BaseRoute, Route, Router
+from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
 
@@ -22,11 +22,12 @@ class LateRoutes:
         self._router: Router | None = None
 
     def routes(self) -> list[BaseRoute]:
-        """Return the routes of the app itself."""
-        return [Route(f"{name}{{rest:path}}", self) for name in self._names]
+        """Return the routes of the app itself, for requests and websockets."""
+        paths = [f"{name}{{rest:path}}" for name in self._names]
+        return [kind(path, self) for path in paths for kind in (Route, WebSocketRoute)]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
+        """Answer a request or a websocket."""
         async with self._making:
             if self._router is None:
                 self._router = Router(await asyncio.to_thread(self._make))
