@@ -5,14 +5,22 @@ const NAMES = {
   connect: "Connect", disconnect: "Disconnect", calibrate: "Calibrate…",
   engage: "Engage motors…", release: "Release motors…", unblock: "Unblock",
 };
+// What an act does that needs no question.
+const SENTENCES = {
+  connect: "Connect reads the arm. Nothing moves.",
+  unblock: "Unblock lets the motors hold the arm where it is. Nothing moves.",
+  disconnect: "Disconnect leaves the motors as they are.",
+};
 const FOLLOWS = ["holding", "moving"];
 
 export class Arm {
   #mode = "";
   #acts = "";
   #about = html("span", {});
+  #rested = html("span", { class: "rested", hidden: "" });
   #note = html("p", { role: "status" });
   #facts = html("dl", {});
+  #hint = html("p", { class: "hint" });
   #buttons = html("div", { class: "acts", role: "group", "aria-label": "Acts at the arm" });
   #dialog = html("dialog", { "aria-labelledby": "hazard-title", class: "hazard" });
 
@@ -21,13 +29,13 @@ export class Arm {
     this.say = say;
     document.head.append(html("link", { rel: "stylesheet", href: new URL("arm.css", import.meta.url).href }));
     const why = html("p", { class: "why" }, "STOP on this page is no emergency stop: keep the hardware stop button, or the switch of the arm, in reach.");
-    this.card = html("details", { id: "arm" }, html("summary", {}, html("i"), this.#about), this.#note, this.#facts, this.#buttons, why);
+    this.card = html("details", { id: "arm" }, html("summary", {}, html("i"), this.#about, this.#rested), this.#note, this.#facts, this.#buttons, this.#hint, why);
     stage.querySelector("#toast").before(this.card);
     stage.parentElement.append(this.#dialog);
   }
 
   // Show the arm of a status.
-  draw({ arm, role }) {
+  draw({ arm, role, stopped }) {
     this.card.hidden = !arm;
     if (!arm) return;
     const { mode, note, acts, lag, error, age, round_trip: trip, stop } = arm;
@@ -36,14 +44,20 @@ export class Arm {
     if (!this.#mode || follows !== FOLLOWS.includes(this.#mode)) this.card.open = !follows;
     this.#mode = mode;
     this.card.dataset.mode = mode;
+    // As measured, never as simulated, and seen without a click.
+    const [seconds, degrees, metres] = stop ?? [];
+    const angle = stop && `${signed(degrees)}°`;
+    const rested = stop && `${seconds.toFixed(2)} s, ${metres === null ? angle : `${Math.round(1000 * metres)} mm`}`;
     write(this.#about, `Arm ${mode}`);
+    this.#rested.hidden = !(stopped && follows && stop);
+    write(this.#rested, this.#rested.hidden ? "" : `stopped in ${rested}`);
     write(this.#note, note);
     const facts = {
       "Behind the setpoint": `${signed(lag)}°`,
       "Tracking error": `${signed(error)}°`,
       "Age of the measurement": `${Math.round(1000 * age)} ms`,
       "Reply time": `${Math.round(1000 * trip)} ms`,
-      ...(stop && { "Last stop, measured": `${stop[0].toFixed(2)} s, ${signed(stop[1])}°` }),
+      ...(stop && { "Last stop, measured": metres === null ? rested : `${rested}, ${angle}` }),
     };
     this.#facts.hidden = !follows;
     if (this.#facts.children.length !== Object.keys(facts).length)
@@ -53,15 +67,18 @@ export class Arm {
   }
 
   #offer(acts) {
-    const key = JSON.stringify(acts);
+    const key = JSON.stringify([this.#mode, acts]);
     if (key === this.#acts) return;
     this.#acts = key;
-    const made = Object.entries(acts).map(([act, hazard], i) => {
-      const button = html("button", { type: "button", "data-act": act, ...(i === 0 && { class: "main" }) }, NAMES[act]);
+    // A working arm needs no act.
+    const first = FOLLOWS.includes(this.#mode) ? null : Object.keys(acts)[0];
+    const made = Object.entries(acts).map(([act, hazard]) => {
+      const button = html("button", { type: "button", "data-act": act, ...(act === first && { class: "main" }) }, NAMES[act]);
       button.addEventListener("click", () => (hazard ? this.#ask(act, hazard) : this.#give(act)));
       return button;
     });
     this.#buttons.replaceChildren(...made);
+    write(this.#hint, Object.keys(acts).map((act) => SENTENCES[act]).filter(Boolean).join(" "));
     if (this.#dialog.open) this.#dialog.close();
   }
 

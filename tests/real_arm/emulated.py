@@ -94,6 +94,16 @@ def at_rest(arm: EmulatedArm) -> bool:
 @contextmanager
 def emulator(*options: str) -> Iterator[int]:
     """Run ``katana450 emulate`` and return its port."""
+    with emulator_process(*options) as (process, port):
+        yield port
+        process.terminate()
+        output, _ = process.communicate(timeout=TIMEOUT)
+        assert process.returncode == 0, output
+
+
+@contextmanager
+def emulator_process(*options: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """Run ``katana450 emulate``; return its process, which may be frozen or ended, and port."""
     process = subprocess.Popen(
         [sys.executable, "-m", "katana450", "emulate", "--port", "0", *options],
         stdout=subprocess.PIPE,
@@ -105,11 +115,11 @@ def emulator(*options: str) -> Iterator[int]:
         line = process.stdout.readline()
         found = re.search(r"tcp://127\.0\.0\.1:(\d+)", line)
         assert found, line
-        yield int(found[1])
+        yield process, int(found[1])
     finally:
-        process.terminate()
-        output, _ = process.communicate(timeout=TIMEOUT)
-        assert process.returncode == 0, output
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=TIMEOUT)
 
 
 @contextmanager

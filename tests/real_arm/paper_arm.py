@@ -158,7 +158,7 @@ class Conversation:
     """
 
     def __init__(self) -> None:
-        self.machine = ArmMachine(DEFAULT_VARIANT, ENDS, JOINTS)
+        self.machine = ArmMachine(DEFAULT_VARIANT, ENDS, JOINTS, self._travel)
         self.arm = PaperArm()
         self.now = 100.0
         self.setpoint: Callable[[float], FloatArray] = lambda _: JOINTS
@@ -166,6 +166,11 @@ class Conversation:
         self.delay: Callable[[], float] = lambda: 0.002
         self.reports: list[tuple[float, ArmReport, FloatArray]] = []
         self._tick = self.now
+
+    @staticmethod
+    def _travel(start: FloatArray, end: FloatArray) -> float:
+        """Return the travel of a tool that is 2 m from axis 1 alone [m]."""
+        return 2.0 * abs(float(end[0] - start[0]))
 
     def run(self, seconds: float) -> None:
         """Let ``seconds`` pass."""

@@ -124,6 +124,46 @@ def test_stop_ends_a_calibration_and_leaves_the_arm_uncalibrated(talk: Conversat
     assert ArmAct.UNBLOCK not in talk.mode().acts
 
 
+@pytest.mark.parametrize("pressed", ["while lost", "later", "not at all"])
+def test_stop_freezes_an_arm_that_still_calibrates_after_a_lost_connection(
+    talk: Conversation, pressed: str
+) -> None:
+    talk.connect()
+    talk.machine.perform(ArmAct.CALIBRATE)
+    talk.run(0.5)
+    assert talk.mode() is ArmMode.CALIBRATING
+    talk.machine.lost("The test cut the connection.")
+    if pressed == "while lost":
+        talk.machine.end_act(talk.now)
+    before = len(talk.motors)
+    talk.machine.connected("tcp://paper:5566")
+    talk.run(0.2)
+    if pressed == "later":
+        assert "is calibrating: wait" in talk.machine.note
+        talk.machine.end_act(talk.now)
+    talk.run(0.3)
+    frozen = sorted(talk.motors[before:])
+    if pressed == "not at all":
+        assert not frozen
+        return
+    assert frozen == [(0, MotorFlag.FLUSH), *((axis, MotorFlag.FREEZE) for axis in range(1, 7))]
+    talk.run(1.0)
+    assert talk.mode() is ArmMode.UNCALIBRATED
+    assert talk.machine.note.startswith("STOP froze the arm")
+    # The press counts once: what a person begins after it is not stopped.
+    talk.machine.perform(ArmAct.CALIBRATE)
+    talk.run(1.0)
+    assert talk.mode() is ArmMode.CALIBRATING
+
+
+def test_stop_at_an_arm_that_rests_or_is_not_connected_sends_nothing(talk: Conversation) -> None:
+    talk.machine.end_act(talk.now)
+    talk.connect()
+    talk.machine.end_act(talk.now)
+    talk.run(0.5)
+    assert not talk.motors
+
+
 def test_stop_drops_an_act_that_waits(talk: Conversation) -> None:
     talk.connect()
     talk.machine.perform(ArmAct.CALIBRATE)
@@ -233,6 +273,8 @@ def test_stop_freezes_the_fastest_axis_first_and_is_measured(talk: Conversation)
     assert measured is not None
     assert 0.0 < measured.time < 0.1
     assert 0.0 < measured.angle < 0.05
+    # Axis 1 is among the fastest, so its angle is the largest.
+    assert measured.distance == pytest.approx(2.0 * measured.angle, rel=0.1)
     # Setpoints while stopped move nothing, nor does the first one after it.
     rest = talk.machine.arm.positions.copy()
     talk.run(0.5)
@@ -241,6 +283,11 @@ def test_stop_freezes_the_fastest_axis_first_and_is_measured(talk: Conversation)
     talk.stopped = False
     talk.run(1.0)
     assert np.abs(talk.machine.arm.positions - rest).max() <= 1
+    assert talk.reports[-1][1].measured_stop is measured
+    # A later stop at rest does not show the figures of this one.
+    talk.stopped = True
+    talk.run(0.3)
+    assert talk.reports[-1][1].measured_stop is None
 
 
 def test_stop_at_rest_sends_nothing(talk: Conversation) -> None:

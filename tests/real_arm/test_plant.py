@@ -19,6 +19,7 @@ from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extensions.real_arm.plant.gravity import GravityLoads
 from katana450.extensions.real_arm.plant.profile import KATANA450, PROFILES, STIFF, profile_named
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
 
 START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])
 
@@ -96,6 +97,12 @@ def test_stop_brakes_where_the_arm_is_and_is_measured(robot: Robot) -> None:
     # A constant deceleration would need half the product of speed and time.
     assert 0.2 < report.measured_stop.angle / (speed * report.measured_stop.time) < 0.8
     assert stopped[-1].q is stopped[-20].q
+    chain = robot.require_arm().chain
+    ends = (forward(chain, q)[:3, 3] for q in (answers[-1].q, stopped[-1].q))
+    travel = float(np.linalg.norm(np.subtract(*ends)))
+    # From the press on, and not from the last answer before it.
+    assert travel > 0.005
+    assert report.measured_stop.distance == pytest.approx(travel, abs=2e-3)
     # The session begins again where the arm was measured.
     held = stopped[-1].q
     again = [driver.send(held, 0.0, 1.5 + n * TICK) for n in range(1, 50)]

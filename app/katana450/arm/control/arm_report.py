@@ -62,10 +62,12 @@ class MeasuredStop:
     Attributes:
         time: time from the request to rest [s].
         angle: maximum angle by which a joint moved meanwhile [rad].
+        distance: distance by which the tool moved meanwhile [m]; None if the driver does not know.
     """
 
     time: float
     angle: float
+    distance: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

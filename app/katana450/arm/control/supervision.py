@@ -96,8 +96,10 @@ def stop_for(state: State, report: ArmReport, world: CollisionWorld | None) -> S
         return None
     why = f"{finding_text(fault)}."
     if fault.reason is Reason.NOT_FOLLOWING:
-        stays = report.mode in (ArmMode.COLLIDED, ArmMode.FAULT, ArmMode.LOST)
+        stays = report.mode in (ArmMode.COLLIDED, ArmMode.FAULT)
         why = report.note if stays and report.note else "The arm was not ready for setpoints."
+        if report.mode is ArmMode.LOST:
+            why = "The connection to the arm was lost."
     return Stop(StopCause(why), fault)
 
 

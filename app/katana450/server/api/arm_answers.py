@@ -71,6 +71,7 @@ class MeasuredArm(msgspec.Struct, frozen=True, kw_only=True):
         round_trip: Time of the newest exchange with the arm [s].
         stop_time: Time to rest of the newest stop, as measured [s]; null before the first.
         stop_angle: Maximum angle of a joint in it [rad]; null before the first.
+        stop_distance: Travel of the tool in it [m]; null before the first, and if it is not known.
         sensors: Raw values of the sensors of the gripper; empty without sensors.
     """
 
@@ -85,4 +86,5 @@ class MeasuredArm(msgspec.Struct, frozen=True, kw_only=True):
     round_trip: float
     stop_time: float | None
     stop_angle: float | None
+    stop_distance: float | None
     sensors: list[float]

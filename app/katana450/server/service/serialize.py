@@ -157,6 +157,7 @@ def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
         round_trip=report.round_trip,
         stop_time=None if stop is None else stop.time,
         stop_angle=None if stop is None else stop.angle,
+        stop_distance=None if stop is None else stop.distance,
         sensors=list(report.sensors),
     )
 

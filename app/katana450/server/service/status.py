@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.arm_report import ArmReport
+from katana450.arm.control.arm_report import ArmMode, ArmReport
 from katana450.arm.control.lease import Person
 from katana450.arm.control.messages import headline, mood, sentence
 from katana450.arm.control.state import State, Status
@@ -19,6 +20,18 @@ from katana450.server.service.runner import StatusLine
 
 FIRST = (Status.FAULT, Status.STOPPED, Status.BLOCKED)
 """States of the arm that have priority over the status of a runner."""
+
+UNCONTROLLED: Mapping[ArmMode | None, tuple[StatusLine, str]] = {
+    ArmMode.CALIBRATING: (
+        StatusLine("stopped", "Calibrating", "The arm moves by itself."),
+        "STOP ends the calibration.",
+    ),
+    ArmMode.LOST: (
+        StatusLine("stopped", "No answer from the arm", "It may still move."),
+        "If it moves, use its switch.",
+    ),
+}
+"""State line of a stopped arm that may move nevertheless, and the sentence on the stop."""
 
 MIN_SHOWN_AGE = 0.2
 """Minimum age of a picture [s] that the page shows."""
@@ -56,12 +69,20 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
     if stopped is not None:
         rests = stopped.confirmed and not (state is not None and state.moving)
         now = StatusLine("stopped", "Stopped" if rests else "Stopping…", "")
+        if (mode := arm_mode(hub)) in UNCONTROLLED:
+            now = UNCONTROLLED[mode][0]
     if age is not None:
         now = StatusLine("lost", "No answer from the arm", f"The state shown is {age:.1f} s old.")
     if stopped is not None and not stopped.confirmed:
         why = f"The arm has not confirmed the stop. {now.why}".rstrip()
         now = StatusLine("stopped", "Stopping…" if age is None else "Stop requested", why)
     return now
+
+
+def arm_mode(hub: Hub) -> ArmMode | None:
+    """Return the mode of a real arm; None for another one."""
+    report = None if hub.arm is None else hub.arm.state.report
+    return None if report is None else report.mode
 
 
 def rests_paused(state: State) -> bool:
@@ -90,7 +111,7 @@ def arm_status(state: State, report: ArmReport) -> dict[str, Any]:
         "error": round(math.degrees(tracking_error(report, state.q)[0]), 1),
         "age": round(state.t - report.t, 2),
         "round_trip": round(report.round_trip, 3),
-        "stop": None if stop is None else (round(stop.time, 2), math.degrees(stop.angle)),
+        "stop": None if stop is None else (stop.time, math.degrees(stop.angle), stop.distance),
     }
 
 
@@ -148,11 +169,14 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     rights = hub.gate.clear_rights
     clears = rights.allow(person)
     until = "Clear stop is pressed" if clears else f"{rights.names} clears the stop"
+    stays = f"Nothing moves until {until}."
+    if (mode := arm_mode(hub)) in UNCONTROLLED:
+        stays = UNCONTROLLED[mode][1]
     return {
         **(state_line(hub, person)._asdict() if own_pause else {}),
         "pace": pace_refusal(hub, participant),
         "may_clear_stop": clears,
-        "until": "" if hub.stopped is None else f"Nothing moves until {until}.",
+        "until": "" if hub.stopped is None else stays,
         "name": person.name,
         "role": person.role.value,
         "mine": mine,

@@ -10,6 +10,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from katana450.extensions.real_arm.link.logged import ExchangeLog, LoggedArmUrl
+from katana450.extensions.real_arm.tool_travel import tool_travel
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -29,4 +30,5 @@ def driver_of(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -
             [*arm.limits.upper, arm.gripper.upper],
         ]
     )
-    return KatanaDriver(url, bounds, np.array([*q, gripper]))
+    joints = np.array([*q, gripper])
+    return KatanaDriver(url, bounds, joints, travel=tool_travel(robot))

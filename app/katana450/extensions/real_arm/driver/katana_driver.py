@@ -26,6 +26,7 @@ from katana450.extensions.real_arm.encoders import EncoderMap
 from katana450.extensions.real_arm.link.arm_link import ArmLink
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from katana450.extensions.real_arm.link.transport import ArmRefusalError, LinkLostError
+from katana450.extensions.real_arm.tool_travel import Travel
 from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, Variant
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -82,6 +83,7 @@ class KatanaDriver:
         joints: FloatArray,
         variant: Variant = DEFAULT_VARIANT,
         clock: Callable[[], float] = time.perf_counter,
+        travel: Travel | None = None,
     ) -> None:
         """Create the driver without a connection.
 
@@ -91,13 +93,14 @@ class KatanaDriver:
             joints: (6,) values of them that are reported before the first measurement [rad].
             variant: The arm.
             clock: Clock of the control loop.
+            travel: Travel of the tool between two postures; None if a stop is measured without it.
 
         Raises ConfigurationError if the limits of the joints are not those of the arm.
         """
         EncoderMap(variant).check_limits(*bounds[:, :JOINTS])
         self._url = url
         self._clock = clock
-        self._machine = ArmMachine(variant, bounds, joints)
+        self._machine = ArmMachine(variant, bounds, joints, travel)
         self._link: ArmLink | None = None
         self._heard_at = clock()
         self._retry, self._retry_at = SHORTEST_RETRY, -np.inf

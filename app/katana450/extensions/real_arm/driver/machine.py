@@ -13,7 +13,7 @@ import numpy as np
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode, ArmReport, MeasuredStop
 from katana450.arm.drivers.driver import DriverAnswer
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.codec.axis_status import IN_MOTION, AxisStatus
 from katana450.extensions.real_arm.codec.replies import ArmReply, AxisStates, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     ArmRequest,
@@ -36,6 +36,7 @@ from katana450.extensions.real_arm.driver.procedures import (
 from katana450.extensions.real_arm.driver.readings import ArmReadings
 from katana450.extensions.real_arm.encoders import EncoderMap
 from katana450.extensions.real_arm.link.transport import ArmRefusalError
+from katana450.extensions.real_arm.tool_travel import Travel
 from katana450.extensions.real_arm.variants import Variant
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
@@ -60,6 +61,8 @@ MAX_REFUSALS = 3
 
 CALIBRATION_ENDED = "STOP ended the calibration. Calibrate the arm again."
 
+MOVED_BY_ITSELF = "STOP froze the arm, which moved by itself. Calibrate the arm."
+
 FIRST_NOTE = "No connection. Connect to the arm to read it."
 
 
@@ -72,18 +75,25 @@ class ArmMachine:
         arm: Newest measurements.
     """
 
-    def __init__(self, variant: Variant, bounds: FloatArray, joints: FloatArray) -> None:
+    def __init__(
+        self,
+        variant: Variant,
+        bounds: FloatArray,
+        joints: FloatArray,
+        travel: Travel | None = None,
+    ) -> None:
         """Create it without a connection.
 
         Args:
             variant: The arm.
             bounds: (2, 6) lower and upper limits of the joints and the finger joint [rad].
             joints: (6,) values of them that are reported before the first measurement [rad].
+            travel: Travel of the tool between two postures; None if a stop is measured without it.
         """
         self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
         self.arm = ArmReadings()
         self._variant, self._encoders = variant, EncoderMap(variant)
-        self._bounds = bounds
+        self._bounds, self._travel = bounds, travel
         self._joints = frozen(joints)
         self._motion = ArmMotion(variant, self._encoders, self.arm)
         self._acts: deque[ArmAct] = deque()
@@ -97,7 +107,7 @@ class ArmMachine:
         self._has_sensors = variant.has_gripper
         self._round_trip = 0.0
         self._measured_stop: MeasuredStop | None = None
-        self._wants_link = self._was_connected = False
+        self._wants_link = self._was_connected = self._must_freeze = False
 
     @property
     def wants_link(self) -> bool:
@@ -146,7 +156,7 @@ class ArmMachine:
             self._wants_link, self.note = True, "Connecting to the arm."
         elif act is ArmAct.DISCONNECT:
             self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
-            self._wants_link = self._was_connected = False
+            self._wants_link = self._was_connected = self._must_freeze = False
             self._clear()
         else:
             self._acts.append(act)
@@ -159,6 +169,9 @@ class ArmMachine:
         if stopped:
             if not self._stopped:
                 self._stop_asked = t
+                if self.mode.follows:
+                    # The measurement of an older stop is not that of this one.
+                    self._measured_stop = None
             self._motion.ignore(encoders)
         elif self.mode.follows and self._procedure is None:
             problem = self._motion.follow(encoders, t)
@@ -167,15 +180,18 @@ class ArmMachine:
         self._stopped = stopped
 
     def end_act(self, now: float) -> None:
-        """Drop acts that wait, and end a calibration: somebody has pressed STOP.
+        """Drop acts that wait, and end what the arm does by itself: somebody has pressed STOP.
 
-        The arm is not calibrated then.
+        An arm whose calibration ends is not calibrated. An arm that does not answer may still
+        calibrate, so it is frozen as soon as it answers again.
         """
         self._acts.clear()
         if self.mode is ArmMode.CALIBRATING and self._procedure is not None:
             self._procedure.close()
             axes = self._variant.driven
             self._start(halt(self.arm, axes, self._encoders, now, CALIBRATION_ENDED), now)
+        elif self._wants_link and not self.mode.follows:
+            self._must_freeze = True
 
     def freeze(self, now: float) -> None:
         """Stop an arm that moves, as at the end of the program."""
@@ -298,6 +314,12 @@ class ArmMachine:
 
     def _begin(self, now: float) -> None:
         """Begin the stop or the act that waits."""
+        if self._must_freeze:
+            self._must_freeze = False
+            if self.arm.axes_in(*IN_MOTION, AxisStatus.CALIBRATING):
+                axes = self._variant.driven
+                self._start(halt(self.arm, axes, self._encoders, now, MOVED_BY_ITSELF), now)
+                return
         if self._stop_asked is not None:
             asked, self._stop_asked = self._stop_asked, None
             if self.mode.follows and self._motion.moves(now):
@@ -329,7 +351,7 @@ class ArmMachine:
         if not self._motion.finger_moves(asked):
             # Fingers at rest keep their order, and so what they hold.
             axes = self._motion.axes
-        self._start(halt(self.arm, axes, self._encoders, asked, cause), asked)
+        self._start(halt(self.arm, axes, self._encoders, asked, cause, self._travel), asked)
 
     def _advance(self, now: float, error: ArmRefusalError | None = None) -> None:
         """Continue the procedure up to its next request or pause, or end it."""

@@ -32,6 +32,7 @@ from katana450.extensions.real_arm.codec.requests import (
 from katana450.extensions.real_arm.driver.readings import ArmReadings, collision_sentence
 from katana450.extensions.real_arm.encoders import EncoderMap
 from katana450.extensions.real_arm.link.transport import ArmRefusalError
+from katana450.extensions.real_arm.tool_travel import Travel
 from katana450.extensions.real_arm.variants import MAX_SPEED, Variant
 
 CALIBRATION_VALUE = 32_000
@@ -161,7 +162,12 @@ def release(arm: ArmReadings, variant: Variant) -> Procedure:
 
 
 def halt(
-    arm: ArmReadings, axes: tuple[int, ...], encoders: EncoderMap, begun: float, cause: str = ""
+    arm: ArmReadings,
+    axes: tuple[int, ...],
+    encoders: EncoderMap,
+    begun: float,
+    cause: str = "",
+    travel: Travel | None = None,
 ) -> Procedure:
     """Stop the arm as fast as its protocol allows, and measure the stop.
 
@@ -174,6 +180,7 @@ def halt(
         encoders: Conversion to joints.
         begun: Time of the request to stop [s].
         cause: Sentence on the fault that the stop follows; empty for a request of a person.
+        travel: Travel of the tool between two postures; None if it is not measured.
     """
     origin = arm.position_at(begun)
     refusal = ""
@@ -198,7 +205,11 @@ def halt(
     arm.held = arm.positions
     yield ReadStates()
     moved = np.abs((arm.positions - origin) * encoders.scale)[: AXES - 1]
-    stop = None if resting is None else MeasuredStop(resting - begun, float(moved.max()))
+    stop = None
+    if resting is not None:
+        ends = encoders.joints(origin), encoders.joints(arm.positions)
+        distance = None if travel is None else travel(*ends)
+        stop = MeasuredStop(resting - begun, float(moved.max()), distance)
     collided = tuple(axis for axis in arm.collided if axis < AXES)
     if collided:
         return ProcedureEnd(ArmMode.COLLIDED, collision_sentence(collided), stop)

@@ -16,6 +16,7 @@ from katana450.errors import InputError
 from katana450.extensions.real_arm.plant.axis import STEP, PlantAxis
 from katana450.extensions.real_arm.plant.gravity import GravityLoads
 from katana450.extensions.real_arm.plant.profile import PlantProfile
+from katana450.extensions.real_arm.tool_travel import tool_travel
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 MAX_STEPS = 200
@@ -57,7 +58,7 @@ class PlantDriver:
                 strict=True,
             )
         )
-        self._loads = GravityLoads(robot)
+        self._loads, self._travel = GravityLoads(robot), tool_travel(robot)
         self._weights = (*self._loads.at(start[:-1]), 0.0)
         self._setpoint = start
         # The targets of the steps that the delay keeps back, and the one before them.
@@ -156,7 +157,9 @@ class PlantDriver:
         if self._stopping is not None and not self._moves:
             began, places = self._stopping
             angle = float(np.abs(at - places)[:-1].max())
-            self._measured_stop, self._stopping = MeasuredStop(t - began, angle), None
+            distance = None if self._travel is None else self._travel(places, at)
+            self._measured_stop = MeasuredStop(t - began, angle, distance)
+            self._stopping = None
         # A braking arm is where it should be.
         self._take_over(at)
 
