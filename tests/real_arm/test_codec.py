@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from functools import partial
 
 import pytest
 from hypothesis import given, settings
@@ -68,6 +69,19 @@ def test_reply_is_read_at_every_split(
         ReplyReceived(request_, reply)
     ]
     assert host_events(request_, [data[:-1]]) == []
+
+
+@pytest.mark.parametrize("request_", [request for request, _ in PAIRS])
+def test_request_and_refusal_are_read_at_every_split(request_: requests.ArmRequest) -> None:
+    address = 0 if isinstance(request_, requests.ErrorQuery) else 24
+    for data, read, found in (
+        (request_bytes(request_), firmware_events, RequestReceived(request_, address)),
+        (refusal_bytes(), partial(host_events, request_), RequestRefused(request_)),
+    ):
+        for cut in range(len(data) + 1):
+            assert read([data[:cut], data[cut:]]) == [found]
+        assert read([bytes((byte,)) for byte in data]) == [found]
+        assert read([data[:-1]]) == []
 
 
 @settings(max_examples=EXAMPLES)
@@ -175,14 +189,19 @@ def test_fuzzed_bytes_raise_nothing_and_give_no_wrong_event(count: int) -> None:
     # A second source of bytes looks like the protocol, so that the fuzz reaches all of the codec.
     likely = [reply_bytes(reply) for _, reply in PAIRS] + [STREAM, refusal_bytes(), b"\0\0\0\xc1"]
     done = found = 0
+    received_bytes = b""
     while done < count:
         data = bytearray(rng.choice(likely) if rng.random() < 0.5 else rng.randbytes(64))
         for _ in range(rng.randrange(1, 5)):
             data[rng.randrange(len(data))] = rng.randrange(256)
+        # Longer than any request and what may precede it.
+        received_bytes = (received_bytes + data)[-4096:]
         for event in arm.receive(bytes(data)):
             if isinstance(event, RequestReceived):
                 found += 1
-                assert firmware_events([request_bytes(event.request, event.address)]) == [event]
+                sent = request_bytes(event.request, event.address)
+                assert firmware_events([sent]) == [event]
+                assert sent in received_bytes
         request, _ = rng.choice(PAIRS)
         for received in host_events(request, [bytes(data)]):
             if isinstance(received, ReplyReceived):
