@@ -39,6 +39,7 @@ def test_patches_show_what_is_pressed_and_vanish(
     server: viser.ViserServer,
     described: DescribedRobot,
     session: Session,
+    model: TouchModel,
     around: State,
     holding: State,
 ) -> None:
@@ -52,6 +53,9 @@ def test_patches_show_what_is_pressed_and_vanish(
     assert patches._pads == []
     shown.append(holding)
     patches.follow()
+    found = model.squeeze(holding)
+    assert found is not None
+    pressures = found.pads
     for pad in patches._pads:
         node = pad._node
         assert node.visible
@@ -60,6 +64,21 @@ def test_patches_show_what_is_pressed_and_vanish(
         # Some taxels and their rims on both sides are pressed, most are not.
         assert 16 <= drawn[:128].sum() < 64
         assert drawn[128:144].sum() == drawn[144:].sum() > 0
+        # The rims are white at the centre of pressure; the force stands behind the finger there.
+        (touch,) = (each for each in pressures if each.finger in node.name)
+        assert touch.centre is not None
+        at = 16 * touch.centre[0] / pad._pad.length
+        colours = np.asarray(node.batched_colors)
+        white = np.flatnonzero(
+            (colours == colours.max(axis=0)).all(axis=1) & (np.ptp(colours, axis=1) == 0)
+        )
+        assert white.tolist() == [128 + int(at), 144 + int(at)]
+        assert pad._label.visible
+        assert pad._label.text == f"{touch.force:.1f} N"
+        away = np.linalg.norm(
+            np.asarray(pad._label.position) - pad._pad.middles[int(at)].mean(axis=0)
+        )
+        assert away == pytest.approx(0.03)
         assert len(np.unique(np.asarray(node.batched_colors)[drawn], axis=0)) > 1
     colours = np.asarray(patches._pads[0]._node.batched_colors)
     patches.follow()
@@ -69,7 +88,7 @@ def test_patches_show_what_is_pressed_and_vanish(
     )
     shown.append(around)
     patches.follow()
-    assert not any(pad._node.visible for pad in patches._pads)
+    assert not any(pad._node.visible or pad._label.visible for pad in patches._pads)
 
 
 def test_colours_rise_with_the_pressure() -> None:

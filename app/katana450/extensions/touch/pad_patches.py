@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.extensions.touch.foundation import MODULUS
+from katana450.extensions.touch.foundation import MODULUS, PadPressure
 from katana450.extensions.touch.pad import COLUMNS, ROWS, Pad
 from katana450.extensions.touch.squeeze import Squeeze
 from katana450.extensions.touch.touch_model import TouchModel
@@ -25,7 +25,12 @@ LIFT = 0.3e-3
 
 RIM_WIDTH, RIM_DEPTH = 1.5e-3, 4e-3
 """[m] Size of the patches on the rims of the finger, which show the greatest pressure of their row:
-what is pressed is hidden by what presses it."""
+what is pressed is hidden by what presses it. Those at the centre of pressure are white."""
+
+ASIDE = 0.03
+"""[m] Distance of the force in newtons from the pad, behind the finger."""
+
+WHITE = np.full(3, 255.0)
 
 BRIGHTNESS = 0.6
 """[1] Part of the light of a colour, which the lamps of the scene make brighter."""
@@ -68,11 +73,11 @@ class PadPatches:
         self._shown = squeeze
         self._pads = self._pads or [_PatchedPad(self._context, pad) for pad in model.pads]
         for number, pad in enumerate(self._pads):
-            pad.show(None if squeeze is None else squeeze.pads[number].pressure)
+            pad.show(None if squeeze is None else squeeze.pads[number])
 
 
 class _PatchedPad:
-    """The patches of one finger."""
+    """The patches of one finger, and its force in newtons beside the centre of pressure."""
 
     def __init__(self, context: FolderContext, pad: Pad) -> None:
         """Add the patches of ``pad``, hidden."""
@@ -91,7 +96,8 @@ class _PatchedPad:
         taxel = np.array((pad.length / ROWS, 2.0 * LIFT, pad.width / COLUMNS))
         rim = np.array((pad.length / ROWS, RIM_DEPTH, RIM_WIDTH))
         edges = 0.5 * (pad.width + RIM_WIDTH) * np.array((-1.0, 1.0))[:, None]
-        row = pad.middles.mean(axis=1) - 0.5 * (RIM_DEPTH - LIFT) * normals[:, 0]
+        middle = pad.middles.mean(axis=1)
+        row = middle - 0.5 * (RIM_DEPTH - LIFT) * normals[:, 0]
         places = [pad.middles.reshape(-1, 3), *(row + edge * across for edge in edges)]
         quaternions = turned.reshape(ROWS, COLUMNS, 4)
         self._scales = np.concatenate(
@@ -111,18 +117,30 @@ class _PatchedPad:
             receive_shadow=False,
             visible=False,
         )
+        self._pad, self._behind = pad, middle - ASIDE * normals[:, 0]
+        self._label = context.server.scene.add_label(
+            f"/arm/{path}/force", "", anchor="center-center", visible=False
+        )
 
-    def show(self, pressure: FloatArray | None) -> None:
-        """Show ``pressure`` (16, 8) [Pa]; None to hide all patches."""
-        visible = pressure is not None and bool(pressure.any())
+    def show(self, touch: PadPressure | None) -> None:
+        """Show ``touch``; None to hide everything."""
+        centre = None if touch is None else touch.centre
+        visible = centre is not None
         if visible != self._node.visible:
-            self._node.visible = visible
-        if pressure is None or not visible:
+            self._node.visible = self._label.visible = visible
+        if touch is None or centre is None:
             return
+        pressure = touch.pressure
         rims = pressure.max(axis=1)
         shown = np.concatenate((pressure.ravel(), rims, rims))
+        colours = pressure_colours(shown)
+        row = min(int(centre[0] / self._pad.length * ROWS), ROWS - 1)
+        marks = ROWS * COLUMNS + np.array((row, ROWS + row))
+        colours[marks], shown[marks] = WHITE, FULL_PRESSURE
+        self._label.text = f"{touch.force:.1f} N"
+        self._label.position = self._behind[row]
         # For instances viser expects linear light.
-        light = BRIGHTNESS * to_light(pressure_colours(shown) / 255.0)
+        light = BRIGHTNESS * to_light(colours / 255.0)
         self._node.batched_colors = np.round(255.0 * light).astype(np.uint8)
         self._node.batched_scales = np.where(shown > 0.0, 1.0, HIDDEN)[:, None] * self._scales
 
