@@ -29,6 +29,19 @@ DEVICES = """
 """
 """A gamepad and a phone that note what they play."""
 
+FEEL = """async ([states, haptic]) => {
+    const { Rumble } = await import("/static/touch/rumble.js");
+    const rumble = new Rumble();
+    const kept = navigator.getGamepads;
+    const pulse = (value, duration) => felt.push({ kind: "haptic", value, duration });
+    if (haptic) navigator.getGamepads = () => [{ connected: true, hapticActuators: [{ pulse }] }];
+    felt.splice(0);
+    states.forEach((state, i) => rumble.take(state, 1000 * i));
+    navigator.getGamepads = kept;
+    return felt.splice(0);
+}"""
+"""Returns what the devices play for states that follow each other after a second."""
+
 INK = """(map) => {
     const { width, height } = map.querySelector("canvas");
     const { data } = map.querySelector("canvas").getContext("2d").getImageData(0, 0, width, height);
@@ -138,6 +151,52 @@ def test_devices_vibrate_only_after_they_were_turned_on(page: Page, arm: Client)
     button.click()
     arm.go(requests.Joint(axis=5, value=upper - 0.02))
     assert felt(page) == []
+
+
+def state(*reasons: str, **values: Any) -> dict[str, Any]:
+    """Return the part of a state that is felt: an arm that moves freely, with changes."""
+    force = values.pop("force", 0.0)
+    touch = {"force_limit": 10.0, "pads": [{"force": force}, {"force": force}]}
+    margins = {"clearance": values.pop("clearance", 0.1), "limit": values.pop("limit", 1.0)}
+    findings = [{"reason": reason} for reason in reasons]
+    return {
+        **{"moving": True, "findings": findings, "margins": margins},
+        **{"touch": touch, "touching": [], **values},
+    }
+
+
+@pytest.mark.parametrize(
+    ("found", "strong", "weak"),
+    [
+        (state(), None, None),
+        (state(moving=False, clearance=0.006, limit=0.01), None, None),
+        (state(clearance=0.006), 0.0, (0.5, 1.0)),
+        (state(limit=0.01), 0.0, (0.5, 1.0)),
+        (state("contact", moving=False), 0.0, (1.0, 1.0)),
+        (state(touching=["cup"]), 0.0, (0.6, 0.6)),
+        (state(force=5.0), 0.6, (0.2, 0.2)),
+        (state("sliding", force=0.0), 1.0, (1.0, 1.0)),
+        (state("slipped"), 1.0, (1.0, 1.0)),
+    ],
+    ids=["free", "rest", "near", "limit", "blocked", "touch", "grip", "sliding", "slipped"],
+)
+def test_each_event_is_felt_on_its_motor_and_on_the_phone(
+    page: Page, found: dict[str, Any], strong: float | None, weak: tuple[float, float] | None
+) -> None:
+    played = page.evaluate(FEEL, [[state(), found], False])
+    if strong is None or weak is None:
+        assert played == []
+        return
+    gamepad, phone = played
+    assert gamepad["kind"] == "dual-rumble"
+    assert gamepad["strongMagnitude"] == pytest.approx(strong)
+    assert weak[0] <= gamepad["weakMagnitude"] <= weak[1]
+    strength = max(gamepad["strongMagnitude"], gamepad["weakMagnitude"])
+    assert phone["kind"] == "phone"
+    assert phone["duration"] == pytest.approx(gamepad["duration"] * strength, abs=1.0)
+    # The one motor of a gamepad in Firefox has the stronger of both.
+    (haptic, _) = page.evaluate(FEEL, [[state(), found], True])
+    assert haptic == {"kind": "haptic", "value": strength, "duration": gamepad["duration"]}
 
 
 @pytest.mark.long
