@@ -87,11 +87,15 @@ def emulated(
         server.stop()
 
 
-def inwards(loop: SmallLoop, size: float = 0.3) -> None:
-    """Let the setpoint swing away from the posture after a calibration."""
-    away = swing(np.zeros(6), time.perf_counter(), size)
-    start, signs = loop.measured, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-    loop.setpoint = lambda t: start + signs * away(t)
+def inwards(loop: SmallLoop, size: float = 0.3, fingers: float = 0.0) -> None:
+    """Let the setpoint swing away from the posture after a calibration.
+
+    fingers: speed at which they close meanwhile [rad/s].
+    """
+    begun = time.perf_counter()
+    away, closing = swing(np.zeros(6), begun, size), np.array([0.0] * 5 + [-fingers])
+    start = loop.measured
+    loop.setpoint = lambda t: start + away(t) + closing * max(t - begun, 0.0)
 
 
 # In real time, so it needs a machine that does nothing else; test_machine.py has simulated time.
@@ -187,7 +191,7 @@ def cut(server: EmulatorServer, loop: SmallLoop, *, hangs: bool) -> float:
 
 def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:
     chance = random.Random(21)
-    times, moving = [], 0
+    times, moving, closing = [], 0, 0
     with emulated() as (loop, server):
         loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
         for number in range(CUTS):
@@ -197,7 +201,8 @@ def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:
             if number % 5:
                 loop.wait(ArmMode.HOLDING)
                 loop.clear_stop()
-                inwards(loop, 0.1)
+                # The fingers close and open in turn, so that they never reach an end.
+                inwards(loop, 0.1, 0.1 if number % 2 else -0.1)
             time.sleep(chance.uniform(0.0, 0.8))
             times.append(cut(server, loop, hangs=number % 4 == 3))
             # The request that had no reply may still arrive from the old connection, once.
@@ -207,12 +212,17 @@ def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:
             assert wire.motions() == motions
             packets = [r for r in motions[count:] if isinstance(r, requests.SendSplines)]
             moving += len(packets) > 4
+            # Targets of the fingers go one way, so an order that came twice is seen.
+            targets = [r.value for r in motions[count:] if isinstance(r, requests.CommandMotor)]
+            assert len(set(targets)) == len(targets)
+            closing += len(targets) > 1
             # Each packet begins where the one before it ends, so none came twice.
             for before, after in itertools.pairwise(packets):
                 ends = [axis.target for axis in before.segments]
                 assert [axis.p0 for axis in after.segments] == ends
     assert max(times) <= MAX_SILENCE
     assert moving >= CUTS // 4
+    assert closing >= CUTS // 4
 
 
 @pytest.mark.long

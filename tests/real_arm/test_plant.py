@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -82,6 +83,17 @@ def test_motion_is_the_same_on_each_run(robot: Robot) -> None:
         driven(PlantDriver(robot, START, 0.0, KATANA450), 0.5, moved) for _ in range(2)
     )
     assert all((a.q == b.q).all() for a, b in zip(first, second, strict=True))
+
+
+def test_step_of_the_plant_takes_a_small_part_of_a_tick(robot: Robot) -> None:
+    driver = PlantDriver(robot, START, 0.0, KATANA450)
+    driver.start(0.0)
+    took = []
+    for n in range(1, 200):
+        begun = time.process_time()
+        driver.send(moved(n * TICK), 0.0, n * TICK)
+        took.append(time.process_time() - begun)
+    assert sorted(took)[len(took) // 2] < 0.05 * TICK
 
 
 def test_stop_brakes_where_the_arm_is_and_is_measured(robot: Robot) -> None:

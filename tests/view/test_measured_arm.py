@@ -1,0 +1,59 @@
+"""A measured arm is drawn solid where it is, and its setpoint as a ghost while it lags behind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import viser
+
+from katana450.arm.control.session import Session
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.server.view.scenery import Scenery
+from katana450.server.view.view import GHOST_FROM, View
+from tests.viser_bridge.internals import nodes
+
+
+def assert_drawn(server: viser.ViserServer, robot: Robot, root: str, q: FloatArray) -> None:
+    """Check that the frames below ``root`` are those of the joints ``q`` (5,) [rad]."""
+    angles, node = robot.joint_values(q, 0.0), nodes(server)
+    for link in robot.links:
+        if link.joint is None or link.name.startswith("finger"):
+            continue
+        R = link.T_parent_link[:3, :3] @ so3.exp(link.joint.axis * angles[link.joint.name])
+        (name,) = (
+            name for name in node if name.startswith(root) and name.endswith(f"/{link.name}")
+        )
+        np.testing.assert_allclose(so3.from_quaternion(node[name].wxyz), R, atol=1e-9)
+
+
+def test_arm_is_drawn_where_it_is_measured_and_its_setpoint_as_a_ghost(
+    robot: Robot, server: viser.ViserServer, session: Session
+) -> None:
+    rest = session.begin(session.ready, 0.0, 0.0)
+    measured = frozen(session.ready - 0.1)
+    gestures: Any = SimpleNamespace(listen=lambda *_: None)
+    meshes: Any = SimpleNamespace()
+    scenery = Scenery(server, robot, session, load_props(), gestures, meshes)
+    view: Any = SimpleNamespace(_server=server, _robot=robot, _setpoint=None)
+
+    def show(q: FloatArray) -> bool:
+        """Show an arm at ``q``; return whether the ghost of its setpoint is visible."""
+        state = replace(rest, q=frozen(q))
+        scenery.show(state)
+        View._show_setpoint(view, state)
+        return view._setpoint is not None and bool(view._setpoint.root.visible)
+
+    assert not show(session.ready)
+    assert show(measured)
+    assert_drawn(server, robot, "/arm", measured)
+    assert_drawn(server, robot, "/setpoint", session.ready)
+    # Both follow, and an arm that has reached its setpoint has no ghost.
+    assert show(frozen(session.ready - 1.01 * GHOST_FROM))
+    assert not show(frozen(session.ready - 0.99 * GHOST_FROM))
+    assert_drawn(server, robot, "/arm", session.ready - 0.99 * GHOST_FROM)
