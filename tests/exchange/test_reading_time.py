@@ -11,10 +11,13 @@ import pytest
 from katana450.extensions.importers import guarded_reading
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import SECONDS
-from katana450.extensions.importers.surface import MAX_TRIANGLES
+from katana450.extensions.importers.surface import MAX_DRAWN
 from katana450.maths.geometry.arrays import FloatArray
 
 resource = pytest.importorskip("resource")
+
+LARGEST = 390_000
+"""Number of triangles of a binary STL file of the maximum size."""
 
 OURS = 1.0
 """[s] Maximum processor time in the process of the server."""
@@ -63,11 +66,11 @@ def spent() -> tuple[float, float]:
     ("name", "data", "count"),
     [
         ("soup.stl", stl(soup(20_000)), 20_000),
-        pytest.param("soup.stl", stl(soup(MAX_TRIANGLES)), MAX_TRIANGLES, marks=pytest.mark.long),
-        pytest.param("ball.stl", stl(ball(MAX_TRIANGLES)), MAX_TRIANGLES, marks=pytest.mark.long),
+        pytest.param("soup.stl", stl(soup(LARGEST)), LARGEST, marks=pytest.mark.long),
+        pytest.param("ball.stl", stl(ball(LARGEST)), LARGEST, marks=pytest.mark.long),
         ("star.obj", star(10_000), 9_998),
     ],
-    ids=["soup of 20k", "soup of 200k", "ball of 200k", "polygon of 10k"],
+    ids=["soup of 20k", "soup of 390k", "ball of 390k", "polygon of 10k"],
 )
 def test_mesh_is_read_in_the_time_promised(
     monkeypatch: pytest.MonkeyPatch, name: str, data: bytes, count: int
@@ -77,6 +80,7 @@ def test_mesh_is_read_in_the_time_promised(
     own, others = spent()
     mesh = read_mesh(data, name)
     own, others = spent()[0] - own, spent()[1] - others
-    assert len(mesh.faces) == count
+    assert mesh.text.startswith(f"{count} triangles")
+    assert len(mesh.faces) == count or MAX_DRAWN // 2 < len(mesh.faces) <= MAX_DRAWN
     assert own + others < SECONDS
     assert own < OURS

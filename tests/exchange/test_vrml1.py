@@ -97,5 +97,5 @@ def test_other_content_is_reported() -> None:
         " isA [ \"Cube\" ] a 1 Cube { } } WWWInline { name \"b.wrl\" }"
     )  # fmt: skip
     assert volume(shape) == pytest.approx(8e-9)
-    assert "Left out: pictures on the surface, AsciiText, Wobbler." in shape.text
+    assert "Left out: pictures on the surface, Wobbler." in shape.text
     assert "not there: b.wrl" in shape.text

@@ -36,6 +36,10 @@ def read(text: str, header: str = HEADER) -> ShapeFile:
             "heights that do not match",
         ),
         (f'{BOX} Inline {{ url "..\\parts\\a.wrl" }}', "not there: ../parts/a.wrl"),
+        (f"Switch {{ choice DEF a DEF a Group {{ children {BOX} }} }} USE a", ""),
+        (f"Group {{ children {BOX} name TITLE bboxSize 1 1 1 }}", "name of Group"),
+        ("geometry Box { }", ""),
+        (f'EXTERNPROTO P [ ] [ "a.wrl" "urn:x:node:Group" ] DEF p P {{ children {BOX} }}', ""),
     ],
 )
 def test_a_mistake_leaves_the_rest_of_the_world(text: str, note: str) -> None:

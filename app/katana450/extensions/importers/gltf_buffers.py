@@ -18,7 +18,7 @@ from katana450.errors import InputError
 from katana450.extensions.importers.companions import Companions
 from katana450.extensions.importers.gltf_document import Accessor, Document, DracoPart, MeshoptView
 from katana450.extensions.importers.library_errors import failures_in_words
-from katana450.extensions.importers.surface import MAX_TRIANGLES, doubles
+from katana450.extensions.importers.surface import doubles
 from katana450.maths.geometry.arrays import FloatArray
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -27,7 +27,7 @@ COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 512
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 """Number of components of each accessor type."""
 
-MAX_ROWS = 3 * MAX_TRIANGLES
+MAX_ROWS = 600_000
 """Maximum number of rows of an accessor that no buffer holds."""
 
 MAX_VIEW_BYTES = 64_000_000

@@ -21,7 +21,7 @@ from katana450.maths.geometry.arrays import FloatArray
 Natural = Annotated[int, msgspec.Meta(ge=0)]
 """A whole number from 0."""
 
-TRIANGLES, STRIP, FAN = 4, 5, 6
+POINTS, LINES, LOOP, LINE_STRIP, TRIANGLES, STRIP, FAN = range(7)
 """Modes of a primitive."""
 
 

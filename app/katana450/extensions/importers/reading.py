@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 import sys
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,9 +23,12 @@ from katana450.extensions.importers.shape_file import (
     MAX_MEMORY_BYTES,
     SECONDS,
     Format,
+    ShapeFile,
     Up,
     read_shape,
 )
+from katana450.extensions.importers.simplification import coarser
+from katana450.extensions.importers.surface import MAX_DRAWN, MeshSurface
 from katana450.platform_support import limit_resources
 
 
@@ -32,20 +36,30 @@ def main(arguments: list[str]) -> None:
     """Read one file. The process fails only at the limits of memory and time."""
     bind()
     format, name, unit, up, chosen = arguments
-    data = sys.stdin.buffer.read()
+    found = answer(
+        sys.stdin.buffer.read(),
+        Format(format),
+        name,
+        float(unit) if unit else None,
+        Up(up) if up else None,
+        chosen,
+    )
+    buffer = io.BytesIO()
+    arrays = {key: np.array(value) for key, value in found.items() if value is not None}
+    np.savez(buffer, allow_pickle=False, **arrays)
+    sys.stdout.buffer.write(buffer.getvalue())
+
+
+def answer(
+    data: bytes, format: Format, name: str, unit: float | None, up: Up | None, main: str
+) -> dict[str, object]:
+    """Return the content of the .npz for a file; arguments as those of `read_shape`."""
     found: dict[str, object] = {}
     missing: list[str] = []
     try:
-        shape = read_shape(
-            data,
-            Format(format),
-            name,
-            float(unit) if unit else None,
-            Up(up) if up else None,
-            main=chosen,
-            missing=missing,
-        )
+        shape = read_shape(data, format, name, unit, up, main=main, missing=missing)
         body = convex_body(shape.vertices * shape.scale)
+        shape = drawn(shape)
     except InputError as error:
         found["error"] = str(error)
         if isinstance(error, ChoiceError):
@@ -59,10 +73,26 @@ def main(arguments: list[str]) -> None:
         if shape.file is not data:
             found["content"] = np.frombuffer(shape.file, np.uint8)
     found["missing"] = np.array(missing, dtype=str)
-    buffer = io.BytesIO()
-    arrays = {key: np.array(value) for key, value in found.items() if value is not None}
-    np.savez(buffer, allow_pickle=False, **arrays)
-    sys.stdout.buffer.write(buffer.getvalue())
+    return found
+
+
+def drawn(shape: ShapeFile) -> ShapeFile:
+    """Return the shape with at most MAX_DRAWN triangles, made coarser if it has more."""
+    if len(shape.faces) <= MAX_DRAWN:
+        return shape
+    whole = MeshSurface(shape.vertices, shape.faces, shape.colours)
+    surface, moved = coarser(whole, MAX_DRAWN)
+    note = (
+        f"It is drawn with {len(surface.faces)} triangles, whose corners are up to "
+        f"{1e3 * shape.scale * moved:.2g} mm off."
+    )
+    return replace(
+        shape,
+        vertices=surface.vertices,
+        faces=surface.faces,
+        colours=surface.colours,
+        text=f"{shape.text} {note}",
+    )
 
 
 def bind() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,11 +17,29 @@ from katana450.maths.geometry.arrays import FloatArray, IntArray
 GREY = (204, 204, 204, 255)
 """Colour (RGBA bytes) of uncoloured parts beside coloured ones: the default of VRML97."""
 
-MAX_TRIANGLES = 200_000
+MAX_TRIANGLES = 2_500_000
 """Maximum number of triangles of a file."""
+
+MAX_DRAWN = 200_000
+"""Maximum number of triangles with which an object is drawn."""
 
 MAX_COPIES = 40_000
 """Maximum number of nodes of a scene, each counted as often as it is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines and points beside a surface.
+
+    Attributes:
+        ends: (k, 2) indices of its vertices; both are the same for a point.
+        kinds: names for them in messages.
+        colours: (k, 4) sRGB and opacity; None without colours.
+    """
+
+    ends: IntArray
+    kinds: tuple[str, ...]
+    colours: Colours | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,29 +50,40 @@ class MeshSurface:
         vertices: (n, 3).
         faces: (m, 3) indices of vertices, counter-clockwise seen from outside.
         colours: (m, 4) sRGB and opacity of the faces; None if the file has none.
+        lines: lines and points beside it; None without any.
     """
 
     vertices: FloatArray
     faces: IntArray
     colours: Colours | None = None
+    lines: Lines | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Return whether there is neither a face nor a line."""
+        return not len(self.faces) and self.lines is None
 
     def moved(self, T: FloatArray) -> MeshSurface:
         """Return it under the affine map ``T`` (4, 4); a mirrored surface keeps its outside."""
         with np.errstate(over="ignore", invalid="ignore"):
             vertices = self.vertices @ T[:3, :3].T + T[:3, 3]
             mirrored = float(np.linalg.det(T[:3, :3])) < 0.0
-        return MeshSurface(vertices, self.faces[:, ::-1] if mirrored else self.faces, self.colours)
+        faces = self.faces[:, ::-1] if mirrored else self.faces
+        return replace(self, vertices=vertices, faces=faces)
 
     def painted(self, colour: Sequence[float] | None) -> MeshSurface:
         """Return it in one colour (4,) 0..1, unless it has colours of its own."""
-        if colour is None or self.colours is not None:
+        if colour is None:
             return self
-        return MeshSurface(
-            self.vertices, self.faces, np.tile(as_bytes([colour]), (len(self.faces), 1))
-        )
+        colours, lines = self.colours, self.lines
+        if colours is None:
+            colours = np.tile(as_bytes([colour]), (len(self.faces), 1))
+        if lines is not None and lines.colours is None:
+            lines = replace(lines, colours=np.tile(as_bytes([colour]), (len(lines.ends), 1)))
+        return replace(self, colours=colours, lines=lines)
 
     def tidy(self) -> MeshSurface:
-        """Return it with equal vertices merged, without unused vertices or degenerate triangles."""
+        """Return its faces without degenerate ones, with equal vertices merged."""
         rows, faces = _used(self.vertices, self.faces)
         # Adding zero turns -0 into 0.
         rows = rows + 0.0
@@ -71,7 +100,7 @@ class MeshSurface:
 
 
 def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return the vertices that a face uses, and the faces with their new indices."""
+    """Return the vertices that faces or lines use, and these with their new indices."""
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     return vertices[used], (np.cumsum(used) - 1)[faces]
@@ -114,7 +143,10 @@ class MeshBuilder:
 
     def surface(self) -> MeshSurface:
         """Return all parts as one surface, with colours if any part has them."""
-        coloured = any(part.colours is not None for part in self._parts)
+        coloured = any(
+            part.colours is not None or (part.lines is not None and part.lines.colours is not None)
+            for part in self._parts
+        )
         offsets = np.cumsum([0, *(len(part.vertices) for part in self._parts)])
         paint = [value / 255.0 for value in GREY]
         parts = [part.painted(paint if coloured else None) for part in self._parts]
@@ -127,7 +159,21 @@ class MeshBuilder:
             np.concatenate([part.colours for part in parts if part.colours is not None])
             if coloured
             else None,
+            _joined([part.lines for part in parts], offsets),
         )
+
+
+def _joined(found: Sequence[Lines | None], offsets: IntArray) -> Lines | None:
+    """Return all lines as one, each with its offset of vertices; None without any."""
+    pairs = [(each, at) for each, at in zip(found, offsets, strict=False) if each is not None]
+    if not pairs:
+        return None
+    colours = [each.colours for each, _ in pairs if each.colours is not None]
+    return Lines(
+        np.concatenate([each.ends + at for each, at in pairs]),
+        tuple(dict.fromkeys(kind for each, _ in pairs for kind in each.kinds)),
+        np.concatenate(colours) if len(colours) == len(pairs) else None,
+    )
 
 
 def check_triangles(count: int, name: str) -> None:
@@ -178,6 +224,21 @@ def of_polygons(
     elif colours is not None:
         colours = colours[polygon]
     return MeshSurface(vertices, corners[triangles], colours)
+
+
+def of_lines(
+    vertices: FloatArray, ends: IntArray, kind: str, colours: FloatArray | None = None
+) -> MeshSurface:
+    """Return lines (k, 2) between those of the vertices (n, 3) that are there and finite.
+
+    ``kind`` is their name in messages; ``colours`` (k, 4) 0..1.
+    """
+    there = np.flatnonzero(((ends >= 0) & (ends < len(vertices))).all(axis=1))
+    kept = there[(np.abs(vertices[ends[there]]) < 1e30).all(axis=(1, 2))]
+    used, ends = _used(vertices, ends[kept])
+    paint = None if colours is None else as_bytes(colours[kept])
+    lines = Lines(ends, (kind,), paint) if len(ends) else None
+    return MeshSurface(used, np.zeros((0, 3), dtype=np.int64), None, lines)
 
 
 def doubles(values: npt.NDArray[Any]) -> FloatArray:

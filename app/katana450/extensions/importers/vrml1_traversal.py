@@ -17,7 +17,8 @@ from katana450.extensions.export.vrml_node import Node, Value
 from katana450.extensions.importers.surface import MAX_COPIES, MeshBuilder, MeshSurface
 from katana450.extensions.importers.vrml1_reader import Node1
 from katana450.extensions.importers.vrml_flattening import Shown, placed
-from katana450.extensions.importers.vrml_solids import surface_of
+from katana450.extensions.importers.vrml_lines import LINES
+from katana450.extensions.importers.vrml_shapes import surface_of
 from katana450.maths.geometry.arrays import FloatArray
 
 ALL, NONE = -3, -1
@@ -32,7 +33,6 @@ IGNORED = frozenset(
             "Fog",
             "Normal",
             "NormalBinding",
-            "FontStyle",
             "TextureCoordinate2",
         ),
         *("Texture2Transform", "OrthographicCamera", "PerspectiveCamera", "DirectionalLight"),
@@ -52,6 +52,7 @@ class State:
         material: the latest Material.
         binding: parts of a shape to which materials belong.
         clockwise: whether faces are clockwise seen from outside.
+        font: the latest FontStyle.
     """
 
     T: FloatArray = field(default_factory=lambda: np.eye(4))
@@ -59,6 +60,7 @@ class State:
     material: Node1 | None = None
     binding: str = "OVERALL"
     clockwise: bool = False
+    font: Node1 = field(default_factory=lambda: Node1("FontStyle"))
 
 
 class Traversal:
@@ -123,14 +125,15 @@ class Traversal:
     def _shape(self, node: Node1) -> None:
         state = self._state
         # The same shape with other properties is another surface.
-        key = (node, state.points, state.material, state.binding, state.clockwise)
+        key = (node, state.points, state.material, state.binding, state.clockwise, state.font)
         mark = tuple(each if isinstance(each, str | bool) else id(each) for each in key)
         if mark not in self._surfaces:
             shape = SHAPES[node.kind](node, state)
             self._surfaces[mark] = surface_of(shape, self._name, self._left_out)
         surface = self._surfaces[mark]
         if surface is not None:
-            self._builder.add(surface.painted(_colour(state.material)).moved(state.T))
+            colour = _colour(state.material, glows=node.kind in LINES)
+            self._builder.add(surface.painted(colour).moved(state.T))
 
 
 def _number(node: Node1, name: str, default: float) -> float:
@@ -169,6 +172,7 @@ PROPERTIES: dict[str, Callable[[Node1, State], State]] = {
     "MaterialBinding": lambda node, state: replace(
         state, binding=next(iter(node.words("value")), "OVERALL")
     ),
+    "FontStyle": lambda node, state: replace(state, font=node),
     "ShapeHints": lambda node, state: replace(
         state, clockwise="CLOCKWISE" in node.words("vertexOrdering")
     ),
@@ -232,6 +236,39 @@ def _faces(node: Node1, state: State) -> Node:
     return Node("IndexedFaceSet", tuple(fields))
 
 
+def _line_set(node: Node1, state: State) -> Node:
+    points = state.points[: len(state.points) // 3 * 3]
+    coord = Node("Coordinate", (("point", points),))
+    return Node("IndexedLineSet", (("coord", coord), ("coordIndex", _index(node, "coordIndex"))))
+
+
+def _point_set(node: Node1, state: State) -> Node:
+    count = len(state.points) // 3
+    first = int(np.clip(_number(node, "startIndex", 0.0), 0.0, count))
+    last = int(np.clip(_number(node, "numPoints", -1.0), -1.0, count - first)) + first
+    points = state.points[3 * first : 3 * (count if last < first else last)]
+    return Node("PointSet", (("coord", Node("Coordinate", (("point", points),))),))
+
+
+def _text(node: Node1, state: State) -> Node:
+    style = " ".join(state.font.words("style"))
+    justify = next(iter(node.words("justification")), "LEFT")
+    font = Node(
+        "FontStyle",
+        (
+            ("family", state.font.words("family")),
+            ("size", _number(state.font, "size", 10.0)),
+            ("style", style),
+            ("spacing", _number(node, "spacing", 1.0)),
+            ("justify", ({"CENTER": "MIDDLE", "RIGHT": "END"}.get(justify, "BEGIN"),)),
+        ),
+    )
+    rows = node.words("string")
+    return Node(
+        "Text", (("string", rows), ("fontStyle", font), ("length", node.numbers("width", ())))
+    )
+
+
 def _index(node: Node1, name: str) -> tuple[float, ...]:
     """Return a field of indices, those beyond any vertex as one bound."""
     return tuple(np.clip(node.numbers(name, ()), -1.0, 2.0**31).tolist())
@@ -249,16 +286,23 @@ SHAPES: dict[str, Callable[[Node1, State], Node]] = {
     "Cylinder": _cylinder,
     "Sphere": _sphere,
     "IndexedFaceSet": _faces,
+    "IndexedLineSet": _line_set,
+    "PointSet": _point_set,
+    "AsciiText": _text,
 }
 """The node of VRML97 with the same surface, by the kind of a shape."""
 
 
-def _colour(material: Node1 | None) -> tuple[float, ...] | None:
-    """Return the first colour (4,) 0..1 of a material; None without a material."""
+def _colour(material: Node1 | None, glows: bool) -> tuple[float, ...] | None:
+    """Return the first colour (4,) 0..1 of a material; None without a material.
+
+    With ``glows``, as lines do, the shape reflects no light.
+    """
     if material is None:
         return None
     diffuse = material.numbers("diffuseColor", (0.8,) * 3)[:3]
     glow = material.numbers("emissiveColor", (0.0,) * 3)[:3]
-    shown = diffuse if any(diffuse) or len(glow) < 3 else glow
+    is_glow = len(glow) == 3 and any(glow) and (glows or not any(diffuse))
+    shown = glow if is_glow else diffuse
     shown = shown if len(shown) == 3 else (0.8,) * 3
     return (*shown, 1.0 - _number(material, "transparency", 0.0))

@@ -12,6 +12,7 @@ import posixpath
 import re
 import zlib
 from collections import Counter
+from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
@@ -24,29 +25,38 @@ from katana450.extensions.importers.surface import MeshReading, MeshSurface
 from katana450.extensions.importers.vrml1_reader import parsed_vrml1
 from katana450.extensions.importers.vrml1_traversal import Traversal
 from katana450.extensions.importers.vrml_flattening import Flattening
-from katana450.extensions.importers.vrml_foreign import ForeignReader, parsed
+from katana450.extensions.importers.vrml_foreign import BUILT_IN, ForeignReader, parsed
 from katana450.extensions.importers.vrml_prototypes import Instance, Prototype, PrototypeExpansion
 from katana450.extensions.importers.vrml_standard import STANDARD
 
 GZIP = b"\x1f\x8b"
 """First bytes of a gzip file."""
 
-SUFFIXES = (".wrl", ".wrz", ".x3dv")
+XML = re.compile(rb"(\xef\xbb\xbf)?\s*<")
+"""Beginning of a file in XML."""
+
+SUFFIXES = (".wrl", ".wrz", ".x3dv", ".x3d")
 """Suffixes of worlds."""
 
-BUILT_IN = "urn:"
-"""Beginning of an address of a prototype that a program has built in."""
+MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf", ".dae")
+"""Suffixes of other files that worlds show."""
+
+Other = Callable[[str, bytes], MeshReading]
+"""A function that reads such a file by its path and content."""
+
+Y_FROM_Z = np.array(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1)), dtype=np.float64)
+"""Rotation (4, 4) of what has z up to y up."""
 
 
 def read_wrl(
-    data: bytes, name: str, maximum: int, companions: Companions | None = None
+    data: bytes, name: str, maximum: int, companions: Companions, other: Other
 ) -> MeshReading:
     """Return all surfaces that are shown at first, in the world frame with y up.
 
     ``maximum`` [bytes] limits the unpacked size of a compressed file. Raises InputError with the
     line of an error.
     """
-    worlds = _Worlds(name, maximum, companions or Companions())
+    worlds = _Worlds(name, maximum, companions, other)
     surface = worlds.read(data, "")
     unit = worlds.lengths.get("")
     return MeshReading(surface, tuple(worlds.left_out), unit=unit, note=worlds.note)
@@ -55,8 +65,9 @@ def read_wrl(
 class _Worlds:
     """The worlds of one upload: each is read once, with the worlds and prototypes it names."""
 
-    def __init__(self, name: str, maximum: int, companions: Companions) -> None:
+    def __init__(self, name: str, maximum: int, companions: Companions, other: Other) -> None:
         self._name, self._maximum, self._companions = name, maximum, companions
+        self._other = other
         self.left_out: Counter[str] = Counter()
         self.note = ""
         # Units of length [m] of the worlds that state one.
@@ -82,7 +93,7 @@ class _Worlds:
             world = tuple(map(expansion.expanded, found))
             surface = Flattening(name, self.left_out, self._shown).surface(world)
             # A world that another shows stays as empty as it is.
-            if path or len(surface.faces):
+            if path or not surface.is_empty:
                 return surface
             return self._sample(world, reader, expansion, name) or surface
         finally:
@@ -108,7 +119,7 @@ class _Worlds:
                     samples[each] = (expansion.expanded(instance),)
                 left_out: Counter[str] = Counter()
                 found = Flattening(name, left_out, self._shown, hidden).surface(samples[each])
-                if len(found.faces):
+                if not found.is_empty:
                     self.left_out |= left_out
                     parts = [f"its prototype {each[:40]!r}"] if each else []
                     parts += ["what a Switch hides"] if hidden else []
@@ -126,14 +137,27 @@ class _Worlds:
         if path in self._open:
             self.left_out["worlds that show themselves"] += 1
             return None
-        if not path.lower().endswith(SUFFIXES):
+        if path not in self._surfaces and path.lower().endswith(MESHES):
+            self._surfaces[path] = self._mesh(data, path)
+        if path not in self._surfaces and path.lower().endswith(SUFFIXES):
+            self._surfaces[path] = self.read(data, path)
+        if path not in self._surfaces:
             self.left_out[f"{posixpath.basename(path)}, which is not VRML"] += 1
             return None
-        if path not in self._surfaces:
-            self._surfaces[path] = self.read(data, path)
         own, other = (self.lengths.get(each, 1.0) for each in (self._open[-1], path))
         surface = self._surfaces[path]
         return surface if own == other else surface.moved(np.diag([*[other / own] * 3, 1.0]))
+
+    def _mesh(self, data: bytes, path: str) -> MeshSurface:
+        """Return the surface of a file of another format, with y up."""
+        reading = self._other(path, data)
+        self.left_out.update(reading.left_out)
+        if reading.unit is not None:
+            self.lengths[path] = reading.unit
+        elif not path.lower().endswith((".glb", ".gltf")):
+            # A file without a unit has that of the world.
+            self.lengths[path] = self.lengths.get(self._open[-1], 1.0)
+        return reading.surface.moved(Y_FROM_Z) if reading.up == "z" else reading.surface
 
     def _external(self, prototype: Prototype, path: str) -> Prototype | None:
         """Return a prototype that is in another file; None if that is not there."""
@@ -151,6 +175,11 @@ class _Worlds:
     def _text(self, data: bytes, name: str) -> str:
         if data.startswith(GZIP):
             data = _unpacked(data, name, self._maximum)
+        if XML.match(data):
+            # The library for XML is imported when a file needs it.
+            from katana450.extensions.importers.x3d_file import classic
+
+            return classic(data, name)
         return data.decode("utf-8", "replace").removeprefix("\ufeff")
 
     def _parsed(self, text: str, name: str) -> tuple[tuple[Node, ...], ForeignReader]:

@@ -10,14 +10,9 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node, Value
 from katana450.extensions.importers.surface import MAX_COPIES, MeshBuilder, MeshSurface
-from katana450.extensions.importers.vrml_solids import (
-    MAKERS,
-    number,
-    numbers,
-    part,
-    surface_of,
-    unit,
-)
+from katana450.extensions.importers.vrml_lines import LINES
+from katana450.extensions.importers.vrml_shapes import MAKERS, surface_of
+from katana450.extensions.importers.vrml_solids import number, numbers, part, texts, unit
 from katana450.extensions.importers.vrml_standard import IGNORED_NODES, TEXTURES
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -105,15 +100,10 @@ class Flattening:
             self._surfaces[id(geometry)] = surface_of(geometry, self._name, self._left_out)
         surface = self._surfaces[id(geometry)]
         if surface is not None:
-            self._builder.add(surface.painted(_colour(node)).moved(T))
+            colour = _colour(node, glows=geometry.kind in LINES)
+            self._builder.add(surface.painted(colour).moved(T))
         elif geometry.kind != "NULL":
             self._left_out[geometry.kind] += 1
-
-
-def texts(value: Value | None) -> tuple[str, ...]:
-    """Return the texts of a field."""
-    items = value if isinstance(value, tuple) else (value,)
-    return tuple(item for item in items if isinstance(item, str))
 
 
 def _nodes(value: Value | None) -> list[Node]:
@@ -139,8 +129,11 @@ def rotation(node: Node, field: str) -> FloatArray:
     return so3.exp(unit(np.array((x, y, z))) * float(np.remainder(angle, 2.0 * np.pi)))
 
 
-def _colour(shape: Node) -> tuple[float, ...] | None:
-    """Return the colour (4,) 0..1 of its material; None without a material."""
+def _colour(shape: Node, glows: bool) -> tuple[float, ...] | None:
+    """Return the colour (4,) 0..1 of its material; None without a material.
+
+    With ``glows``, as lines do, the shape reflects no light.
+    """
     appearance = part(shape, "appearance")
     material = None if appearance is None else part(appearance, "material")
     if material is None or material.kind not in BASE_COLOURS:
@@ -148,5 +141,5 @@ def _colour(shape: Node) -> tuple[float, ...] | None:
     field, default = BASE_COLOURS[material.kind]
     diffuse = numbers(material, field, (default,) * 3)[:, 0]
     glow = numbers(material, "emissiveColor", (0.0, 0.0, 0.0))[:, 0]
-    shown = diffuse if diffuse.any() else glow
+    shown = glow if glow.any() and (glows or not diffuse.any()) else diffuse
     return (*shown.tolist(), 1.0 - number(material, "transparency", 0.0))

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 from katana450.extensions.export.vrml_node import Node, Route, Type, Use, Value
 from katana450.extensions.importers.vrml_prototypes import IS, Instance, Prototype
 from katana450.extensions.importers.vrml_reader import VALUES, Reader
 from katana450.extensions.importers.vrml_standard import STANDARD, TEXTURES
+
+BUILT_IN = "urn:"
+"""Beginning of an address of a node or prototype that a program has built in."""
 
 CLOSERS = {"{": "}", "[": "]"}
 """The closing token of each opening token."""
@@ -48,6 +52,8 @@ class ForeignReader(Reader):
         super().__init__(text, name)
         self.left_out: Counter[str] = Counter()
         self.prototypes: dict[str, Prototype] = {}
+        # Nodes of the standard by the names that the file gives them.
+        self._built_in: dict[str, str] = {}
         # Unit of length [m], if the file states one.
         self.length: float | None = None
 
@@ -63,7 +69,10 @@ class ForeignReader(Reader):
         return name
 
     def _kind(self, name: str) -> str:
-        # The name is left out in DEF Transform { }.
+        # The name is left out in DEF Transform { }, and written twice in DEF a DEF a Group { }.
+        while self._ahead == "DEF":
+            self._take()
+            self._define(self._new_name())
         return name if self._ahead == "{" else self._take()
 
     def _used(self, node: Node, _name: str) -> Node:
@@ -111,6 +120,9 @@ class ForeignReader(Reader):
         return Node(IS, (("type", kind.value),), self._take())
 
     def _unknown(self, kind: str, name: str | None, depth: int) -> Node:
+        if kind in self._built_in:
+            node = self._node(depth, self._built_in[kind])
+            return replace(node, name=name) if isinstance(node, Node) else Node("NULL")
         if kind in self.prototypes:
             return self._instance(self.prototypes[kind], name, depth)
         if kind in ("PROTO", "EXTERNPROTO"):
@@ -123,6 +135,10 @@ class ForeignReader(Reader):
                 self._take()
                 self._take()
             return Node("NULL")
+        if kind[0].islower() and self._ahead in self.fields:
+            # A field without the node that has it.
+            found = self._node(depth)
+            return found if isinstance(found, Node) else Node("NULL")
         if kind == "UNIT":
             self._unit()
             return Node("NULL")
@@ -152,6 +168,10 @@ class ForeignReader(Reader):
         if kind == "EXTERNPROTO":
             urls = tuple(self._items(self._string))
             self.prototypes[name] = Prototype(name, types, defaults, None, urls)
+            kinds = [url.rpartition(":")[2] for url in urls if url.startswith(BUILT_IN)]
+            kind = next((kind for kind in kinds if kind in STANDARD), "")
+            if kind:
+                self._built_in[name] = kind
             return
         named, prototypes = self._named, self.prototypes
         self._named, self.prototypes = {}, dict(prototypes)
@@ -259,10 +279,13 @@ class ForeignReader(Reader):
         while self._ahead[:1] in VALUES[1:] and self._ahead:
             self._take()
             plain += 1
-        if not plain and self._ahead[:1].isupper():
-            self._node(depth + 1)
-            return True
-        return plain > 0
+        if plain or not self._ahead[:1].isupper():
+            return plain > 0
+        word = self._take()
+        # A word alone is a text without its quotes.
+        if word in ("DEF", "USE") or self._ahead == "{":
+            self._node(depth + 1, word)
+        return True
 
     def _route(self) -> Route:
         self._take()

@@ -11,34 +11,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from katana450.extensions.export.vrml_node import Node
+from katana450.extensions.export.vrml_node import Node, Value
 from katana450.extensions.importers.surface import MeshSurface, check_triangles, of_polygons
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 ROUND = 32
 """Number of sides that approximate a circle."""
-
-
-def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | None:
-    """Return the surface of a geometry node; None for a kind without one, such as lines.
-
-    ``name`` is the name of the file; ``left_out`` counts what contradicts the rest.
-    """
-    make = MAKERS.get(node.kind)
-    if make is not None and _is_empty(node):
-        left_out[f"{node.kind} without a size"] += 1
-        return MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-    return None if make is None else make(node, name, left_out)
-
-
-def _is_empty(node: Node) -> bool:
-    """Return whether a solid has no surface: one side may be 0, as of a plate."""
-    if node.kind not in LENGTHS:
-        return False
-    lengths = np.concatenate([numbers(node, name, (1.0,))[:, 0] for name in LENGTHS[node.kind]])
-    radius = node.kind != "Box" and not float(lengths[0]) > 0.0
-    return radius or bool((lengths < 0.0).any()) or int((lengths == 0.0).sum()) > 1
 
 
 def numbers(node: Node, field: str, default: Sequence[float], width: int = 1) -> FloatArray:
@@ -63,6 +42,12 @@ def part(node: Node, field: str) -> Node | None:
     """Return the node in a field; None if there is none."""
     value = node.get(field)
     return value if isinstance(value, Node) else None
+
+
+def texts(value: Value | None) -> tuple[str, ...]:
+    """Return the texts of a field."""
+    items = value if isinstance(value, tuple) else (value,)
+    return tuple(item for item in items if isinstance(item, str))
 
 
 def _box(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
@@ -125,20 +110,20 @@ def _turned(
 
 
 def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
-    points, paint = _points(node), _paint(node, left_out)
+    points, table = coordinates(node), colour_table(node, left_out)
     index = numbers(node, "coordIndex", ())[:, 0].astype(np.int64)
-    corners, sizes = _split(index)
+    corners, sizes = split(index)
     face_colours = corner_colours = None
-    if paint is not None:
+    if table is not None:
         chosen = numbers(node, "colorIndex", ())[:, 0].astype(np.int64)
         if flag(node, "colorPerVertex"):
-            places, their_sizes = _split(chosen) if len(chosen) else (corners, sizes)
+            places, their_sizes = split(chosen) if len(chosen) else (corners, sizes)
             fits = np.array_equal(sizes, their_sizes)
-            corner_colours = _chosen(paint, places, fits, left_out)
+            corner_colours = chosen_colours(table, places, fits, left_out)
         else:
             places = chosen if len(chosen) else np.arange(len(sizes))
             fits = len(places) >= len(sizes)
-            face_colours = _chosen(paint, places[: len(sizes)], fits, left_out)
+            face_colours = chosen_colours(table, places[: len(sizes)], fits, left_out)
     if face_colours is not None:
         corner_colours = np.repeat(face_colours, sizes, axis=0)
     surface = _of_whole_faces(points, corners, sizes, corner_colours, name, left_out)
@@ -147,7 +132,7 @@ def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
 
 def _set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     """Return the surface of a set of X3D: triangles, quadrangles, fans or strips."""
-    points, paint = _points(node), _paint(node, left_out)
+    points, table = coordinates(node), colour_table(node, left_out)
     kind = node.kind.removeprefix("Indexed")
     indexed = kind != node.kind
     index = numbers(node, "index", ())[:, 0].astype(np.int64) if indexed else np.arange(len(points))
@@ -158,7 +143,7 @@ def _set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     else:
         fans = kind == "TriangleFanSet"
         if indexed:
-            index, runs = _split(index)
+            index, runs = split(index)
         else:
             runs = numbers(node, "fanCount" if fans else "stripCount", ())[:, 0].astype(np.int64)
             # Points that are not there belong to no run.
@@ -172,7 +157,7 @@ def _set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
         odd = (last - first) % 2
         places = (first, last - 1, last) if fans else (last - 2 + odd, last - 1 - odd, last)
         corners, sizes = index[np.column_stack(places).ravel()], np.full(len(last), 3)
-    colours = None if paint is None else _chosen(paint, corners, True, left_out)
+    colours = None if table is None else chosen_colours(table, corners, True, left_out)
     surface = _of_whole_faces(points, corners, sizes, colours, name, left_out)
     return _facing(surface, not flag(node, "ccw"))
 
@@ -196,7 +181,7 @@ def _of_whole_faces(
     return of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
 
 
-def _points(node: Node) -> FloatArray:
+def coordinates(node: Node) -> FloatArray:
     """Return the coordinates (n, 3) of a geometry."""
     coord = part(node, "coord")
     if coord is None or coord.kind not in ("Coordinate", "CoordinateDouble"):
@@ -204,7 +189,7 @@ def _points(node: Node) -> FloatArray:
     return numbers(coord, "point", (), 3)
 
 
-def _paint(node: Node, left_out: Counter[str]) -> FloatArray | None:
+def colour_table(node: Node, left_out: Counter[str]) -> FloatArray | None:
     """Return the colours (c, 3 or 4) of a geometry; None if it has none."""
     color = part(node, "color")
     if color is None or color.kind == "NULL":
@@ -215,7 +200,7 @@ def _paint(node: Node, left_out: Counter[str]) -> FloatArray | None:
     return numbers(color, "color", (), 4 if color.kind == "ColorRGBA" else 3)
 
 
-def _split(index: IntArray) -> tuple[IntArray, IntArray]:
+def split(index: IntArray) -> tuple[IntArray, IntArray]:
     """Return corners (k,) and sizes (p,) of the polygons in a list with -1 between them."""
     ends = np.flatnonzero(np.append(index, -1) < 0)
     sizes = np.diff(ends, prepend=-1) - 1
@@ -223,17 +208,17 @@ def _split(index: IntArray) -> tuple[IntArray, IntArray]:
     return index[index >= 0], sizes if len(index) == 0 or index[-1] >= 0 else sizes[:-1]
 
 
-def _chosen(
-    paint: FloatArray, places: IntArray, fits: bool, left_out: Counter[str]
+def chosen_colours(
+    table: FloatArray, places: IntArray, fits: bool, left_out: Counter[str]
 ) -> FloatArray | None:
-    """Return the colours (k, 4) at ``places`` of the table ``paint`` (c, 3 or 4).
+    """Return the colours (k, 4) at ``places`` of ``table`` (c, 3 or 4).
 
     None if they do not match.
     """
-    if not fits or (places < 0).any() or (places >= len(paint)).any():
+    if not fits or (places < 0).any() or (places >= len(table)).any():
         left_out["colours that do not match the faces"] += 1
         return None
-    return np.column_stack((paint[places], np.ones(len(places))))[:, :4]
+    return np.column_stack((table[places], np.ones(len(places))))[:, :4]
 
 
 def _facing(surface: MeshSurface, turned: bool) -> MeshSurface:
@@ -258,11 +243,11 @@ def _grid(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     corners = np.column_stack((first, first + columns, first + columns + 1, first + 1)).ravel()
     corner_colours = None
-    paint = _paint(node, left_out)
-    if paint is not None:
+    table = colour_table(node, left_out)
+    if table is not None:
         by_vertex = flag(node, "colorPerVertex")
         places = corners if by_vertex else np.repeat(np.arange(len(first)), 4)
-        corner_colours = _chosen(paint, places, True, left_out)
+        corner_colours = chosen_colours(table, places, True, left_out)
     surface = of_polygons(
         points, corners, np.full(len(first), 4), name, corner_colours=corner_colours
     )
@@ -356,15 +341,7 @@ def unit(v: FloatArray) -> FloatArray:
     return np.asarray(v / np.linalg.norm(v))
 
 
-LENGTHS = {
-    "Box": ("size",),
-    "Cone": ("bottomRadius", "height"),
-    "Cylinder": ("radius", "height"),
-    "Sphere": ("radius",),
-}
-"""Lengths of a solid, the radius first."""
-
-MAKERS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
+SOLIDS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
     "Box": _box,
     "Cone": _cone,
     "Cylinder": _cylinder,

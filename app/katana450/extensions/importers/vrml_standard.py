@@ -33,6 +33,8 @@ _SET = {**_FACES, "coord": Type.NODE}
 
 _INDEX = {"index": Type.INT_LIST}
 
+_ARC = {"startAngle": Type.FLOAT, "endAngle": Type.FLOAT, "radius": Type.FLOAT}
+
 _SETS: Mapping[str, Mapping[str, Type]] = {
     "TriangleSet": {},
     "TriangleFanSet": {"fanCount": Type.INT_LIST},
@@ -144,7 +146,34 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "coordIndex": Type.INT_LIST,
             "colorIndex": Type.INT_LIST,
         },
+        "LineSet": {"coord": Type.NODE, "color": Type.NODE, "vertexCount": Type.INT_LIST},
         "PointSet": {"coord": Type.NODE, "color": Type.NODE},
+        "Arc2D": _ARC,
+        "ArcClose2D": {"closureType": Type.STRING, **_ARC, **_SOLID},
+        "Circle2D": {"radius": Type.FLOAT},
+        "Disk2D": {"innerRadius": Type.FLOAT, "outerRadius": Type.FLOAT, **_SOLID},
+        "Polyline2D": {"lineSegments": Type.PAIR_LIST},
+        "Polypoint2D": {"point": Type.PAIR_LIST},
+        "Rectangle2D": {"size": Type.PAIR, **_SOLID},
+        "TriangleSet2D": {"vertices": Type.PAIR_LIST, **_SOLID},
+        "Text": {
+            "string": Type.STRING_LIST,
+            "fontStyle": Type.NODE,
+            "length": Type.FLOAT_LIST,
+            "maxExtent": Type.FLOAT,
+            **_SOLID,
+        },
+        "FontStyle": {
+            "family": Type.STRING_LIST,
+            "horizontal": Type.BOOL,
+            "justify": Type.STRING_LIST,
+            "language": Type.STRING,
+            "leftToRight": Type.BOOL,
+            "size": Type.FLOAT,
+            "spacing": Type.FLOAT,
+            "style": Type.STRING,
+            "topToBottom": Type.BOOL,
+        },
         "Coordinate": FIELDS["Coordinate"],
         "CoordinateDouble": FIELDS["Coordinate"],
         "Color": {"color": Type.COLOR_LIST},
