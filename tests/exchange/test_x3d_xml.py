@@ -164,6 +164,7 @@ def test_units_of_the_head_count() -> None:
         (b"<!DOCTYPE X3D [<!ENTITY a 'b'>]><X3D><Scene>&a;</Scene></X3D>", "entities of its own"),
         (b"<!DOCTYPE X3D [<!ENTITY a SYSTEM 'file:///etc/passwd'>]><X3D/>", "entities of its own"),
         (b"<X3D><Scene>&a;</Scene></X3D>", "is corrupt"),
+        (b"<!DOCTYPE X3D SYSTEM 'a'><X3D><Scene>&a;</Scene></X3D>", "has no triangles"),
         (b"<?xml version='1.0' encoding='ebcdic-cp-us'?><X3D/>", "is corrupt|not X3D"),
         (b"\xff\xfe<\0X\0", "must begin|is corrupt"),
     ],

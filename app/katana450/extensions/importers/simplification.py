@@ -34,7 +34,7 @@ def coarser(surface: MeshSurface, maximum: int) -> tuple[MeshSurface, float]:
     fine = float((high - low).max()) / MAX_CELLS
     cell = max(0.5 * float(np.median(edges)), fine)
     found: tuple[IntArray, FloatArray, IntArray] | None = None
-    tries = FINER_GRIDS
+    tries, growth = FINER_GRIDS, 1.1
     while found is None or tries:
         cluster, means = _clustered(vertices, low, cell)
         kept = _distinct(cluster[faces], len(means))
@@ -45,8 +45,10 @@ def coarser(surface: MeshSurface, maximum: int) -> tuple[MeshSurface, float]:
         else:
             fine = cell
         if found is None:
-            # The number of triangles of a surface falls with the square of the size of a cell.
-            cell *= max(float(np.sqrt(len(kept) / maximum)), 1.1)
+            # The number of triangles of a surface falls with the square of the size of a cell. It
+            # falls later if there are many small triangles beside large ones.
+            cell *= max(float(np.sqrt(len(kept) / maximum)), growth)
+            growth **= 2
         else:
             cell = float(np.sqrt(fine * coarse)) if fine * 8.0 > coarse else coarse / 2.0
             tries -= 1

@@ -84,7 +84,7 @@ class _Rewriting:
         scene = next(root.iterfind("{*}Scene"), None)
         if scene is None:
             raise InputError(f"{self._name} is not X3D: it has no Scene.")
-        for element in scene:
+        for element in _inside(scene):
             self._node(element, 0)
         return "".join(self._parts)
 
@@ -112,7 +112,7 @@ class _Rewriting:
     def _instance(self, element: Any, kind: str, depth: int) -> None:
         name = element.get("DEF", "")
         values = {key: element.get(key) for key in element.attrib}
-        children = [each for each in element if _tag(each) not in ("IS", "fieldValue")]
+        children = [each for each in _inside(element) if _tag(each) not in ("IS", "fieldValue")]
         types: Types | None = STANDARD.get(kind)
         if kind == "ProtoInstance":
             kind = element.get("name", "")
@@ -132,7 +132,7 @@ class _Rewriting:
             for child in children:
                 held.setdefault(_field(child, types), []).append(child)
             if _tag(element) == "ProtoInstance":
-                held = {each.get("name"): list(each) for each in given if len(each)}
+                held = {each.get("name"): _inside(each) for each in given if len(each)}
             for field, inside in held.items():
                 if field not in connected:
                     self._nodes(field, types, inside, depth)
@@ -178,7 +178,7 @@ class _Rewriting:
             if type in NODES:
                 listed = type is Type.NODE_LIST
                 self._put("[" if listed else "" if len(each) else "NULL")
-                for node in each:
+                for node in _inside(each):
                     self._node(node, depth + 1)
                 self._put("]" if listed else "")
             elif each.get("value"):
@@ -191,6 +191,11 @@ class _Rewriting:
         for node in element.iterfind("{*}ProtoBody/*"):
             self._node(node, depth + 1)
         self._put("}")
+
+
+def _inside(element: Any) -> list[Any]:
+    """Return the elements in an element, without entities that are not expanded."""
+    return [each for each in element if isinstance(each.tag, str)]
 
 
 def _tag(element: Any) -> str:
