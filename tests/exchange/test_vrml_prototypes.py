@@ -147,6 +147,21 @@ def test_a_library_shows_its_first_prototype_with_a_surface() -> None:
     assert "at first" not in shape.text
 
 
+def test_a_robot_has_its_body_also_if_its_prototype_does_not_show_it() -> None:
+    robot = (
+        "PROTO Humanoid [ exposedField MFNode humanoidBody [ ] exposedField MFNode joints [ ] "
+        "exposedField MFNode viewpoints [ ] ] { Transform { children [ %s ] } } "
+        "Humanoid { humanoidBody [ DEF A Joint { size 1 1 1 } Joint { translation 5 0 0 } ] "
+        "joints [ USE A ] }"
+    )
+    hidden = read(JOINT + robot % "Group { children IS viewpoints }")
+    assert volume(hidden) == pytest.approx(2e-9)
+    assert "shows nothing at first: this is what humanoidBody of a robot holds." in hidden.text
+    shown = read(JOINT + robot % "Group { children IS humanoidBody }")
+    assert volume(shown) == pytest.approx(2e-9)
+    assert "at first" not in shown.text
+
+
 def test_what_a_switch_hides_is_read_if_nothing_else_is_there() -> None:
     hidden = "Switch { choice [ Shape { geometry Box { } } Shape { geometry Sphere { } } ] }"
     shape = read(hidden)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.surface import Lines, MeshReading, MeshSurface
+from katana450.extensions.importers.surface import MeshReading, MeshSurface, Strokes
 from katana450.maths.geometry.arrays import FloatArray
 
 THICKNESS = 1.0 / 200.0
@@ -40,7 +40,7 @@ def visible(reading: MeshReading, name: str) -> MeshReading:
     return replace(reading, surface=shown, note=f"{reading.note} {note}".lstrip())
 
 
-def bars(vertices: FloatArray, lines: Lines, name: str) -> MeshSurface:
+def bars(vertices: FloatArray, lines: Strokes, name: str) -> MeshSurface:
     """Return closed bars along ``lines`` between ``vertices``, and diamonds round single points.
 
     Raises InputError if there are more than MAX_BARS. ``name`` is the name of the file.

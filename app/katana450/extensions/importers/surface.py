@@ -28,7 +28,7 @@ MAX_COPIES = 40_000
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class Strokes:
     """Lines and points beside a surface.
 
     Attributes:
@@ -56,7 +56,7 @@ class MeshSurface:
     vertices: FloatArray
     faces: IntArray
     colours: Colours | None = None
-    lines: Lines | None = None
+    lines: Strokes | None = None
 
     @property
     def is_empty(self) -> bool:
@@ -163,13 +163,13 @@ class MeshBuilder:
         )
 
 
-def _joined(found: Sequence[Lines | None], offsets: IntArray) -> Lines | None:
+def _joined(found: Sequence[Strokes | None], offsets: IntArray) -> Strokes | None:
     """Return all lines as one, each with its offset of vertices; None without any."""
     pairs = [(each, at) for each, at in zip(found, offsets, strict=False) if each is not None]
     if not pairs:
         return None
     colours = [each.colours for each, _ in pairs if each.colours is not None]
-    return Lines(
+    return Strokes(
         np.concatenate([each.ends + at for each, at in pairs]),
         tuple(dict.fromkeys(kind for each, _ in pairs for kind in each.kinds)),
         np.concatenate(colours) if len(colours) == len(pairs) else None,
@@ -237,7 +237,7 @@ def of_lines(
     kept = there[(np.abs(vertices[ends[there]]) < 1e30).all(axis=(1, 2))]
     used, ends = _used(vertices, ends[kept])
     paint = None if colours is None else as_bytes(colours[kept])
-    lines = Lines(ends, (kind,), paint) if len(ends) else None
+    lines = Strokes(ends, (kind,), paint) if len(ends) else None
     return MeshSurface(used, np.zeros((0, 3), dtype=np.int64), None, lines)
 
 

@@ -24,7 +24,7 @@ from katana450.extensions.importers.companions import Companions
 from katana450.extensions.importers.surface import MeshReading, MeshSurface
 from katana450.extensions.importers.vrml1_reader import parsed_vrml1
 from katana450.extensions.importers.vrml1_traversal import Traversal
-from katana450.extensions.importers.vrml_flattening import Flattening
+from katana450.extensions.importers.vrml_flattening import Flattening, nodes
 from katana450.extensions.importers.vrml_foreign import BUILT_IN, ForeignReader, parsed
 from katana450.extensions.importers.vrml_prototypes import Instance, Prototype, PrototypeExpansion
 from katana450.extensions.importers.vrml_standard import STANDARD
@@ -37,6 +37,9 @@ XML = re.compile(rb"(\xef\xbb\xbf)?\s*<")
 
 SUFFIXES = (".wrl", ".wrz", ".x3dv", ".x3d")
 """Suffixes of worlds."""
+
+BODY = "humanoidBody"
+"""Field with all links of a robot of OpenHRP, which the prototypes of some files do not show."""
 
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf", ".dae")
 """Suffixes of other files that worlds show."""
@@ -83,8 +86,8 @@ class _Worlds:
         self._open.append(path)
         try:
             if re.match("#VRML V1.0", text):
-                nodes = parsed_vrml1(text, name)
-                return Traversal(name, self.left_out, self._shown).surface(nodes)
+                parts = parsed_vrml1(text, name)
+                return Traversal(name, self.left_out, self._shown).surface(parts)
             found, reader = self._parsed(text, name)
             self.left_out += reader.left_out
             if reader.length is not None:
@@ -95,22 +98,30 @@ class _Worlds:
             # A world that another shows stays as empty as it is.
             if path or not surface.is_empty:
                 return surface
-            return self._sample(world, reader, expansion, name) or surface
+            return self._sample(found, world, reader, expansion, name) or surface
         finally:
             self._open.pop()
 
     def _sample(
         self,
+        found: tuple[Node, ...],
         world: tuple[Node, ...],
         reader: ForeignReader,
         expansion: PrototypeExpansion,
         name: str,
     ) -> MeshSurface | None:
-        """Return a surface for a world that shows nothing; None if it has none.
+        """Return a surface for a world of nodes ``found`` that shows nothing; None if it has none.
 
-        This is its first prototype with a surface, with default values, since a library of
-        prototypes shows nothing by itself. Or what a Switch hides at first.
+        This is the body of a robot whose prototype does not show it. Or its first prototype with a
+        surface, with default values, since a library of prototypes shows nothing by itself. Or what
+        a Switch hides at first.
         """
+        robots = (each.get(BODY) for each in found)
+        body = tuple(expansion.expanded(each) for robot in robots for each in nodes(robot))
+        shown = Flattening(name, self.left_out, self._shown).surface(body)
+        if not shown.is_empty:
+            self.note = f"The world shows nothing at first: this is what {BODY} of a robot holds."
+            return shown
         samples: dict[str, tuple[Node, ...]] = {"": world}
         for hidden in (False, True):
             for each in ("", *reader.prototypes):
@@ -118,14 +129,13 @@ class _Worlds:
                     instance = Instance(each, (), None, reader.prototypes[each])
                     samples[each] = (expansion.expanded(instance),)
                 left_out: Counter[str] = Counter()
-                found = Flattening(name, left_out, self._shown, hidden).surface(samples[each])
-                if not found.is_empty:
+                sample = Flattening(name, left_out, self._shown, hidden).surface(samples[each])
+                if not sample.is_empty:
                     self.left_out |= left_out
                     parts = [f"its prototype {each[:40]!r}"] if each else []
                     parts += ["what a Switch hides"] if hidden else []
-                    shown = " with ".join(parts)
-                    self.note = f"The world shows nothing at first: this is {shown}."
-                    return found
+                    self.note = f"The world shows nothing at first: this is {' with '.join(parts)}."
+                    return sample
         return None
 
     def _shown(self, urls: tuple[str, ...]) -> MeshSurface | None:

@@ -45,10 +45,10 @@ class Flattening:
         self._surfaces: dict[int, MeshSurface | None] = {}
         self._visits = 0
 
-    def surface(self, nodes: tuple[Node, ...]) -> MeshSurface:
+    def surface(self, world: tuple[Node, ...]) -> MeshSurface:
         """Return the surface of all nodes of a file."""
         # Without recursion, because reused nodes can be nested deeper than the text.
-        waiting = [(node, np.eye(4)) for node in reversed(nodes)]
+        waiting = [(node, np.eye(4)) for node in reversed(world)]
         while waiting:
             node, T = waiting.pop()
             self._visits += 1
@@ -70,18 +70,18 @@ class Flattening:
         """Return the visible children of a node with their poses."""
         match node.kind:
             case "Group" | "Anchor" | "Billboard" | "Collision" | "StaticGroup":
-                return [(child, T) for child in _nodes(node.get("children"))]
+                return [(child, T) for child in nodes(node.get("children"))]
             case "Transform":
                 with np.errstate(over="ignore", invalid="ignore"):
                     T_children = T @ placed(node)
-                return [(child, T_children) for child in _nodes(node.get("children"))]
+                return [(child, T_children) for child in nodes(node.get("children"))]
             case "Switch":
                 chosen = int(number(node, "whichChoice", -1.0))
                 chosen = max(chosen, 0) if self._hidden else chosen
-                choice = _nodes(node.get("choice")) or _nodes(node.get("children"))
+                choice = nodes(node.get("choice")) or nodes(node.get("children"))
                 return [(choice[chosen], T)] if 0 <= chosen < len(choice) else []
             case "LOD":
-                levels = _nodes(node.get("level")) or _nodes(node.get("children"))
+                levels = nodes(node.get("level")) or nodes(node.get("children"))
                 return [(child, T) for child in levels[:1]]
             case "Shape" | "Inline":
                 pass
@@ -106,7 +106,8 @@ class Flattening:
             self._left_out[geometry.kind] += 1
 
 
-def _nodes(value: Value | None) -> list[Node]:
+def nodes(value: Value | None) -> list[Node]:
+    """Return the nodes in a field."""
     items = value if isinstance(value, tuple) else (value,)
     return [item for item in items if isinstance(item, Node)]
 
