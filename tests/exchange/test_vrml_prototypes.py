@@ -56,6 +56,14 @@ def test_instances_have_their_own_values_and_children() -> None:
     assert (shape.colours == (255, 0, 0, 255)).all()
 
 
+def test_a_prototype_may_have_the_name_of_another_node() -> None:
+    shape = read(
+        "PROTO Rectangle2D [ field SFFloat depth 1 ] { Shape { geometry Box { size 3 2 1 } } } "
+        "Transform { children Rectangle2D { depth 5 } }"
+    )
+    assert volume(shape) == pytest.approx(6e-9)
+
+
 def test_prototypes_are_nested_and_shared() -> None:
     leg = JOINT + (
         "PROTO Leg [ field SFVec3f at 0 0 0 field SFNode foot Joint { size 1 1 3 } ] {"

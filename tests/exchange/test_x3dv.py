@@ -118,6 +118,25 @@ def test_first_level_and_static_groups_are_shown() -> None:
     assert len(read(hidden).faces) == 2
 
 
+def test_humans_and_assemblies_are_shown() -> None:
+    box = "Shape { geometry Box { size 1 1 1 } }"
+    human = (
+        "HAnimHumanoid { translation 0 0 4 skeleton DEF R HAnimJoint { children [ HAnimSegment {"
+        f" children {box} }} HAnimJoint {{ translation 2 0 0 rotation 0 0 1 1.570796 "
+        f"children [ HAnimSite {{ translation 2 0 0 children {box} }} ] }} ] }} joints USE R "
+        f"skin Transform {{ translation 0 -2 0 children {box} }} }}"
+    )
+    shape = read(human)
+    assert len(shape.faces) == 3 * 12
+    assert sides(shape) == pytest.approx([30.0, 50.0, 10.0])
+    parts = (
+        f"CADLayer {{ children CADAssembly {{ children [ CADPart {{ translation 5 0 0 children "
+        f"CADFace {{ shape {box} }} }} CADFace {{ shape {box} }} ] }} }}"
+    )
+    shape = read(parts)
+    assert (len(shape.faces), sides(shape)) == (24, [60.0, 10.0, 10.0])
+
+
 def test_units_of_inlined_worlds_are_converted() -> None:
     box = "Shape { geometry Box { size 1 1 1 } }"
     text = (

@@ -24,6 +24,19 @@ BASE_COLOURS = {
 }
 """Field of the colour of each kind of material, and its default in all channels."""
 
+GROUPS = {
+    **dict.fromkeys(("Group", "StaticGroup", "Anchor", "Billboard", "Collision"), "children"),
+    **dict.fromkeys(("HAnimSegment", "CADAssembly", "CADLayer"), "children"),
+    "CADFace": "shape",
+}
+"""Field that is shown of each kind of group."""
+
+TRANSFORMS = {
+    **dict.fromkeys(("Transform", "HAnimJoint", "HAnimSite", "CADPart"), ("children",)),
+    "HAnimHumanoid": ("skeleton", "skin"),
+}
+"""Fields that are shown, at another place, of each kind of node with the fields of Transform."""
+
 Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 """A function that returns the surface of the first of several addresses that is there."""
 
@@ -69,12 +82,13 @@ class Flattening:
     def _shown(self, node: Node, T: FloatArray) -> list[tuple[Node, FloatArray]]:
         """Return the visible children of a node with their poses."""
         match node.kind:
-            case "Group" | "Anchor" | "Billboard" | "Collision" | "StaticGroup":
-                return [(child, T) for child in nodes(node.get("children"))]
-            case "Transform":
+            case kind if kind in GROUPS:
+                return [(child, T) for child in nodes(node.get(GROUPS[kind]))]
+            case kind if kind in TRANSFORMS:
                 with np.errstate(over="ignore", invalid="ignore"):
                     T_children = T @ placed(node)
-                return [(child, T_children) for child in nodes(node.get("children"))]
+                inside = (child for field in TRANSFORMS[kind] for child in nodes(node.get(field)))
+                return [(child, T_children) for child in inside]
             case "Switch":
                 chosen = int(number(node, "whichChoice", -1.0))
                 chosen = max(chosen, 0) if self._hidden else chosen

@@ -183,6 +183,8 @@ class ForeignReader(Reader):
                 body.append(node)
         self._take()
         self._named, self.prototypes = named, prototypes
+        # What a file declares counts, also under a name of the standard.
+        self.fields = {kind: fields for kind, fields in self.fields.items() if kind != name}
         first = body[0] if body else Node("NULL")
         self.prototypes[name] = Prototype(name, types, defaults, first)
 

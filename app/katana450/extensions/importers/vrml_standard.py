@@ -33,6 +33,13 @@ _SET = {**_FACES, "coord": Type.NODE}
 
 _INDEX = {"index": Type.INT_LIST}
 
+_TRANSFORM = {
+    **FIELDS["Transform"],
+    "scale": Type.VECTOR,
+    "scaleOrientation": Type.ROTATION,
+    **_BOX,
+}
+
 _ARC = {"startAngle": Type.FLOAT, "endAngle": Type.FLOAT, "radius": Type.FLOAT}
 
 _SETS: Mapping[str, Mapping[str, Type]] = {
@@ -59,12 +66,19 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             **_CHILDREN,
         },
         "Billboard": {"axisOfRotation": Type.VECTOR, **_CHILDREN},
-        "Transform": {
-            **FIELDS["Transform"],
-            "scale": Type.VECTOR,
-            "scaleOrientation": Type.ROTATION,
-            **_BOX,
+        "Transform": _TRANSFORM,
+        "HAnimHumanoid": {
+            "skeleton": Type.NODE_LIST,
+            "skin": Type.NODE_LIST,
+            **{name: kind for name, kind in _TRANSFORM.items() if name != "children"},
         },
+        "HAnimJoint": _TRANSFORM,
+        "HAnimSegment": _CHILDREN,
+        "HAnimSite": _TRANSFORM,
+        "CADLayer": _CHILDREN,
+        "CADAssembly": _CHILDREN,
+        "CADPart": _TRANSFORM,
+        "CADFace": {"shape": Type.NODE, **_BOX},
         # X3D has children in the place of choice and level.
         "Switch": {"choice": Type.NODE_LIST, "whichChoice": Type.INT, **_CHILDREN},
         "LOD": {

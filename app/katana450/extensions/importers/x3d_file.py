@@ -59,7 +59,10 @@ def classic(data: bytes, name: str) -> str:
         remove_pis=True,
     )
     with failures_in_words(name):
-        root = etree.fromstring(data, parser)
+        try:
+            root = etree.fromstring(data, parser)
+        except etree.XMLSyntaxError as error:
+            raise InputError(f"{name} is corrupt: {error.msg}.") from error
         own = root.getroottree().docinfo.internalDTD
         if own is not None and any(True for _ in own.iterentities()):
             raise InputError(f"{name} has entities of its own, which are not read.")
