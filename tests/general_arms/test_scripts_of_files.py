@@ -21,9 +21,9 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.script_schema import script_schema
 from katana450.extensions.programs.server.preview import Preview
+from katana450.extensions.programs.server.traces import Traces, coloured
 from katana450.extensions.programs.source import ScriptError
 from katana450.maths.kinematics.chain import Chain
-from katana450.server.view.traces import Traces, coloured
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.links_of_arms import ur5e
 from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA
