@@ -63,6 +63,6 @@ EXTENSION = Extension(
         add_serve_options,
         initial_scene=_initial_scene,
         routes=_routes,
-        needs=("programs", "scene", "export"),
+        needs=("programs", "scene", "export", "objects"),
     ),
 )

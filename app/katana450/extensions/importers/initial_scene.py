@@ -18,10 +18,10 @@ from katana450.errors import InputError
 from katana450.extensions.free_place import free_place
 from katana450.extensions.importers.mesh_file import read_mesh_file
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
+from katana450.extensions.objects.scenes import free_name
 from katana450.extensions.programs.scene_draft import Scene
 from katana450.extensions.programs.script_scene import check_scene
 from katana450.maths.geometry import se3
-from katana450.server.service.scenes import free_name
 
 PLACED = re.compile(
     r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?(?:@(?P<scale>[0-9.]+(?:e-?[0-9]+)?))?"

@@ -8,13 +8,13 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import LeaseError
 from katana450.extensions.importers.scene_file import StoredScene, scene_zip
+from katana450.extensions.objects.scenes import free_name, scenes_of, used_in
 from katana450.extensions.programs.scene_draft import Scene
 from katana450.maths.water.liquid import WATER
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
-from katana450.server.service.scenes import free_name, used_in
 
 
 def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
@@ -36,7 +36,7 @@ def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmHandle) -> an
     """Store ``stored``, read from ``data``, so that it can be loaded. Raises InputError."""
     key = hashlib.sha256(data).hexdigest()[:32]
     scene = stored.scene
-    hub.scenes.keep(
+    scenes_of(hub).keep(
         key, cmd.ReplaceScene(scene.objects, scene.water, scene.liquid), stored.meshes, arm
     )
     names = [scene_object.name for scene_object in scene.objects]

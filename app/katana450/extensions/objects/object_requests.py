@@ -13,6 +13,7 @@ from katana450.arm.control.solid import PLAIN, ObjectAppearance
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
 from katana450.errors import InputError
 from katana450.extensions.free_place import free_place
+from katana450.extensions.objects.scenes import scenes_of
 from katana450.maths.geometry import se3
 from katana450.maths.water.liquid import LIQUIDS
 from katana450.maths.water.units import ML
@@ -39,7 +40,7 @@ class ObjectRequests(RequestHandler):
             case requests.Attach():
                 return self._attached(request)
             case requests.Load(scene=key):
-                return self.hub.scenes.load_command(key, self.hub.present())
+                return scenes_of(self.hub).load_command(key, self.hub.present())
             case requests.Fill(ml=ml, of=name):
                 return cmd.Fill(ML * ml, LIQUIDS[name])
             case requests.Remove(name=name):

@@ -41,7 +41,6 @@ from katana450.server.service.pictures import ShownPictures
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.request_handler import RequestHandler
 from katana450.server.service.runner import Runner, guarded
-from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_news import StopNews
 from katana450.server.service.stop_path import StopPath
 from katana450.server.service.stop_state import ClearBy, StopRecord
@@ -80,7 +79,6 @@ class Hub:
         self.add_handler(self.runner)
         self.gate.on_stop = guarded(self.runner.stopped)
         self.meshes = Meshes() if meshes is None else meshes
-        self.scenes = Scenes(self.meshes)
         self._participants: dict[str, Participant] = {}
         self.pictures = ShownPictures()
         self._known = KnownPages()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from typing import TYPE_CHECKING, NamedTuple
+from weakref import WeakKeyDictionary
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import MAX_OBJECTS
@@ -13,6 +14,7 @@ from katana450.errors import InputError, LeaseError
 
 if TYPE_CHECKING:
     from katana450.server.service.arm_handle import ArmHandle
+    from katana450.server.service.hub import Hub
 
 MAX_WAITING_SCENES = 4
 """Maximum number of uploaded scenes that are not loaded yet."""
@@ -56,6 +58,14 @@ class Scenes:
             raise LeaseError(f"{held.name!r} is held: open the gripper first.")
         self._meshes.put(waiting.meshes, used_in(arm.state))
         return waiting.command
+
+
+_SCENES: WeakKeyDictionary[Hub, Scenes] = WeakKeyDictionary()
+
+
+def scenes_of(hub: Hub) -> Scenes:
+    """Return the scenes that wait on the server of ``hub``."""
+    return _SCENES.setdefault(hub, Scenes(hub.meshes))
 
 
 def used_in(state: State | None) -> frozenset[str]:
