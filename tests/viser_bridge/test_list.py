@@ -144,8 +144,8 @@ def test_private_parts_of_the_server_are_listed() -> None:
 
 def test_private_parts_in_tests_are_listed_and_in_one_folder() -> None:
     here = Path(__file__).parent
-    view = BRIDGE.parent / "view"
-    ours = {name for _, tree in trees(view) for name in _defined(tree)}
+    views = BRIDGE.parent / "view", BRIDGE.parents[1] / "extensions"
+    ours = {name for _, tree in trees(*views) for name in _defined(tree)}
     for path, tree in trees(ROOT / "tests", ROOT / "benchmarks", ROOT / "examples", ROOT / "docs"):
         modules = private_modules(tree)
         used = private_names(tree) - ours if imports_viser(tree) else set()
