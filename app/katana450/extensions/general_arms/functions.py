@@ -17,6 +17,7 @@ from katana450.extensions.general_arms.links import sine_and_cosine
 
 # A float or an array: the formulas are the same.
 Number = Any
+Numbers = tuple[Number, ...]
 
 FREE: Final = 1e-13
 """[1] or [m] Distance from an axis below which the turn about it is free. Any turn then
@@ -31,7 +32,8 @@ class Operations(NamedTuple):
         root: sqrt(x), and 0 where x < 0.
         select: (condition, a, b) to a where the condition holds, else b.
         bounded: the nearest number in [-1, 1].
-        rare: whether a rare case begins, of which the caller takes care: of many poses at once.
+        rarely: (condition, function, arguments, usual) to function(*arguments) in the rare case in
+            which the condition holds, else ``usual``. Arrays always have ``usual``.
     """
 
     atan2: Callable[[Number, Number], Number]
@@ -41,7 +43,7 @@ class Operations(NamedTuple):
     root: Callable[[Number], Number]
     select: Callable[[Number, Number, Number], Number]
     bounded: Callable[[Number], Number]
-    rare: Callable[[Number], bool]
+    rarely: Callable[[Number, Callable[..., Numbers], tuple[Number, ...], Numbers], Numbers]
 
 
 def _root(x: float) -> float:
@@ -57,7 +59,14 @@ def _bounded(x: float) -> float:
 
 
 FLOATS: Final = Operations(
-    math.atan2, math.hypot, math.cos, math.sin, _root, _select, _bounded, bool
+    math.atan2,
+    math.hypot,
+    math.cos,
+    math.sin,
+    _root,
+    _select,
+    _bounded,
+    lambda condition, function, arguments, usual: function(*arguments) if condition else usual,
 )
 
 ARRAYS: Final = Operations(
@@ -68,7 +77,7 @@ ARRAYS: Final = Operations(
     lambda x: np.sqrt(np.maximum(x, 0.0)),
     np.where,
     lambda x: np.clip(x, -1.0, 1.0),
-    lambda _: False,
+    lambda _condition, _function, _arguments, usual: usual,
 )
 
 Facing = tuple[tuple[Number, Number, Number], tuple[Number, Number, Number]]

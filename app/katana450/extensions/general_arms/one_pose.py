@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from katana450 import tolerances
 from katana450.extensions.general_arms.form import Form
 from katana450.extensions.general_arms.functions import Number
-from katana450.extensions.general_arms.straight_line import Code, Trace, compiled
+from katana450.extensions.general_arms.straight_line import Code, Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 
@@ -17,15 +17,15 @@ INPUTS = (("r11", "r12", "r13", "x"), ("r21", "r22", "r23", "y"), ("r31", "r32",
 """Names of the numbers of a pose."""
 
 
-def one_pose(chain: Chain, form: Form, *, is_reversed: bool) -> Code:
+def one_pose(chain: Chain, form: Form, *, is_reversed: bool, thorough: bool) -> Code:
     """Return solve(rows, free): the joint angles [rad] of all branches.
 
     ``rows`` is T_S_tool (4, 4) as nested lists, and ``free`` (n,) the canonical angles [rad] that
     are taken where the pose leaves them free. Each angle is in the turn inside its limits if there
-    is one, else in [-pi, pi]. The function returns None for a pose with a rare case of the
-    formulas, which these solve themselves.
+    is one, else in [-pi, pi]. Unless it is ``thorough``, the function returns None where the
+    formulas distinguish rare cases.
     """
-    trace = Trace()
+    trace = Trace(thorough=thorough)
     rows: Matrix = [[trace.term(name) for name in names] for names in INPUTS]
     if is_reversed:
         rows = _inverse(rows)
@@ -39,7 +39,7 @@ def one_pose(chain: Chain, form: Form, *, is_reversed: bool) -> Code:
         for alpha in found
     ]
     inputs = ", ".join(f"({', '.join(names)})" for names in INPUTS)
-    return compiled(trace.text(f"{inputs}, _ = rows", outputs))
+    return trace.compiled(f"{inputs}, _ = rows", outputs)
 
 
 def _inner(form: Form, rows: Matrix) -> Matrix:

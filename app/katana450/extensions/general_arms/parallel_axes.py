@@ -84,9 +84,12 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
             first, second, radius = split((m11, m12, m13), (m21, m22, m23), m31, m33, 0.0)
             u, v = ahead - a1, up
             for psi, five, six, cp, sp in (first, second):
-                if f.rare(radius <= LOOSE):
-                    psi, six = loosened(u, v, psi, six, free[5], radius, m33)  # noqa: PLW2901
-                    cp, sp = f.cos(psi), f.sin(psi)  # noqa: PLW2901
+                psi, six, cp, sp = f.rarely(  # noqa: PLW2901
+                    radius <= LOOSE,
+                    loosened,
+                    (u, v, psi, six, free[5], radius, m33),
+                    (psi, six, cp, sp),
+                )
                 towards, opening, bend = bent(u - ex * cp + ey * sp, v - ex * sp - ey * cp)
                 for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
                     four = flip * (psi - two - bend_)
@@ -96,8 +99,10 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
     return solve
 
 
-def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple[float, float]]:
+def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple[float, ...]]:
     """Return a function for psi and alpha6 [rad] where axes 4 and 6 are nearly in line.
+
+    It also returns the cosine and sine of psi.
 
     Of all turns that keep their sum, or difference, and turn the tool by less than HELD, it
     takes the one with alpha6 at the wanted angle, else the given one, and of these the nearest that
@@ -109,13 +114,14 @@ def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple
 
     def loosened(
         u: float, v: float, psi: float, six: float, free: float, radius: float, aligned: float
-    ) -> tuple[float, float]:
+    ) -> tuple[float, ...]:
         side = 1.0 if aligned >= 0.0 else -1.0
         for wanted in (psi + side * (six - free), psi):
             turn = wrapped(nearest(u, v, wanted) - psi)
             if radius <= FREE or radius * abs(turn) <= HELD:
-                return psi + turn, six - side * turn
-        return psi, six
+                psi, six = psi + turn, six - side * turn
+                break
+        return psi, six, math.cos(psi), math.sin(psi)
 
     def nearest(u: float, v: float, wanted: float) -> float:
         g = math.hypot(u, v)
@@ -152,11 +158,13 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
         z = z - d1
         beside = (c1 * z - height) / s1
         up = c1 * beside + s1 * z
-        planes = list(turns(x, y, beside, free[0]))
-        if f.rare(planes[0][2] <= near):
-            planes = _by_axes(planes, x, y, beside, -flip * s1 * r23, flip * s1 * r13)
+        front, back = turns(x, y, beside, free[0])
+        along = -flip * s1 * r23, flip * s1 * r13
+        planes = f.rarely(
+            front[2] <= near, _by_axes, (*front, *back, x, y, beside, *along), (*front, *back)
+        )
         found = []
-        for c, s, ahead in planes:
+        for c, s, ahead in (planes[:3], planes[3:]):
             one = atan2(s, c)
             m11, m21 = c * r11 + s * r21, c1 * (c * r21 - s * r11) + s1 * r31
             psi = f.select(hypot(m11, m21) <= FREE, 0.0, atan2(m21, m11))
@@ -168,26 +176,22 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
     return solve
 
 
-def _by_axes(
-    planes: list[tuple[float, float, float]],
-    x: float,
-    y: float,
-    beside: float,
-    c: float,
-    s: float,
-) -> list[tuple[float, float, float]]:
-    """Return the turns of axis 1, one of them along (c, s) if that holds the tool point too."""
+def _by_axes(*numbers: float) -> tuple[float, ...]:
+    """Return the turns of axis 1, one of them along (c, s) if that holds the tool point too.
+
+    numbers: the two turns, (cos, sin, x') each; x, y and height of the tool point; c and s.
+    """
+    front, back, (x, y, beside, c, s) = numbers[:3], numbers[3:6], numbers[6:]
     size = math.hypot(c, s)
     if size <= FREE:
-        return planes
+        return front + back
     c, s = c / size, s / size
     if abs(c * y - s * x - beside) > AGREES:
-        return planes
-    front, back = planes
-    ahead = c * x + s * y
+        return front + back
+    along = c, s, c * x + s * y
     if c * front[0] + s * front[1] >= c * back[0] + s * back[1]:
-        return [(c, s, ahead), back]
-    return [front, (c, s, ahead)]
+        return along + back
+    return front + along
 
 
 def pointed(links: DHLinks) -> DHLinks:

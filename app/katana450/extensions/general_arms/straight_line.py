@@ -144,11 +144,16 @@ def _span(value: Number) -> Span:
 
 
 class Trace:
-    """The terms of one function, in the order in which they were made."""
+    """The terms of one function, in the order in which they were made.
 
-    def __init__(self) -> None:
+    ``thorough``: whether the function does what is rarely needed. Else it returns None there.
+    """
+
+    def __init__(self, *, thorough: bool = True) -> None:
+        self._thorough = thorough
         self._terms: dict[tuple[object, ...], Term] = {}
         self._rare: list[tuple[int, Term]] = []
+        self._called: dict[str, Callable[..., tuple[float, ...]]] = {}
 
     def term(self, text: str, *arguments: Number, span: Span = NO_SPAN) -> Term:
         """Return the term of ``text``; equal ones are the same object."""
@@ -182,7 +187,7 @@ class Trace:
             self._root,
             self._select,
             self._bounded,
-            self._is_rare,
+            self._rarely,
         )
 
     def _atan2(self, y: Number, x: Number) -> Number:
@@ -205,11 +210,25 @@ class Trace:
             return a if condition else b
         return self.term("({1} if {0} else {2})", condition, a, b)
 
-    def _is_rare(self, condition: Number) -> bool:
-        """Let the function return None where ``condition`` holds; return False."""
-        if condition not in self._conditions:
-            self._rare.append((len(self._terms), condition))
-        return False
+    def _rarely(
+        self,
+        condition: Term,
+        function: Callable[..., tuple[float, ...]],
+        arguments: tuple[Number, ...],
+        usual: tuple[Number, ...],
+    ) -> tuple[Number, ...]:
+        if not self._thorough:
+            if condition not in self._conditions:
+                self._rare.append((len(self._terms), condition))
+            return usual
+        name = function.__name__
+        self._called[name] = function
+        places = ", ".join(f"{{{k + 1}}}" for k in range(len(arguments)))
+        made = self.term(f"({name}({places}) if {{0}} else ())", condition, *arguments)
+        return tuple(
+            self.term(f"({{1}}[{k}] if {{0}} else {{2}})", condition, made, each)
+            for k, each in enumerate(usual)
+        )
 
     def _function(
         self, name: str, function: Callable[..., float], span: Span
@@ -221,6 +240,13 @@ class Trace:
             return self.term(f"{name}({places})", *arguments, span=span)
 
         return made
+
+    def compiled(self, inputs: str, outputs: Sequence[Sequence[Number]]) -> Code:
+        """Return the function of `text`."""
+        names = {**NAMES, **self._called}
+        exec(self.text(inputs, outputs), names)
+        code: Code = names["solve"]
+        return code
 
     def text(self, inputs: str, outputs: Sequence[Sequence[Number]]) -> str:
         """Return the text of the function of (rows, free) for ``outputs``.
@@ -277,11 +303,3 @@ def another_turn_helps(lower: float, upper: float) -> bool:
 def _is_rarely_used(term: Term) -> bool:
     """Return whether a term is an input, or made of a free angle, which is rarely used."""
     return all(isinstance(each, Term) and each.text.startswith("free") for each in term.arguments)
-
-
-def compiled(text: str) -> Code:
-    """Return the function ``solve`` of a text by `Trace`."""
-    names = dict(NAMES)
-    exec(text, names)
-    code: Code = names["solve"]
-    return code
