@@ -13,7 +13,9 @@ from katana450.arm.control.state import State
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from tests.general_arms.published_arms import FOUR, SEVEN, SIX, SKEWED
 
@@ -24,30 +26,70 @@ MAX_MOVE = 2.0
 """[rad] A call moves the goal by a few hops of 0.1 rad at most."""
 
 
+PLACES = 64
+"""Number of places at which the way of a drag is looked at."""
+
+CLEAR_STEP = 0.05
+"""[rad] Turn of a joint from place to place up to which the way is clear."""
+
+
 class Dragged(NamedTuple):
-    """The results of some drags."""
+    """The results of some drags; those with a ``clear`` way have all arrived."""
 
     arrived: int
     held: int
+    clear: int
     calls: int
     seconds: float
+
+
+def is_clear(tool: DrivenTool, q: FloatArray, branch: str, way: tuple[ToolPose, ToolPose]) -> bool:
+    """Return whether ``branch`` has postures inside the limits all the way, without a leap.
+
+    Only six axes with a closed form can tell. The arm stands at the beginning of the way.
+    """
+    start, target = way
+    if not tool._branches.is_exact:
+        return False
+    for k in range(PLACES + 1):
+        place = start.towards(target, k / PLACES)
+        found = tool._branches.on_branch(place.T, branch, q)
+        if found is None or not tool.chain.within_limits(found):
+            return False
+        if np.abs(found - q).max() > CLEAR_STEP or tool.branch_of(found) != branch:
+            return False
+        reached = ToolPose.of(forward(tool.chain, found))
+        if max(reached.apart(place)) > 1e-9:
+            return False
+        q = found
+    return True
 
 
 def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragged:
     """Drag the tool along ``count`` random paths and check every call."""
     tool = DrivenTool(chain)
     rng = np.random.default_rng(23)
-    arrived = held = calls = 0
+    arrived = held = clear = calls = 0
     seconds = 0.0
+    ready = tool.ready((), np.eye(4))
+    exact = True
     for number in range(count):
         if number % DRAGS_OF_A_TRIP == 0:
             even = number // DRAGS_OF_A_TRIP % 2 == 0
-            q = tool.ready((), np.eye(4)) if even else rng.uniform(chain.lower, chain.upper)
+            q = ready if even else rng.uniform(chain.lower, chain.upper)
             state = State.standing(q, 0.0, 0.0, "tcp", tool.branch_of(q))
             state = replace(state, priority=priority)
-            since = tool.target_at(q)
-        turn = so3.exp(0.3 * rng.normal(size=3))
+            since, exact = tool.target_at(q), True
+        # Four axes can only pitch their tool.
+        turn = so3.exp(
+            0.3 * rng.normal() * chain.S[:3, 3] if chain.n == 4 else 0.3 * rng.normal(size=3)
+        )
         target = ToolPose(since.position + 0.08 * rng.normal(size=3), turn @ since.R)
+        way_is_clear = (
+            exact
+            and priority is Priority.POSE
+            and is_clear(tool, state.goal, str(state.branch), (since, target))
+        )
         for _ in range(MAX_CALLS):
             begin = time.thread_time()
             found = tool.track(state, target, since)
@@ -64,17 +106,20 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
             since = found.since
         since = target
         exact = found.best.position_error < 1e-6 and found.best.rotation_error < 1e-6
+        assert exact or not way_is_clear
+        clear += way_is_clear
         arrived += exact
         held += not exact
-    return Dragged(arrived, held, calls, seconds)
+    return Dragged(arrived, held, clear, calls, seconds)
 
 
 @pytest.mark.parametrize("name", ["UR5e", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
 def test_drags_keep_branch_and_limits(name: str) -> None:
     found = drags(ARMS[name], 20)
     assert found.arrived + found.held == 20
-    if ARMS[name].n >= 6:
-        assert found.arrived >= 5
+    assert found.arrived >= 3
+    if name in SIX:
+        assert found.clear >= 3
 
 
 @pytest.mark.parametrize("name", SEVEN)
@@ -87,7 +132,8 @@ def test_drags_of_seven_axes_keep_branch_and_limits(name: str) -> None:
 def test_10000_drags_keep_branch_and_limits(name: str) -> None:
     found = drags(ARMS[name], 10_000)
     print(
-        f"{name}: {found.arrived} arrived, {found.held} held, {found.calls} calls, "
+        f"{name}: {found.arrived} arrived, {found.clear} of them with a clear way, "
+        f"{found.held} held, {found.calls} calls, "
         f"{1e3 * found.seconds / found.calls:.2f} ms each"
     )
 
