@@ -181,7 +181,7 @@ export class Episodes {
     const seconds = (value) => ({ type: "number", step: 0.1, min: 0, max: recorded.toFixed(1), value: value.toFixed(1) });
     const select = html("select", {}, ...Object.entries(OUTCOMES).slice(0, outcome === "unfinished" ? 4 : 3).map(([value, words]) => html("option", { value, ...(value === outcome && { selected: "" }) }, words)));
     select.addEventListener("change", () => ask({ do: "judge", outcome: select.value }));
-    const discard = html("button", { type: "button" }, "Discard");
+    const discard = html("button", { type: "button", "data-key": `${number} kept` }, "Discard");
     discard.addEventListener("click", () => ask({ do: "discard" }));
     row.append(
       html("label", {}, "Outcome", select),
@@ -189,13 +189,13 @@ export class Episodes {
       field("Note", { maxlength: 500, value: note }, (value) => ask({ do: "describe", note: value })),
       field("From, s", seconds(start), (value) => ask({ do: "trim", start: Number(value), end })),
       field("To, s", seconds(end), (value) => ask({ do: "trim", start, end: Number(value) })),
-      html("div", {}, discard, html("a", { href: `api/v1/episodes/${number}`, download: file }, `Download, ${size(bytes)}`)),
+      html("div", {}, discard, html("a", { "data-key": `${number} file`, href: `api/v1/episodes/${number}`, download: file }, `Download, ${size(bytes)}`)),
     );
     return html("li", {}, row);
   }
 
   #gone({ number, task }) {
-    const back = html("button", { type: "button", "aria-label": `Restore episode ${number}` }, "Restore");
+    const back = html("button", { type: "button", "data-key": `${number} kept`, "aria-label": `Restore episode ${number}` }, "Restore");
     back.addEventListener("click", () => this.#ask({ do: "restore", number }));
     return html("li", { class: "gone" }, html("b", {}, `${number}`), html("span", {}, `discarded ${task}`), ...(this.#may ? [back] : []));
   }

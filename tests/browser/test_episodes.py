@@ -263,3 +263,51 @@ def test_viewer_sees_and_changes_nothing(browser: Browser, tmp_path: Path, folde
         page.page.wait_for_timeout(1000)
         assert rec(page).startswith("REC 0:")
         window.close()
+
+
+@pytest.mark.long
+def test_list_is_edited_by_keyboard_alone(open_page: OpenPage, server: AppServer) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=WIDE)
+    ready(page)
+    keys = page.page.keyboard
+    keys.press("t")
+    toast(page, "Recording episode 1")
+    move(server, *POSTURES)
+    keys.press("y")
+    page.wait_until(lambda: outcomes(server) == ["success"], "the success")
+    page.page.focus("#episodes-button")
+    keys.press("Enter")
+    tab_to(page, "#episodes summary")
+    keys.press("Enter")
+    tab_to(page, "#episodes ol select")
+    keys.press("f")
+    page.wait_until(lambda: outcomes(server) == ["failure"], "the failure")
+    tab_to(page, "#episodes ol input[maxlength='500']")
+    keys.type("half a cup")
+    tab_to(page, "#episodes ol label:last-of-type input")
+    keys.press("Control+A")
+    keys.type("1.0")
+    # Leaving the field changes the list, and the focus stays where it came to.
+    tab_to(page, "#episodes ol button")
+    page.page.evaluate("window.before = document.activeElement")
+    page.wait_until(lambda: listed(server)["episodes"][0]["end"] == 1.0, "the end")
+    assert listed(server)["episodes"][0]["note"] == "half a cup"
+    page.wait_until(lambda: page.page.evaluate("!before.isConnected"), "the new list")
+    assert page.page.evaluate("document.activeElement.matches('#episodes ol button')")
+    keys.press("Enter")
+    page.wait_until(lambda: len(listed(server)["discarded"]) == 1, "the discarded one")
+    page.wait_until(lambda: page.page.locator("#episodes .gone").count() == 1, "it in the list")
+    # The focus is on the button that takes it back.
+    assert page.page.evaluate("document.activeElement.matches('#episodes .gone button')")
+    keys.press("Enter")
+    page.wait_until(lambda: outcomes(server) == ["failure"], "the episode again")
+    assert page.errors == []
+
+
+def tab_to(page: ViserPage, what: str) -> None:
+    """Press Tab until ``what`` has the focus."""
+    for _ in range(60):
+        if page.page.evaluate("(what) => document.activeElement.matches(what)", what):
+            return
+        page.page.keyboard.press("Tab")
+    raise AssertionError(f"the key Tab does not reach {what}")

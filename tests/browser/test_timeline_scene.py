@@ -26,6 +26,7 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.test_timeline import GHOST, opened, place, rest, shown_turn, visible
+from tests.general_arms.links_of_arms import ur5e
 
 pytestmark = pytest.mark.long
 
@@ -214,3 +215,46 @@ def test_handles_of_the_selection_are_dragged_by_the_mouse(
         mouse.up()
         assert float(slider.input_value()) == pytest.approx(fraction * length, abs=0.02 * length)
     assert page.errors == []
+
+
+def test_another_arm_is_played_back_and_runs_again(
+    tmp_path: Path, open_page: OpenPage, artefacts: Path
+) -> None:
+    """A UR5e: six axes, no gripper."""
+    urdf, folder = tmp_path / "ur5e.urdf", tmp_path / "ring"
+    urdf.write_text(ur5e(), encoding="utf-8")
+    command = (*RECORDING_APP, "--silence", "2.0", "--urdf", str(urdf), "--record", str(folder))
+    with AppServer(command) as server:
+        with connect(server.url, "Ada") as arm:
+            arm.ask(requests.Home(wait=30))
+            home = np.array(arm.query(answers.State).q)
+            for by in (0.6, -0.3):
+                arm.ask(requests.Joints(q=[home[0] + by, *home[1:].tolist()], wait=30))
+            end = np.array(arm.query(answers.State).q)
+        page = open_page(server.url, nodes=("/arm",))
+        run = PlaybackRun(lambda: recordings_in(folder))
+
+        def recorded() -> bool:
+            run.update()
+            moment = run.at(math.inf) if run.spans else None
+            return moment is not None and np.allclose(moment.row.q, end, atol=1e-9)
+
+        page.wait_until(recorded, "the motion in the recording", seconds=40.0)
+        opened(page)
+        place(page, 1.0)
+        link = f"{GHOST}/base_link/shoulder"
+        page.wait_until(lambda: visible(page, link), "the recorded arm")
+        moment = run.at(run.spans[0].start + 1.0)
+        assert moment is not None
+
+        def turn() -> float:
+            R = np.linalg.inv(page.node_pose(f"{GHOST}/base_link")) @ page.node_pose(link)
+            return float(np.arctan2(R[1, 0], R[0, 0]))
+
+        page.wait_until(lambda: abs(turn() - moment.row.q[0]) < 2e-2, "the recorded posture")
+        page.keep(artefacts / "timeline-ur5e.png")
+        page.page.get_by_role("button", name="Run again the selected motion").click()
+        page.page.get_by_text("The motion has run again.").wait_for(timeout=90_000)
+        with connect(server.url, "Look") as arm:
+            np.testing.assert_allclose(arm.query(answers.State).q, end, atol=1e-4)
+        assert page.errors == []
