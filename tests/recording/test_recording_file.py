@@ -17,17 +17,24 @@ from mcap.writer import Writer
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
+from katana450.extension import ServerFacts
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files import message_writer
 from katana450.extensions.recording.files.checking import verify_recording
 from katana450.extensions.recording.files.fingerprint import RELEVANT, differences, fingerprint
-from katana450.extensions.recording.files.header import METADATA
+from katana450.extensions.recording.files.header import (
+    MAX_SCENE_BYTES,
+    METADATA,
+    attached_scene,
+)
 from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.table import columns, state_at
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.live import recorder
+from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.topics import (
     CHECKPOINTS,
     COMMANDS,
@@ -40,7 +47,8 @@ from katana450.extensions.recording.topics import (
 from katana450.maths.kinematics.forward import forward
 from katana450.platform_support import claim_file
 from katana450.resources import URDF_PATH
-from tests.recording.recorded import described, header, record, run
+from katana450.settings import Settings
+from tests.recording.recorded import PERIOD, described, header, record, run, swinging
 
 TICKS = 250
 
@@ -335,3 +343,42 @@ def test_resting_arm_writes_little(tmp_path: Path) -> None:
         # The first two, in which it comes to rest; then there is nothing to record.
         assert verify_recording(file, described().session).ticks == 1
         assert file.counts()[COMMANDS] == 2
+
+
+def test_scene_of_a_server_is_attached_to_its_recordings(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("objects: []\n", encoding="utf-8")
+    facts = ServerFacts(Settings(), URDF_PATH, None, 8080, None)  # type: ignore[arg-type]
+    config = recorder.RecorderConfig(facts, tmp_path / "ring", tmp_path / "episodes", scene)
+    kept, _ = recorder._ring(config)
+    run(20, 1, kept.put, swinging, odd=False)
+    kept.close()
+    (path,) = recordings_in(tmp_path / "ring")
+    with RecordingFile.open(path) as file:
+        found = {each.name: each for each in file.attachments()}
+    assert set(found) == {URDF_PATH.name, "scene.yaml"}
+    assert found["scene.yaml"].data == scene.read_bytes()
+    # What cannot be attached does not keep the server from recording.
+    scene.write_bytes(bytes(MAX_SCENE_BYTES + 1))
+    assert attached_scene(scene) == attached_scene(tmp_path / "none.zip") == ()
+    assert caplog.text.count("is not attached to the recording") == 2
+
+
+def test_hour_of_swinging_takes_at_most_60_mb(tmp_path: Path) -> None:
+    path = tmp_path / "swing.mcap"
+    with path.open("wb") as opened:
+        writer = RecordingWriter(opened, header())
+        records: list[TickRecord] = []
+        run(600, 1, records.append, swinging, odd=False)
+        begin = opened.tell()
+        for number, each in enumerate(records):
+            writer.put(each)
+            # As often as a server syncs.
+            if number % 60 == 59:
+                writer.flush()
+        writer.close()
+        size = opened.tell() - begin
+    assert len(records) > 500
+    assert size * (3600.0 / PERIOD) / len(records) < 60e6

@@ -29,12 +29,13 @@ from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.recording.digest import Digester
 from katana450.extensions.recording.files.checking import TickReader, verify_recording
 from katana450.extensions.recording.files.header import header_of
-from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS
 from katana450.settings import Settings
 from tests.conftest import LONG
+from tests.recording.dataset_files import write_copy
 from tests.recording.recorded import ADA, described, fresh, header, record, run
 
 TICKS = 3000 if LONG else 600
@@ -236,3 +237,44 @@ def test_digest_sees_every_bit(records: list[TickRecord]) -> None:
     found = {digest, *(digester.digest(each) for each in changes)}
     assert len(found) == len(changes) + 1
     assert digester.digest(state) == digest == Digester().digest(state)
+
+
+def test_command_describes_cuts_and_explains(
+    path: Path, records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    del records
+    part, foreign = tmp_path / "part.mcap", tmp_path / "foreign.mcap"
+    assert (
+        main(["record", "trim", str(path), "--from", "1", "--to", "2.5", "--out", str(part)]) == 0
+    )
+    assert "1.5 s." in capsys.readouterr().out
+    run = katana450.open(part)
+    # The arm rests at the end.
+    assert 1.0 < run.end - run.start < 1.52
+    assert run.verify().identical
+    assert main(["record", "info", str(part)]) == 0
+    told = capsys.readouterr().out
+    for words in (
+        f"{part}: {run.end - run.start:.1f} s from 20",
+        "/commands: ",
+        "attached: katana450.urdf",
+        "numpy: ",
+    ):
+        assert words in told
+
+    def change(message: Message) -> Message:
+        if message.topic != COMMANDS or message.t < run.start + 0.5:
+            return message
+        return message._replace(data=message.data.replace(b'"digest":"', b'"digest":"0'))
+
+    changed = {"cpu": "Another processor", "libm_rounding": "0123456789ab"}
+    for metadata, words in (
+        ({}, "so the recording was changed"),
+        (changed, "cpu: Another processor there"),
+    ):
+        write_copy(part, foreign, metadata=metadata, change=change)
+        assert main(["record", "verify", str(foreign)]) == 1
+        told = capsys.readouterr().out
+        assert "first difference at t = " in told
+        assert words in told
+        assert ("libm_rounding" in told) is bool(metadata)

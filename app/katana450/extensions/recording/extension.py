@@ -53,7 +53,10 @@ def _process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     from katana450.extensions.recording.places import default_folder
 
     folder = options.record or default_folder(facts.port)
-    config = RecorderConfig(facts, folder, _episodes_folder(options, facts.port))
+    # An option of the extension ``importers``.
+    scene: Path | None = getattr(options, "scene", None)
+    scene = None if scene is None else scene.absolute()
+    config = RecorderConfig(facts, folder, _episodes_folder(options, facts.port), scene)
     return ExtraProcess(
         "katana450 rec",
         "The process that records",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import secrets
 import time
 from collections.abc import Mapping, Sequence
@@ -25,6 +26,11 @@ FORMAT: Final = "1"
 
 URDF_MEDIA_TYPE = "application/xml"
 
+MAX_SCENE_BYTES = 1_000_000
+"""Size up to which the file of a scene is attached to each file of a ring."""
+
+log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
 class Attachment:
@@ -33,6 +39,23 @@ class Attachment:
     name: str
     media_type: str
     data: bytes
+
+
+def attached_scene(path: Path) -> tuple[Attachment, ...]:
+    """Return the file of the initial scene at ``path``; nothing if it is large or unreadable.
+
+    All its objects are in the complete states too.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MAX_SCENE_BYTES:
+            log.warning("%s is not attached to the recording: it has %d bytes.", path, size)
+            return ()
+        kind = "application/zip" if path.suffix == ".zip" else "application/yaml"
+        return (Attachment(path.name, kind, path.read_bytes()),)
+    except OSError as error:
+        log.warning("%s is not attached to the recording: %s.", path, error.strerror or error)
+        return ()
 
 
 @dataclass(frozen=True, eq=False)

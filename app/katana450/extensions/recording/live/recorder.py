@@ -45,11 +45,13 @@ class RecorderConfig:
         facts: what it knows of the server.
         folder: folder of the ring.
         episodes: folder of the episodes.
+        scene: file of the initial scene; None without one.
     """
 
     facts: ServerFacts
     folder: Path
     episodes: Path
+    scene: Path | None = None
 
 
 def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
@@ -79,13 +81,15 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
 
 def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
     from katana450.assembly.robot_session import find_robot
-    from katana450.extensions.recording.files.header import header_of
+    from katana450.extensions.recording.files.header import attached_scene, header_of
     from katana450.extensions.recording.live.ring import Ring
 
     facts = config.facts
     found = find_robot(facts.settings, facts.urdf, facts.tool)
+    attachments = () if config.scene is None else attached_scene(config.scene)
+    environment = found.session.environment
     header = header_of(
-        found.robot, facts.settings, facts.urdf, facts.tool, found.session.environment
+        found.robot, facts.settings, facts.urdf, facts.tool, environment, attachments
     )
     return Ring(config.folder, header), header
 
