@@ -236,7 +236,7 @@ export class Timeline {
     const file = () => (may ? [option("file", "Open a file…")] : []);
     of.replaceChildren(option(RING, this.#names.get(RING)), ...opened, ...file());
     of.value = this.#of;
-    second.replaceChildren(option("", "Compare with…"), option("here", "from here on"), ...opened.map((each) => each.cloneNode(true)), ...file());
+    second.replaceChildren(option("", "Compare…"), option("here", "from here on"), ...opened.map((each) => each.cloneNode(true)), ...file());
     second.value = this.#second ? (this.#names.has(this.#second.of) && this.#second.of !== this.#of ? this.#second.of : "here") : "";
   }
 

@@ -38,6 +38,15 @@ DROP = """([name, bytes]) => {
 }"""
 """Script that drops a file on the page."""
 
+CUT = """(all) => all.filter((each) => {
+    const pen = document.createElement("canvas").getContext("2d");
+    const { font, paddingLeft } = getComputedStyle(each);
+    pen.font = font;
+    const text = pen.measureText(each.selectedOptions[0].text).width;
+    return text + parseFloat(paddingLeft) + ARROW > each.clientWidth;
+}).map((each) => each.selectedOptions[0].text)""".replace("ARROW", "14")
+"""Script that returns the words of lists that are cut off before the arrow."""
+
 EXEMPT = {("header", "phone"), ("header", "landscape"), ("nav", "landscape")}
 """Parts that may overlap the timeline's box: the header's box includes the buttons of the page."""
 
@@ -299,6 +308,8 @@ def test_timeline_covers_nothing(
         "(all) => all.map((each) => each.getBoundingClientRect().height)"
     )
     assert min(small) >= (32.0 if size == "wide" else 44.0) - 0.5
+    cut = page.page.locator("#timeline select").evaluate_all(CUT)
+    assert cut == []
     assert page.errors == []
 
 
