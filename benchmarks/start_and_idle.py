@@ -116,6 +116,17 @@ def wait_for_port(port: int) -> None:
     raise TimeoutError(f"no server listened on port {port} for {OPEN_SECONDS:g} s")
 
 
+class SeenPage(ViserPage):
+    """A page that is ready when arm and gizmo are drawn; the panel may follow."""
+
+    waits_for_panel = False
+
+
+def opened(browser: Browser, url: str, nodes: Sequence[str]) -> ViserPage:
+    """Return a page in which arm and gizmo are drawn."""
+    return SeenPage.open(browser, url, nodes=nodes, drawing=Drawing.ALWAYS)
+
+
 def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | None]:
     """Return the times of one start, and the fraction of a core used at rest for ``idle`` [s].
 
@@ -128,12 +139,12 @@ def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | N
         starting = starter.submit(server.start)
         wait_for_port(server.port)
         port = time.perf_counter() - started
-        page = ViserPage.open(browser, server.url, nodes=nodes, drawing=Drawing.ALWAYS)
+        page = opened(browser, server.url, nodes)
         usable = time.perf_counter() - started
         starting.result()
         page.close()
         began = time.perf_counter()
-        page = ViserPage.open(browser, server.url, nodes=nodes, drawing=Drawing.ALWAYS)
+        page = opened(browser, server.url, nodes)
         times = Times(port, usable, time.perf_counter() - began)
         fraction = None
         if idle:

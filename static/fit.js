@@ -135,8 +135,7 @@ const Fit = (() => {
     // Note that the person has chosen the view of this name.
     choose: (view) => (riding = view === "Tool"),
     // Begin to fit as soon as all shapes are loaded; the rest of the scene is there.
-    // Call `drawn` as soon as there are some.
-    begin(drawn) {
+    begin() {
       if (begun) return;
       begun = true;
       let [count, steady, tries] = [0, 0, 0];
@@ -144,7 +143,6 @@ const Fit = (() => {
         const before = count;
         count = viewer()?.cameraControl && node("") ? corners().length : 0;
         steady = count && count === before ? steady + 1 : 0;
-        if ((count && Viser.isDrawn()) || tries === TRIES - 1) drawn();
         if (steady < STEADY && ++tries < TRIES) return;
         clearInterval(timer);
         if (count) new ResizeObserver(refit).observe(viewer().canvas);

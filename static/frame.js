@@ -15,7 +15,11 @@
   document.documentElement.dataset.loading = "";
   Viser.keepFocus();
   Viser.forgoCode();
-  Viser.hold();
+  let scene = null; // the line of the first messages
+  Viser.hold(() => {
+    if (scene) report(scene);
+    outer?.katana?.drawn();
+  });
   const sheet = new CSSStyleSheet();
   sheet.replaceSync(`${Viser.STEADY} ${Viser.HELD}
     html[data-theme=dark] { color-scheme: dark; background: #14181d }
@@ -138,12 +142,14 @@
     hears(messages, line) {
       Fields.hear(messages);
       seen += 1;
-      report(line);
+      // The server sends the panel when the scene is drawn.
+      scene = line;
+      if (Viser.isDrawn() || document.hidden) report(line);
       const ready = Viser.replayed(messages);
       dress(messages);
       Fit.hear(messages);
       if (ready) loaded = true;
-      if (ready) Fit.begin(() => outer?.katana?.drawn());
+      if (ready) Fit.begin();
       if (!kept || tries > 0 || !ready) return;
       tries = 1;
       setTimeout(() => restore(line), AGAIN);

@@ -60,16 +60,15 @@ const Viser = (() => {
     await import("../viser/program.js");
   }
 
-  // Draw nothing before the whole scene is there. viser draws each step on the way, compiles programs
+  // Draw nothing before the whole scene is there, then call `drawn`. viser draws each step on the way, compiles programs
   // for it, and eases its panel into its place; the surrounding page covers all of it.
   const HELD = "html[data-held] * { transition: none !important }";
-  const HOLD = 5000; // ms after the replay until which the scene is waited for
+  const HOLD = 5000; // ms after the first messages until which the scene is waited for
   let held = false;
-  let since = null; // time of the end of the replay
-  function hold() {
+  let since = null; // time of the first messages
+  function hold(drawn = () => {}) {
     const { documentElement } = document;
     documentElement.dataset.held = "";
-    held = true;
     const before = Object.getOwnPropertyDescriptor(window, "__viserMutable");
     let mine;
     Object.defineProperty(window, "__viserMutable", {
@@ -77,6 +76,7 @@ const Viser = (() => {
       get: () => mine,
       set(value) {
         mine = value;
+        held = true;
         before?.set?.(value);
         const { gl } = value.scene.__r3f.root.getState();
         const render = gl.render;
@@ -85,6 +85,7 @@ const Viser = (() => {
             if (!isWhole()) return;
             held = false;
             delete documentElement.dataset.held;
+            queueMicrotask(drawn);
           }
           render.call(gl, scene, camera);
         };
@@ -131,7 +132,7 @@ const Viser = (() => {
               shown.set(name, visible);
               if (veiled?.(name)) message.visible = false;
             }
-            if (replayed(data.messages)) since ??= performance.now();
+            since ??= performance.now();
             hears(data.messages, this.#line);
           }
         });

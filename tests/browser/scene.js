@@ -26,6 +26,12 @@
     });
   };
 
+  // Whether the server has sent everything since the last connection, with the panel and hidden nodes.
+  harness.replayed = () => {
+    const since = harness.links.findLast(({ type }) => type === "connected")?.time;
+    return harness.received.some(({ type, time }) => type === "ReplayDoneMessage" && time >= since);
+  };
+
   // Resolve after one more frame, in which all messages that have come are handled.
   harness.drawn = () =>
     new Promise((resolve, reject) => {

@@ -187,3 +187,27 @@ def test_deleted_messages_are_not_mistaken_for_later_ones() -> None:
 def test_server_of_the_app_uses_our_producer() -> None:
     open_server("a key").stop()
     assert _infra._message_producer is frames.produce
+
+
+def test_scene_is_sent_in_the_order_in_which_it_is_needed() -> None:
+    def node(name: str, *, visible: bool) -> list[Any]:
+        return [
+            wire.SetPositionMessage(name, (0.0, 0.0, 0.0)),
+            wire.SetSceneNodeVisibilityMessage(name, visible),
+        ]
+
+    end = wire.ReplayDoneMessage()
+    slider = wire.GuiUpdateMessage("id", {"value": 1.0})
+    window = [
+        *node("/ghost", visible=False),
+        *node("/ghost/link", visible=True),
+        slider,
+        *node("/ghosts", visible=True),
+        wire.SetPositionMessage("/ghost", (1.0, 0.0, 0.0)),
+        end,
+    ]
+    seen, panel, unseen = frames.in_parts(window)
+    assert [each.name for each in seen] == ["/ghosts", "/ghosts"]
+    assert panel == [slider]
+    assert unseen == [*window[:4], window[-2], end]
+    assert frames.in_parts([end]) == [[end]]

@@ -251,6 +251,7 @@ def test_message_of_the_page_is_decoded(kind: str) -> None:
     [
         ("SetOrientationMessage", ("/n", (1.0, 0.0, 0.0, 0.0)), {"wxyz": (1.0, 0.0, 0.0, 0.0)}),
         ("SetPositionMessage", ("/n", (1.0, 2.0, 3.0)), {"position": (1.0, 2.0, 3.0)}),
+        ("SetSceneNodeVisibilityMessage", ("/n", False), {"visible": False}),
         ("SceneNodeUpdateMessage", ("/n", {"visible": False}), {"updates": {"visible": False}}),
     ],
 )

@@ -18,6 +18,7 @@ from weakref import WeakValueDictionary
 
 import msgspec
 import zstandard
+from viser import _messages as wire
 from viser.infra import _infra
 
 MAX_KEPT_FRAMES = 4
@@ -162,8 +163,36 @@ class Packer:
         return bytes(frame)
 
 
+def in_parts(window: Sequence[Any]) -> list[Sequence[Any]]:
+    """Return the messages of a scene in the order in which a page needs them, in up to three parts.
+
+    First what is seen in the scene, then the panel, then hidden nodes. The order within a part
+    stays, and the last message, which ends the scene, remains the last.
+    """
+    hidden = tuple(
+        f"{message.name}/"
+        for message in window
+        if isinstance(message, wire.SetSceneNodeVisibilityMessage) and not message.visible
+    )
+    seen: list[Any] = []
+    panel: list[Any] = []
+    unseen: list[Any] = []
+    for message in window[:-1]:
+        kind, name = type(message).__name__, getattr(message, "name", "")
+        if kind.startswith("Gui") and not kind.startswith("GuiSetPanel"):
+            panel.append(message)
+        elif f"{name}/".startswith(hidden):
+            unseen.append(message)
+        else:
+            seen.append(message)
+    return [part for part in (seen, panel, [*unseen, window[-1]]) if part]
+
+
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:
-    """Send a browser the windows of a buffer, as viser's own ``_message_producer`` does."""
+    """Send a browser the windows of a buffer, as viser's own ``_message_producer`` does.
+
+    A whole scene is sent in parts.
+    """
     packer = buffer.__dict__.setdefault("packer", Packer())
     buffer.max_window_size = MAX_WINDOW
     slot = slot_of(line.request.headers)
@@ -174,7 +203,9 @@ async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: 
     windows = buffer.window_generator(client_id, backlog_done_message=backlog_done_message)
     try:
         async for window in windows:
-            await send(packer.frame(window))
+            whole = backlog_done_message is not None and window[-1] is backlog_done_message
+            for part in in_parts(window) if whole else (window,):
+                await send(packer.frame(part))
     finally:
         # An unfinished generator would keep its unsent messages.
         await windows.aclose()

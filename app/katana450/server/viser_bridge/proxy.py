@@ -48,6 +48,9 @@ reserved for the driver and for each admin."""
 SCENE_TIMEOUT = 4.0
 """Timeout [s] of a browser for the scene of a new server. viser's page tries again after 5 s."""
 
+DRAWN_TIMEOUT = 1.0
+"""Maximum time [s] for which the panel waits until the scene is drawn."""
+
 REFUSAL_INTERVAL = 0.5
 """Minimum time [s] between two shown refusals: a drag sends 20 messages a second."""
 
@@ -162,8 +165,19 @@ class _Line:
         """Send frames as fast as the browser shows them."""
         while True:
             await self._send(await self.slot.take())
+            if self._key and not self._flow.counts:
+                # What follows the scene, like the panel, must not delay its drawing.
+                await self._until_drawn()
             await asyncio.sleep(self._pause(self._hub.clock()))
             await self._wait_for_room()
+
+    async def _until_drawn(self) -> None:
+        """Wait a while until the page has drawn something. One in the background draws nothing."""
+        end = self._hub.clock() + DRAWN_TIMEOUT
+        while not self._flow.counts and (left := end - self._hub.clock()) > 0.0:
+            self._room.clear()
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._room.wait(), left)
 
     async def _wait_for_room(self) -> None:
         while not self._flow.has_room(self._hub.clock()):
