@@ -13,8 +13,8 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from katana450.server.web.acceptor import WANTED_DESCRIPTORS, Acceptor
-from katana450.server.web.listen import listen
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
 
 WAITING = 8
 
@@ -138,7 +138,7 @@ def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
 def test_descriptor_limit_is_raised_as_far_as_the_system_allows(soft: int, hard: int) -> None:
     program = (
         "import resource\n"
-        "from katana450.server.web.acceptor import raise_descriptor_limit\n"
+        "from katana450.server.web.listen import raise_descriptor_limit\n"
         f"resource.setrlimit(resource.RLIMIT_NOFILE, ({soft}, {hard}))\n"
         "raise_descriptor_limit()\n"
         "print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])\n"

@@ -40,10 +40,11 @@ from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
-from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
+from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator, identity_of
 from katana450.server.web.channel import ARRIVAL, PING
 from katana450.server.web.http_api import RouteProvider
+from katana450.server.web.listen import raise_descriptor_limit
 from katana450.server.web.program_socket import LineServer
 from katana450.server.web.security import FOR_PROGRAMS
 from katana450.server.web.stop_monitor import watch_stop_path

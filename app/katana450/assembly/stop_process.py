@@ -6,21 +6,14 @@ ends or hangs; the arm does not stop for that.
 
 from __future__ import annotations
 
-import asyncio
 import socket
 import time
 from dataclasses import dataclass
 from functools import partial
 
 from katana450.arm.runtime.arm_listener import STOP, ArmAddress, Greeting, connect_when_ready
-from katana450.arm.runtime.stop_pipe import StopPipe
-from katana450.assembly.authentication import access_file, address_of, tls_context
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.platform_support import raise_priority
-from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
-from katana450.server.web.authenticator import Authenticator
-from katana450.server.web.stop_connection import StopConnection
-from katana450.server.web.stop_server import StopServer
 from katana450.settings import Settings
 
 TURN_INTERVAL = 0.2
@@ -50,10 +43,23 @@ class StopConfig:
 def run_stop(config: StopConfig, supervisor: SupervisorPipe) -> None:
     """Run the server of STOP in this process, from start to end. Raises KatanaError."""
     raise_priority()
+    # Imported here, because the supervisor imports this module before it starts the processes.
+    import asyncio
+
     asyncio.run(_serve(config, supervisor))
 
 
 async def _serve(config: StopConfig, supervisor: SupervisorPipe) -> None:
+    import asyncio
+
+    from katana450.arm.runtime.stop_pipe import StopPipe
+    from katana450.assembly.authentication import access_file, address_of, tls_context
+    from katana450.server.web.acceptor import Acceptor
+    from katana450.server.web.authenticator import Authenticator
+    from katana450.server.web.listen import raise_descriptor_limit
+    from katana450.server.web.stop_connection import StopConnection
+    from katana450.server.web.stop_server import StopServer
+
     settings, listening = config.settings, config.listening
     address = address_of(settings, listening)
     access = access_file(settings, listening)

@@ -29,8 +29,7 @@ from katana450.extension import ExtraProcess, ServerFacts, serve_extensions
 from katana450.platform_support import pipe_address, stop_signals
 from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
-from katana450.server.web.acceptor import raise_descriptor_limit
-from katana450.server.web.listen import LOOPBACK, listen, listen_beside
+from katana450.server.web.listen import LOOPBACK, listen, listen_beside, raise_descriptor_limit
 from katana450.settings import Settings
 
 ARM, FRONT_END, STOP = "katana450 arm", "katana450 front", "katana450 stop"

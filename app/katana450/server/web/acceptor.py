@@ -18,9 +18,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from katana450.errors import ConfigurationError
-from katana450.platform_support import raise_open_file_limit
-
 log = logging.getLogger(__name__)
 
 MAX_WAITING = 64
@@ -45,38 +42,7 @@ BACK_OFF = 0.2
 LOG_EVERY = 10.0
 """Minimum interval [s] of log lines about the same problem."""
 
-DESCRIPTORS = 1024
-"""Maximum number of files and sockets open at once: two or three for each allowed connection, and a
-reserve for libraries, files and pipes."""
-
-MIN_DESCRIPTORS = 128
-"""Limit of open files below which the server does not start: a crowd of clients would lock out
-everybody, and STOP from a new connection would fail."""
-
-WANTED_DESCRIPTORS = 4096
-"""Limit of open files that the server requests from the system."""
-
 NO_DESCRIPTOR_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
-
-
-def raise_descriptor_limit() -> None:
-    """Raise the limit of open files to ``WANTED_DESCRIPTORS``, or as far as the system allows.
-
-    Raises ConfigurationError if fewer than ``MIN_DESCRIPTORS`` can be open.
-    """
-    limit = raise_open_file_limit(WANTED_DESCRIPTORS)
-    if limit is not None and limit < MIN_DESCRIPTORS:
-        raise ConfigurationError(
-            f"Only {limit} files can be open at once, too few to run. Raise the limit to "
-            f"{DESCRIPTORS} (`ulimit -n {DESCRIPTORS}`)."
-        )
-    if limit is not None and limit < DESCRIPTORS:
-        log.warning(
-            "Only %d files can be open at once. Many clients can use them up, and STOP from a new "
-            "connection then fails. Raise the limit to %d (`ulimit -n`).",
-            limit,
-            DESCRIPTORS,
-        )
 
 
 @dataclass(eq=False)

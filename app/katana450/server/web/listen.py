@@ -1,13 +1,14 @@
-"""Listening sockets, with clear errors for ports and addresses that cannot be used."""
+"""Listening sockets and the limit of open files, with clear errors. It imports little."""
 
 from __future__ import annotations
 
 import errno
+import logging
 import socket
 from ipaddress import ip_address
 
 from katana450.errors import ConfigurationError
-from katana450.platform_support import claim_port
+from katana450.platform_support import claim_port, raise_open_file_limit
 
 BACKLOG = 128
 
@@ -15,6 +16,40 @@ MAX_PORT = 65535
 
 LOOPBACK = "127.0.0.1"
 """Address that only programs of this machine can reach."""
+
+
+DESCRIPTORS = 1024
+"""Maximum number of files and sockets open at once: two or three for each allowed connection, and a
+reserve for libraries, files and pipes."""
+
+MIN_DESCRIPTORS = 128
+"""Limit of open files below which the server does not start: a crowd of clients would lock out
+everybody, and STOP from a new connection would fail."""
+
+WANTED_DESCRIPTORS = 4096
+"""Limit of open files that the server requests from the system."""
+
+log = logging.getLogger(__name__)
+
+
+def raise_descriptor_limit() -> None:
+    """Raise the limit of open files to ``WANTED_DESCRIPTORS``, or as far as the system allows.
+
+    Raises ConfigurationError if fewer than ``MIN_DESCRIPTORS`` can be open.
+    """
+    limit = raise_open_file_limit(WANTED_DESCRIPTORS)
+    if limit is not None and limit < MIN_DESCRIPTORS:
+        raise ConfigurationError(
+            f"Only {limit} files can be open at once, too few to run. Raise the limit to "
+            f"{DESCRIPTORS} (`ulimit -n {DESCRIPTORS}`)."
+        )
+    if limit is not None and limit < DESCRIPTORS:
+        log.warning(
+            "Only %d files can be open at once. Many clients can use them up, and STOP from a new "
+            "connection then fails. Raise the limit to %d (`ulimit -n`).",
+            limit,
+            DESCRIPTORS,
+        )
 
 
 def listen(host: str, port: int, option: str = "--port") -> socket.socket:
