@@ -29,6 +29,7 @@ from typing import NamedTuple
 from playwright.sync_api import Browser
 
 import katana450
+from katana450.server.viser_bridge.viser_page import DECODER_FILE, PROGRAM
 from tests.browser.camera import Drawing
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
@@ -78,14 +79,16 @@ def over_the_wire(url: str) -> dict[str, int]:
     files = ["/", *(f"/{name}" for name in re.findall(r'(?:src|href)="(static/[^"]+)"', index))]
     return {
         "our page": sum(compressed(url + file, cookie) for file in (*files, "/static/link.js")),
-        "viser's page": compressed(f"{url}/viser/", cookie),
+        "viser's page": sum(
+            compressed(f"{url}/viser/{name}", cookie) for name in ("", PROGRAM, DECODER_FILE)
+        ),
         "the scene": asyncio.run(scene_bytes(url, cookie)),
     }
 
 
 def compressed(url: str, cookie: str) -> int:
-    """Return the bytes of the answer to a browser that accepts gzip."""
-    headers = {"Cookie": cookie, "Accept-Encoding": "gzip"}
+    """Return the bytes of the answer to a browser that accepts gzip and zstd."""
+    headers = {"Cookie": cookie, "Accept-Encoding": "gzip, zstd"}
     with urllib.request.urlopen(
         urllib.request.Request(url, headers=headers), timeout=SCENE_SECONDS
     ) as answer:
