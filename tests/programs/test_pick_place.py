@@ -13,6 +13,7 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import runner
+from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
@@ -202,6 +203,24 @@ def test_low_object_is_held_by_the_fingertips(
     assert hand is not None
     for finger in hand.fingers:
         assert MARGIN <= world.gap(held.x_setpoint, finger, "table") <= 1e-3 * (size[2] - 4.0)
+
+
+def summary(task: Task) -> tuple[str, float]:
+    """Return what a task does, and how long its path takes [s]."""
+    plan = task.action.plan if isinstance(task.action, FollowPlan) else None
+    return type(task.action).__name__, 0.0 if plan is None else round(plan.duration, 9)
+
+
+@pytest.mark.parametrize("command", [cmd.Stop(), cmd.Pause()])
+def test_program_is_planned_for_a_stopped_arm_as_for_a_free_one(
+    stage: Stage, command: cmd.Command
+) -> None:
+    steps = "- grasp: part\n- line: {by: {z: 40}}\n- set_down:\n"
+    free, start = planned(stage, steps, box("part", NEAR))
+    halted = stage.session.step(start, [command], start.t + TICK)
+    assert halted.stopped is not None or halted.paused
+    program = compiled(parse(f"frame: base\nsteps:\n{steps}"), stage.plan_context, halted)
+    assert list(map(summary, program.tasks)) == list(map(summary, free.tasks))
 
 
 @pytest.mark.parametrize("checked", [False, True])

@@ -311,11 +311,16 @@ class PlanBuilder:
         return found
 
     def standing(self, q: FloatArray) -> State:
-        """Return the state of the arm at rest at ``q`` (n,) [rad]."""
+        """Return the state of the arm at rest at ``q`` (n,) [rad], free to move.
+
+        A program runs only after a stop was cleared and a pause ended, but may be planned before.
+        """
         q, branch = frozen(q), self.plan_context.arm.kinematics.branch_of(q)
-        return self._with_still_water(
-            replace(self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE)
-        )
+        standing = replace(
+            self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE,
+            stopped=None, paused=False, blocked=False,
+        )  # fmt: skip
+        return self._with_still_water(standing)
 
     def assume_missed(self) -> None:
         """Continue as if the last grasp had missed: the fingers are closed, the object stands."""
