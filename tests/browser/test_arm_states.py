@@ -141,7 +141,7 @@ def test_stop_is_shown_as_measured_and_a_lost_arm_as_one_that_may_move(
     arm.shows("Arm moving")
     arm.emulator.kill()
     arm.shows("Arm lost")
-    arm.shows("No answer from the arm", at="#headline")
+    arm.shows("Arm lost", at="#headline")
     why = arm.page.inner_text("#why")
     assert why.startswith("It may still move.")
     assert "The connection to the arm was lost." in why

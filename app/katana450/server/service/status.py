@@ -27,7 +27,7 @@ UNCONTROLLED: Mapping[ArmMode | None, tuple[StatusLine, str]] = {
         "STOP ends the calibration.",
     ),
     ArmMode.LOST: (
-        StatusLine("stopped", "No answer from the arm", "It may still move."),
+        StatusLine("stopped", "Arm lost", "It may still move."),
         "If it moves, use its switch.",
     ),
 }
