@@ -21,7 +21,7 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.step_target import Angles, StepTarget
 from katana450.extensions.recording.codec import Codec, json_form, json_text
-from katana450.maths.geometry import so3
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
@@ -36,9 +36,11 @@ from tests.general_arms.published_arms import (
     PANDA,
     PINCHERX_100,
     PUMA_560,
+    QUARTER,
     SKEWED_6,
     SKEWED_7,
     UR5E,
+    craig,
 )
 
 SOME = {"UR5e": UR5E, "KR 6": KR_6, "Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}
@@ -442,6 +444,58 @@ def test_swivel_of_seven_axes_turns_where_it_must() -> None:
     np.testing.assert_allclose(1e3 * end, middle(PANDA) + np.array((280.0, 0, 0)), atol=1e-5)
     assert abs(path.end[6] - path.start[6]) > math.radians(10.0)
     assert PANDA.within_limits(path.end)
+
+
+@every({"UR5e": UR5E, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}, {"Panda": PANDA})
+def test_trajectory_of_all_joints_is_followed(chain: Chain) -> None:
+    q = np.degrees(builder(chain).q)
+    rows = [[0.5 * number, *(q + 5.0 * number).tolist()] for number in range(4)]
+    made = program(chain, f"trajectory: {{through: {rows}}}")
+    np.testing.assert_allclose(played(chain, made)[-1].setpoint, np.radians(q + 15.0), atol=1e-9)
+
+
+THREE_AXES = craig(
+    [
+        (0.0, 0.0, 0.1, 0.0),
+        (-QUARTER, 0.0, 0.0, -0.5),
+        (0.0, 0.15, 0.0, 1.0),
+    ],
+    [-3.0, -2.0, -2.0],
+    [3.0, 2.0, 2.0],
+    se3.from_rotation_translation(np.eye(3), np.array((0.12, 0.0, 0.0))),
+)
+EIGHT_AXES = craig(
+    [
+        (0.0, 0.0, 0.3, 0.1),
+        (1.2, 0.05, 0.1, 0.0),
+        (0.7, 0.3, -0.09, 0.0),
+        (0.9, -0.02, 0.4, 0.0),
+        (-1.0, 0.03, 0.1, 0.0),
+        (0.7, 0.05, 0.06, 0.0),
+        (1.2, 0.05, 0.1, 0.0),
+        (0.8, 0.05, 0.1, 0.0),
+    ],
+    [-2.0] * 8,
+    [2.0] * 8,
+)
+
+
+@pytest.mark.parametrize("chain", [THREE_AXES, EIGHT_AXES], ids=["three axes", "eight axes"])
+def test_arm_of_few_or_many_axes_follows_lines_and_circles(chain: Chain) -> None:
+    p = middle(chain)
+    text = f"circle: {{centre: {point(p - (0.0, 0.0, 15.0))}, normal: x, radius: 15}}"
+    made = program(chain, "line: {by: {y: 20}}", "line: {by: {y: -20}}", text)
+    line, _, circle = (each.segments[0].path for each in plans(made))
+    sigma = np.linspace(0.0, 1.0, 300)
+    points = 1e3 * forward_batch(chain, joint_derivatives(line, sigma)[0])[:, :3, 3]
+    np.testing.assert_allclose(points, p + np.outer(sigma, (0.0, 20.0, 0.0)), atol=1e-6)
+    np.testing.assert_allclose(circle.end, circle.start, atol=1e-9)
+    np.testing.assert_allclose(circle.end, builder(chain).q, atol=1e-8)
+
+
+def test_three_axes_choose_no_orientation() -> None:
+    with pytest.raises(ScriptError, match="3 axes follows from its position"):
+        program(THREE_AXES, "line: {pitch: 5}")
 
 
 def test_grasping_needs_a_pitch_and_a_roll() -> None:

@@ -176,6 +176,12 @@ def test_mistakes_are_named(stage: Stage, rows: list[list[float]], why: str) -> 
         compiled(parse(script(rows)), stage.plan_context, stage.begin())
 
 
+@pytest.mark.parametrize("through", ["5", "[1, 2]", "{a: 1}", "text", "[[], []]"])
+def test_what_is_no_list_of_rows_is_refused(through: str) -> None:
+    with pytest.raises(ScriptError, match="Expected a"):
+        parse(f"steps:\n  - trajectory: {{through: {through}}}\n")
+
+
 def test_derivatives_are_those_of_the_path(stage: Stage) -> None:
     rows = np.array(swing(2.0))
     path = TrajectoryPath(stage.plan_context.arm.chain, rows[:, 0], np.radians(rows[:, 1:]))
