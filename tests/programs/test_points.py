@@ -109,3 +109,17 @@ def test_blend_too_small_to_drive_is_refused() -> None:
 
 def test_wait_of_0_does_nothing(stage: Stage) -> None:
     assert len(planned(stage, "  - wait: 0\n").tasks) == len(planned(stage, "").tasks)
+
+
+@pytest.mark.parametrize(
+    ("step", "why"),
+    [
+        ("line: {by: {y: 20}, yaw: 10}", "yaw of a five-axis arm follows"),
+        ("move: {x: 320, y: 0, z: 150, yaw: 10}", "yaw of a five-axis arm follows"),
+        ("move: {x: 320, y: 0, z: 150, branch: front-up-plus}", "no branch 'front-up-plus'"),
+        ("circle: {centre: corner, normal: x, radius: 10, yaw: 5}", "yaw of a five-axis arm"),
+    ],
+)
+def test_what_only_other_arms_have_is_refused(stage: Stage, step: str, why: str) -> None:
+    with pytest.raises(ScriptError, match=why):
+        planned(stage, f"  - {step}\n")
