@@ -26,7 +26,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.path import Path, joint_derivatives
+from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.plan import Plan
 from tests.general_arms.driven import TICK, begun, pose, session_of, settled
 from tests.general_arms.published_arms import (
@@ -508,13 +508,24 @@ def test_plan_is_recorded_to_the_bit(chain: Chain) -> None:
     d, p = 0.3 * length(chain), middle(chain)
     through = ", ".join(map(point, (p - (0.0, 0.0, d), p - (0.0, d, d))))
     made = program(chain, f"line: {{by: {{y: {d}}}}}", f"lines: {{through: [{through}]}}")
-    coder, sigma = Codec(), np.linspace(0.0, 1.0, 33)
+    writer, reader, session = Codec(), Codec(), session_of(chain)
+    states: list[list[bytes]] = [[], []]
     for plan in plans(made):
-        path = plan.segments[0].path
-        found = coder.decoded(Path, json_form(json_text(coder.encoded(Path, path))))
-        one, other = (joint_derivatives(each, sigma) for each in (path, found))
-        assert np.array_equal(one, other)
-        assert found.joins == path.joins
+        form = json_text(writer.encoded(cmd.Follow, cmd.Follow(plan)))
+        for shared in writer.shared.take_new():
+            reader.shared.add(shared)
+        found = reader.decoded(cmd.Follow, json_form(form))
+        for command, seen in zip((cmd.Follow(plan), found), states, strict=True):
+            state = session.begin(plan.start, 0.0, 0.0)
+            for number in range(60):
+                commands = [command] if number == 0 else []
+                state = session.step(state, commands, state.t + TICK)
+                state = session.observe(state, state.setpoint, 0.0)
+                seen.append(state.setpoint.tobytes())
+                assert writer.encoded(State, state)
+        assert found.plan.segments[0].path.joins == plan.segments[0].path.joins
+    assert states[0] == states[1]
+    assert len(set(states[0])) > 60
 
 
 def test_path_refuses_numbers_that_are_no_path() -> None:
