@@ -28,6 +28,7 @@ from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.links_of_arms import ur5e
 from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA
 from tests.programs.yaml_core import loaded
+from tests.viser_bridge import internals
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "examples" / "programs" / "other_arms" / "ur5e.yaml"
@@ -72,7 +73,7 @@ def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
         traces = Traces(server, plan.robot.require_arm())
         for state in states:
             traces.follow(state)
-        nodes = dict(server.scene._handle_from_node_name)
+        nodes = internals.nodes(server)
         traced = nodes["/path/traced"]
         assert isinstance(traced, viser.LineSegmentsHandle)
         assert traced.visible

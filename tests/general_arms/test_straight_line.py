@@ -13,7 +13,7 @@ from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
 from katana450.extensions.general_arms.functions import FLOATS
 from katana450.extensions.general_arms.links import reversed_chain
 from katana450.extensions.general_arms.one_pose import one_pose
-from katana450.extensions.general_arms.straight_line import Trace
+from katana450.extensions.general_arms.straight_line import TermList
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -85,8 +85,8 @@ def test_free_angle_of_a_singular_wrist_is_that_of_the_caller(joint: int) -> Non
 
 
 def test_products_with_zero_and_one_vanish_and_equal_terms_are_computed_once() -> None:
-    trace = Trace()
-    a, b = trace.term("a"), trace.term("b")
+    terms = TermList()
+    a, b = terms.term("a"), terms.term("b")
     assert 0.0 * a + 1.0 * b is b
     assert b + 0.0 is b
     assert b - 0.0 is b
@@ -98,17 +98,17 @@ def test_products_with_zero_and_one_vanish_and_equal_terms_are_computed_once() -
     assert np.float64(1.0) * a is a
     assert a * b is a * b
     outputs = [[a * b + a * b, -2.0 * (-a)]]
-    assert trace.text("a, b = rows", outputs).count("a * b") == 1
-    assert trace.compiled("a, b = rows", outputs)((3.0, 5.0), ()) == [(30.0, 6.0)]
+    assert terms.text("a, b = rows", outputs).count("a * b") == 1
+    assert terms.compiled("a, b = rows", outputs)((3.0, 5.0), ()) == [(30.0, 6.0)]
 
 
 def test_only_the_value_that_a_condition_selects_is_computed() -> None:
-    trace = Trace()
-    operations = trace.operations()
-    a = trace.term("a")
+    terms = TermList()
+    operations = terms.operations()
+    a = terms.term("a")
     root = operations.root(a)
     chosen = operations.select(a <= 0.0, 1.0, 1.0 / a)
-    solve = trace.compiled("a, = rows", [[root, chosen]])
+    solve = terms.compiled("a, = rows", [[root, chosen]])
     assert solve((0.0,), ()) == [(0.0, 1.0)]
     assert solve((4.0,), ()) == [(2.0, 0.25)]
     assert operations.select(True, a, root) is a
@@ -129,9 +129,9 @@ def test_only_the_value_that_a_condition_selects_is_computed() -> None:
 def test_angle_is_brought_into_a_turn_from_where_it_can_be(
     span: tuple[float, float], angles: tuple[float, ...], expected: tuple[float, ...]
 ) -> None:
-    trace = Trace()
-    a = trace.term("a", span=span)
-    solve = trace.compiled("a, = rows", [[trace.turned(a, -math.pi, math.pi)]])
+    terms = TermList()
+    a = terms.term("a", span=span)
+    solve = terms.compiled("a, = rows", [[terms.turned(a, -math.pi, math.pi)]])
     for angle, turned in zip(angles, expected, strict=True):
         assert solve((angle,), ())[0][0] == pytest.approx(turned, abs=1e-15)
 
@@ -150,7 +150,7 @@ def test_angle_is_brought_into_a_turn_from_where_it_can_be(
 def test_angle_is_brought_into_the_turn_inside_its_limits(
     limits: tuple[float, float], angle: float, expected: float
 ) -> None:
-    trace = Trace()
-    a = trace.term("a", span=(-math.pi, math.pi))
-    solve = trace.compiled("a, = rows", [[trace.turned(a, *limits)]])
+    terms = TermList()
+    a = terms.term("a", span=(-math.pi, math.pi))
+    solve = terms.compiled("a, = rows", [[terms.turned(a, *limits)]])
     assert solve((angle,), ())[0][0] == pytest.approx(expected, abs=1e-15)

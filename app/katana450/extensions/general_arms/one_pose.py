@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from katana450 import tolerances
 from katana450.extensions.general_arms.form import Form
 from katana450.extensions.general_arms.functions import Number
-from katana450.extensions.general_arms.straight_line import Code, Trace
+from katana450.extensions.general_arms.straight_line import Code, TermList
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 
@@ -25,21 +25,21 @@ def one_pose(chain: Chain, form: Form, *, is_reversed: bool, thorough: bool) -> 
     is one, else in [-pi, pi]. Unless it is ``thorough``, the function returns None where the
     formulas distinguish rare cases.
     """
-    trace = Trace(thorough=thorough)
-    rows: Matrix = [[trace.term(name) for name in names] for names in INPUTS]
+    terms = TermList(thorough=thorough)
+    rows: Matrix = [[terms.term(name) for name in names] for names in INPUTS]
     if is_reversed:
         rows = _inverse(rows)
-    free = [trace.term(f"free[{k}]") for k in range(chain.n)]
-    found = form.build(form.links, trace.operations())([*_inner(form, rows), ()], free)
+    free = [terms.term(f"free[{k}]") for k in range(chain.n)]
+    found = form.build(form.links, terms.operations())([*_inner(form, rows), ()], free)
     order = range(chain.n - 1, -1, -1) if is_reversed else range(chain.n)
     joints = list(zip(order, chain.lower.tolist(), chain.upper.tolist(), strict=True))
     shift = form.links.shift
     outputs = [
-        [trace.turned(alpha[k] - shift[k], lower, upper) for k, lower, upper in joints]
+        [terms.turned(alpha[k] - shift[k], lower, upper) for k, lower, upper in joints]
         for alpha in found
     ]
     inputs = ", ".join(f"({', '.join(names)})" for names in INPUTS)
-    return trace.compiled(f"{inputs}, _ = rows", outputs)
+    return terms.compiled(f"{inputs}, _ = rows", outputs)
 
 
 def _inner(form: Form, rows: Matrix) -> Matrix:

@@ -43,7 +43,7 @@ class Term:
     """A number that the function computes.
 
     Attributes:
-        trace: has all terms of the function.
+        owner: list of all terms of the function.
         text: its text with a place for each argument.
         arguments: terms and numbers.
         number: counts the terms.
@@ -52,12 +52,12 @@ class Term:
 
     # numpy leaves products with its numbers to this class.
     __array_ufunc__ = None
-    __slots__ = ("arguments", "number", "span", "text", "trace")
+    __slots__ = ("arguments", "number", "owner", "span", "text")
 
     def __init__(
-        self, trace: Trace, text: str, arguments: tuple[Number, ...], number: int, span: Span
+        self, owner: TermList, text: str, arguments: tuple[Number, ...], number: int, span: Span
     ) -> None:
-        self.trace = trace
+        self.owner = owner
         self.text = text
         self.arguments = arguments
         self.number = number
@@ -69,7 +69,7 @@ class Term:
         if _has(other, MINUS):
             return self - other.arguments[0]
         (a, b), (c, d) = self.span, _span(other)
-        return self.trace.term(PLUS, self, other, span=(a + c, b + d))
+        return self.owner.term(PLUS, self, other, span=(a + c, b + d))
 
     def __radd__(self, other: Number) -> Number:
         return self + other
@@ -80,13 +80,13 @@ class Term:
         if _has(other, MINUS):
             return self + other.arguments[0]
         (a, b), (c, d) = self.span, _span(other)
-        return self.trace.term(LESS, self, other, span=(a - d, b - c))
+        return self.owner.term(LESS, self, other, span=(a - d, b - c))
 
     def __rsub__(self, other: Number) -> Number:
         if other == 0.0:
             return -self
         a, b = self.span
-        return self.trace.term(LESS, other, self, span=(other - b, other - a))
+        return self.owner.term(LESS, other, self, span=(other - b, other - a))
 
     def __mul__(self, other: Number) -> Number:
         if not isinstance(other, Term):
@@ -95,7 +95,7 @@ class Term:
             return -(self.arguments[0] * other)
         if other.text == MINUS:
             return -(self * other.arguments[0])
-        return self.trace.term("({0} * {1})", self, other)
+        return self.owner.term("({0} * {1})", self, other)
 
     def __rmul__(self, other: Number) -> Number:
         if other == 0.0:
@@ -105,13 +105,13 @@ class Term:
         if self.text == MINUS:
             return -other * self.arguments[0]
         a, b = sorted((other * self.span[0], other * self.span[1]))
-        return self.trace.term("({0} * {1})", other, self, span=(a, b))
+        return self.owner.term("({0} * {1})", other, self, span=(a, b))
 
     def __truediv__(self, other: Number) -> Number:
-        return self.trace.term("({0} / {1})", self, other)
+        return self.owner.term("({0} / {1})", self, other)
 
     def __rtruediv__(self, other: Number) -> Number:
-        return self.trace.term("({0} / {1})", other, self)
+        return self.owner.term("({0} / {1})", other, self)
 
     def __neg__(self) -> Number:
         if self.text == MINUS:
@@ -119,16 +119,16 @@ class Term:
         if self.text == LESS:
             first, second = self.arguments
             return second - first
-        return self.trace.term(MINUS, self, span=(-self.span[1], -self.span[0]))
+        return self.owner.term(MINUS, self, span=(-self.span[1], -self.span[0]))
 
     def __le__(self, other: Number) -> Number:
-        return self.trace.term("({0} <= {1})", self, other)
+        return self.owner.term("({0} <= {1})", self, other)
 
     def __lt__(self, other: Number) -> Number:
-        return self.trace.term("({0} < {1})", self, other)
+        return self.owner.term("({0} < {1})", self, other)
 
     def __gt__(self, other: Number) -> Number:
-        return self.trace.term("({0} > {1})", self, other)
+        return self.owner.term("({0} > {1})", self, other)
 
 
 def _is(value: Number, number: float) -> bool:
@@ -143,7 +143,7 @@ def _span(value: Number) -> Span:
     return value.span if isinstance(value, Term) else (float(value), float(value))
 
 
-class Trace:
+class TermList:
     """The terms of one function, in the order in which they were made.
 
     ``thorough``: whether the function does what is rarely needed. Else it returns None there.

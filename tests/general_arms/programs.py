@@ -1,0 +1,116 @@
+"""Programs for arms outside the five-axis family: planned and played, and their targets as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.state import State
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
+from katana450.extensions.programs.pose_path import PosePath
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.runner import Phase, Run, step
+from katana450.extensions.programs.script import parse
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.planning.plan import Plan
+from tests.general_arms.driven import TICK, begun, pose, session_of
+from tests.general_arms.published_arms import (
+    IIWA_7,
+    KR_6,
+    OPENMANIPULATOR_X,
+    PANDA,
+    PINCHERX_100,
+    PUMA_560,
+    SKEWED_6,
+    SKEWED_7,
+    UR5E,
+)
+
+SOME = {"UR5e": UR5E, "KR 6": KR_6, "Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}
+REST = {
+    "Puma 560": PUMA_560,
+    "iiwa": IIWA_7,
+    "PincherX-100": PINCHERX_100,
+    "skewed 6": SKEWED_6,
+    "skewed 7": SKEWED_7,
+}
+NANOMETRE = 1e-9
+
+
+def every(arms: Mapping[str, Chain], others: Mapping[str, Chain]) -> pytest.MarkDecorator:
+    """Parametrise by arms; ``others`` are tested with the long tests."""
+    cases = [pytest.param(chain, id=name) for name, chain in arms.items()]
+    cases += [pytest.param(c, id=name, marks=pytest.mark.long) for name, c in others.items()]
+    return pytest.mark.parametrize("chain", cases)
+
+
+def builder(chain: Chain) -> PlanBuilder:
+    session = session_of(chain)
+    return PlanBuilder(PlanContext(session, np.eye(4)), begun(session))
+
+
+def program(chain: Chain, *steps: str) -> Program:
+    """Return the steps as a program from the ready posture."""
+    made = builder(chain)
+    text = "frame: base\nsteps:\n" + "".join(f"  - {each}\n" for each in steps)
+    return compiled(parse(text), made.plan_context, made.state)
+
+
+def plans(made: Program) -> list[Plan]:
+    return [each.action.plan for each in made.tasks if isinstance(each.action, FollowPlan)]
+
+
+def played(chain: Chain, made: Program) -> list[State]:
+    """Return the states of a run to its end."""
+    session = session_of(chain)
+    state, run = begun(session), Run(0.0)
+    states = [state]
+    while run.phase is Phase.RUNNING and len(states) < 4000:
+        run, commands = step(made, run, state, state.t)
+        state = session.step(state, commands, state.t + TICK)
+        state = session.observe(state, state.setpoint, 0.0)
+        states.append(state)
+    assert (run.phase, run.why) == (Phase.DONE, "")
+    return states
+
+
+def on_paths(states: list[State]) -> list[tuple[PosePath, float, FloatArray]]:
+    """Return path, place and joints of each tick on a path of the tool."""
+    found = []
+    for state in states:
+        following = state.following
+        if following is not None and isinstance(following.segment.path, PosePath):
+            sigma = following.segment.scaling.pace(following.local).sigma
+            found.append((following.segment.path, sigma, state.setpoint))
+    return found
+
+
+def middle(chain: Chain) -> FloatArray:
+    """Return the tool point (3,) [mm] of the ready posture."""
+    made = builder(chain)
+    return 1e3 * made.target.position
+
+
+def length(chain: Chain) -> float:
+    """Return a length [mm] that the arm can move its tool in every direction."""
+    return 25.0 if chain.n == 4 else 80.0
+
+
+def angles_beside(chain: Chain, turn: tuple[float, float, float]) -> str:
+    """Return fields with the angles of the ready posture, turned by a rotation vector [rad]."""
+    R = pose(session_of(chain), begun(session_of(chain)))[:3, :3]
+    return angles_of(so3.exp(np.array(turn)) @ R)
+
+
+def angles_of(R: FloatArray) -> str:
+    roll, pitch, yaw = np.degrees(so3.to_rpy(R)).tolist()
+    return f"roll: {roll!r}, pitch: {pitch!r}, yaw: {yaw!r}"
+
+
+def point(p: FloatArray) -> str:
+    return "{{x: {:.6f}, y: {:.6f}, z: {:.6f}}}".format(*p)

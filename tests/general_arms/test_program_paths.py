@@ -1,0 +1,145 @@
+"""Paths of other arms: of few and many axes, as recorded, and for numbers that are no path."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.pose_path import PosePath
+from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.step_target import Angles
+from katana450.extensions.recording.codec import Codec, json_form, json_text
+from katana450.maths.geometry import se3
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.path import joint_derivatives
+from tests.general_arms.driven import TICK, session_of
+from tests.general_arms.programs import (
+    angles_beside,
+    builder,
+    every,
+    length,
+    middle,
+    plans,
+    point,
+    program,
+)
+from tests.general_arms.published_arms import (
+    OPENMANIPULATOR_X,
+    PANDA,
+    QUARTER,
+    UR5E,
+    craig,
+)
+
+THREE_AXES = craig(
+    [
+        (0.0, 0.0, 0.1, 0.0),
+        (-QUARTER, 0.0, 0.0, -0.5),
+        (0.0, 0.15, 0.0, 1.0),
+    ],
+    [-3.0, -2.0, -2.0],
+    [3.0, 2.0, 2.0],
+    se3.from_rotation_translation(np.eye(3), np.array((0.12, 0.0, 0.0))),
+)
+EIGHT_AXES = craig(
+    [
+        (0.0, 0.0, 0.3, 0.1),
+        (1.2, 0.05, 0.1, 0.0),
+        (0.7, 0.3, -0.09, 0.0),
+        (0.9, -0.02, 0.4, 0.0),
+        (-1.0, 0.03, 0.1, 0.0),
+        (0.7, 0.05, 0.06, 0.0),
+        (1.2, 0.05, 0.1, 0.0),
+        (0.8, 0.05, 0.1, 0.0),
+    ],
+    [-2.0] * 8,
+    [2.0] * 8,
+)
+
+
+@pytest.mark.parametrize("chain", [THREE_AXES, EIGHT_AXES], ids=["three axes", "eight axes"])
+def test_arm_of_few_or_many_axes_follows_lines_and_circles(chain: Chain) -> None:
+    p = middle(chain)
+    text = f"circle: {{centre: {point(p - (0.0, 0.0, 15.0))}, normal: x, radius: 15}}"
+    made = program(chain, "line: {by: {y: 20}}", "line: {by: {y: -20}}", text)
+    line, _, circle = (each.segments[0].path for each in plans(made))
+    sigma = np.linspace(0.0, 1.0, 300)
+    points = 1e3 * forward_batch(chain, joint_derivatives(line, sigma)[0])[:, :3, 3]
+    np.testing.assert_allclose(points, p + np.outer(sigma, (0.0, 20.0, 0.0)), atol=1e-6)
+    np.testing.assert_allclose(circle.end, circle.start, atol=1e-9)
+    np.testing.assert_allclose(circle.end, builder(chain).q, atol=1e-8)
+
+
+def test_three_axes_choose_no_orientation() -> None:
+    with pytest.raises(ScriptError, match="3 axes follows from its position"):
+        program(THREE_AXES, "line: {pitch: 5}")
+
+
+def test_grasping_needs_a_pitch_and_a_roll() -> None:
+    with pytest.raises(InputError, match="five-axis arm"):
+        _ = builder(UR5E).at
+
+
+@every({"UR5e": UR5E}, {"Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X})
+def test_plan_is_recorded_to_the_bit(chain: Chain) -> None:
+    d, p = 0.3 * length(chain), middle(chain)
+    through = ", ".join(map(point, (p - (0.0, 0.0, d), p - (0.0, d, d))))
+    made = program(chain, f"line: {{by: {{y: {d}}}}}", f"lines: {{through: [{through}]}}")
+    writer, reader, session = Codec(), Codec(), session_of(chain)
+    states: list[list[bytes]] = [[], []]
+    for plan in plans(made):
+        form = json_text(writer.encoded(cmd.Follow, cmd.Follow(plan)))
+        for shared in writer.shared.take_new():
+            reader.shared.add(shared)
+        found = reader.decoded(cmd.Follow, json_form(form))
+        for command, seen in zip((cmd.Follow(plan), found), states, strict=True):
+            state = session.begin(plan.start, 0.0, 0.0)
+            for number in range(60):
+                commands = [command] if number == 0 else []
+                state = session.step(state, commands, state.t + TICK)
+                state = session.observe(state, state.setpoint, 0.0)
+                seen.append(state.setpoint.tobytes())
+                assert writer.encoded(State, state)
+        assert found.plan.segments[0].path.joins == plan.segments[0].path.joins
+    assert states[0] == states[1]
+    assert len(set(states[0])) > 60
+
+
+def test_path_refuses_numbers_that_are_no_path() -> None:
+    path = plans(program(UR5E, "line: {by: {y: 20}}"))[0].segments[0].path
+    assert isinstance(path, PosePath)
+    for places, terms, message in (
+        (path.places[::-1], path.terms, "must rise from 0 to 1"),
+        (path.places[:-1], path.terms, "shape"),
+        (path.places, path.terms * np.nan, "nan"),
+    ):
+        with pytest.raises(InputError, match=message):
+            PosePath(path.chain, path.curve, places, terms)
+
+
+def test_angles_that_gimbal_lock_hides_are_asked_for() -> None:
+    made = builder(UR5E)
+    target = made.planning.oriented(made.target, Angles(math.pi / 2, 0.0, 0.0), np.eye(3))
+    with pytest.raises(InputError, match="`roll`, `pitch` and `yaw` together"):
+        made.planning.oriented(target, Angles(yaw=0.3), np.eye(3))
+    assert made.planning.oriented(target, Angles(), np.eye(3)) is target
+
+
+def test_curve_is_the_same_for_one_place_and_for_many() -> None:
+    path = (
+        plans(program(UR5E, f"line: {{{angles_beside(UR5E, (0.1, 0.1, 0.1))}}}"))[0]
+        .segments[0]
+        .path
+    )
+    assert isinstance(path, PosePath)
+    sigma = np.linspace(0.0, 1.0, 5)
+    many = path.curve.at(Jet.variable(sigma)).T
+    for number, each in enumerate(sigma.tolist()):
+        np.testing.assert_allclose(path.curve.at(Jet.variable(each)).T[0], many[number], atol=1e-15)
