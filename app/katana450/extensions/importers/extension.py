@@ -46,8 +46,8 @@ def _initial_scene(options: Namespace, session: Callable[[], Session]) -> Initia
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
+    from katana450.extensions.late_routes import LateRoutes
     from katana450.server.api.fields import ROOT
-    from katana450.server.web.late_routes import LateRoutes
 
     def make() -> list[BaseRoute]:
         from katana450.extensions.importers.uploads import Uploads

@@ -77,9 +77,9 @@ def _episodes_folder(options: Namespace, port: int) -> Path:
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
+    from katana450.extensions.late_routes import LateRoutes
     from katana450.extensions.recording.places import default_folder
     from katana450.server.api.fields import ROOT
-    from katana450.server.web.late_routes import LateRoutes
 
     options = context.options
     port = context.hub.stop_path.main_port

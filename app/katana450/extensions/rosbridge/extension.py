@@ -58,7 +58,7 @@ def _check_installed(options: Namespace, _facts: ServerFacts) -> None:
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:
-    from katana450.server.web.late_routes import LateRoutes
+    from katana450.extensions.late_routes import LateRoutes
 
     assert context.options is not None
     urdf = context.options.urdf
