@@ -22,6 +22,7 @@ from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 from tests.browser.camera import Camera, Drawing
 from tests.browser.grip import ArrowGrip, Grip, RingGrip
 from tests.browser.message import Message
+from tests.browser.viser_frame import viser_frame
 
 Matrix = NDArray[np.floating[Any]]
 Pixel = tuple[float, float]
@@ -90,7 +91,7 @@ class ViserPage:
             pixels = 1.0 if best else COARSE
             query = f"fixedDpr={pixels}" if own_camera else camera.query(pixels)
             page.goto(f"{url}/?{query}")
-            viser_page = cls(page, _viser_frame(page), errors)
+            viser_page = cls(page, viser_frame(page), errors)
             viser_page.wait_ready(nodes)
         except BaseException:
             context.close()
@@ -391,17 +392,6 @@ class ViserPage:
             yield
         finally:
             self.frame.evaluate("(draws) => harness.draw(draws)", before)
-
-
-def _viser_frame(page: Page) -> Frame:
-    """Return the document of viser: the page itself, or a frame in it."""
-    element = page.query_selector("iframe#scene")
-    if element is None:
-        return page.main_frame
-    frame = element.content_frame()
-    assert frame is not None
-    frame.wait_for_url("**/viser/**", wait_until="commit")
-    return frame
 
 
 def _matrix(elements: Sequence[float]) -> Matrix:

@@ -22,6 +22,7 @@ APP = (sys.executable, str(Path(__file__).with_name("viser_parts_app.py")), "--p
 NODES = ("/box", "/floor")
 CAMERA = Camera((1.5, -0.5, 0.75), (0.0, 0.0, 0.25))
 PORTRAIT = (390, 844)
+HELD = Path(__file__).with_name("held.js").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -90,31 +91,6 @@ def test_page_publishes_its_decoder(page: ViserPage) -> None:
     with part("start"):
         assert ask(page, "window.__viserZstdWasm instanceof WebAssembly.Module")
         assert ask(page, "typeof Viser.start") == "function"
-
-
-HELD = """
-    window.drawings = [];
-    // After the harness has defined the same property, and before viser's program runs.
-    addEventListener("DOMContentLoaded", () => {
-        const before = Object.getOwnPropertyDescriptor(window, "__viserMutable");
-        let mine;
-        Object.defineProperty(window, "__viserMutable", {
-            configurable: true,
-            get: () => mine,
-            set(value) {
-                before.set(mine = value);
-                const { gl } = value.scene.__r3f.root.getState();
-                const render = gl.render;
-                gl.render = (scene, camera) => {
-                    const there = Boolean(value.nodeRefFromName["/box"]);
-                    if (scene === value.scene) drawings.push(there);
-                    render.call(gl, scene, camera);
-                };
-            },
-        });
-        CALL
-    });
-"""
 
 
 def test_page_draws_nothing_before_its_scene_is_whole(

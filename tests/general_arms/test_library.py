@@ -173,7 +173,7 @@ def test_plan_leads_to_a_pose_and_a_line_turns_to_angles(urdf: Urdf) -> None:
     line = arm.line(roll=roll, pitch=pitch, yaw=yaw)
     np.testing.assert_allclose(arm.fk(line.end)[:3, :3], R, atol=1e-9)
     centre = arm.fk(arm.ready)[:3, 3]
-    circle = arm.circle(centre, 0.02, rpy=(roll, pitch, yaw), branch="right-up-noflip", turns=0.5)
+    circle = arm.circle(centre, 0.02, rpy=(roll, pitch, yaw), branch="left-up-flip", turns=0.5)
     np.testing.assert_allclose(arm.fk(circle.start)[:3, :3], R, atol=1e-9)
     with arm.show(line) as viewer:
         assert viewer.url.startswith("http://127.0.0.1:")

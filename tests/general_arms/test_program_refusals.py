@@ -1,4 +1,4 @@
-"""What scripts of other arms cannot ask for: beyond the reach, through singularities and limits."""
+"""Refusals of scripts of other arms: beyond the reach, at singularities and limits."""
 
 from __future__ import annotations
 

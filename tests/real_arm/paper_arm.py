@@ -226,3 +226,14 @@ class Conversation:
     def motors(self) -> list[tuple[int, int]]:
         """Axis and flag of all orders to motors that arrived."""
         return [(r.axis, r.flag) for _, r in self.arm.requests if isinstance(r, CommandMotor)]
+
+
+def sway(t0: float, amplitude: float = 0.5) -> Callable[[float], FloatArray]:
+    """Return a setpoint that swings with 1 rad/s at most and rests after 4 s."""
+
+    def at(t: float) -> FloatArray:
+        s = min(max(t - t0, 0.0), 4.0)
+        reach = amplitude * float(np.sin(0.5 * np.pi * s)) ** 2
+        return JOINTS + reach * np.array([1.0, -1.0, 0.5, 1.0, 1.0, 0.0])
+
+    return at
