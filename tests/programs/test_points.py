@@ -116,7 +116,7 @@ def test_wait_of_0_does_nothing(stage: Stage) -> None:
     [
         ("line: {by: {y: 20}, yaw: 10}", "yaw of a five-axis arm follows"),
         ("move: {x: 320, y: 0, z: 150, yaw: 10}", "yaw of a five-axis arm follows"),
-        ("move: {x: 320, y: 0, z: 150, branch: front-up-plus}", "no branch 'front-up-plus'"),
+        ("move: {x: 320, y: 0, z: 150, branch: front-up-noflip}", "no branch 'front-up-noflip'"),
         ("circle: {centre: corner, normal: x, radius: 10, yaw: 5}", "yaw of a five-axis arm"),
     ],
 )

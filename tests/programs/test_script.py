@@ -90,9 +90,9 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps: [home]\nspeeed: 1", 2, "did you mean 'speed'"),
         ("a: &x 1\nsteps: [home]", 1, "Anchors"),
         ("steps: !!python/object:os.system [home]", 1, "Tags"),
-        ("steps: [home", 1, "cannot be read"),
-        ("steps:\n\t- home", 2, "cannot be read"),
-        ("steps: [home]\n\x07", 2, "cannot be read"),
+        ("steps: [home", 1, "not valid YAML"),
+        ("steps:\n\t- home", 2, "not valid YAML"),
+        ("steps: [home]\n\x07", 2, "not valid YAML"),
         ("steps: [home]\nexpect: {speed: 1}", 2, "no 'speed'"),
     ],
 )

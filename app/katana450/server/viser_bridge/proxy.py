@@ -163,13 +163,14 @@ class _Line:
 
     async def _down(self) -> None:
         """Send frames as fast as the browser shows them."""
+        await self._send(await self.slot.take())
+        if self._key:
+            # What follows the scene, like the panel, must not delay its drawing.
+            await self._until_drawn()
         while True:
-            await self._send(await self.slot.take())
-            if self._key and not self._flow.counts:
-                # What follows the scene, like the panel, must not delay its drawing.
-                await self._until_drawn()
             await asyncio.sleep(self._pause(self._hub.clock()))
             await self._wait_for_room()
+            await self._send(await self.slot.take())
 
     async def _until_drawn(self) -> None:
         """Wait a while until the page has drawn something. One in the background draws nothing."""
