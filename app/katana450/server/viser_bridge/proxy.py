@@ -97,7 +97,8 @@ class Proxy:
         key = key_of(identity, page) if PAGE.fullmatch(page) else ""
         line = _Line(self._hub, self._guard, browser, key)
         with suppress(TimeoutError):
-            await asyncio.wait_for(self.complete.wait(), SCENE_TIMEOUT)
+            async with asyncio.timeout(SCENE_TIMEOUT):
+                await self.complete.wait()
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",
@@ -178,7 +179,9 @@ class _Line:
         while not self._flow.counts and (left := end - self._hub.clock()) > 0.0:
             self._room.clear()
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._room.wait(), left)
+                # Not `wait_for`: in Python 3.11 it can lose the cancellation by `run`.
+                async with asyncio.timeout(left):
+                    await self._room.wait()
 
     async def _wait_for_room(self) -> None:
         while not self._flow.has_room(self._hub.clock()):
