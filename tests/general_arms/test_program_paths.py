@@ -34,6 +34,7 @@ from tests.general_arms.published_arms import (
     OPENMANIPULATOR_X,
     PANDA,
     QUARTER,
+    SKEWED_LINKS,
     UR5E,
     craig,
 )
@@ -49,16 +50,7 @@ THREE_AXES = craig(
     se3.from_rotation_translation(np.eye(3), np.array((0.12, 0.0, 0.0))),
 )
 EIGHT_AXES = craig(
-    [
-        (0.0, 0.0, 0.3, 0.1),
-        (1.2, 0.05, 0.1, 0.0),
-        (0.7, 0.3, -0.09, 0.0),
-        (0.9, -0.02, 0.4, 0.0),
-        (-1.0, 0.03, 0.1, 0.0),
-        (0.7, 0.05, 0.06, 0.0),
-        (1.2, 0.05, 0.1, 0.0),
-        (0.8, 0.05, 0.1, 0.0),
-    ],
+    [*SKEWED_LINKS, (0.8, 0.05, 0.1, 0.0)],
     [-2.0] * 8,
     [2.0] * 8,
 )

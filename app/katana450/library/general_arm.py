@@ -35,7 +35,7 @@ NEEDED: Final = (
     "it needs three or more turning axes, whose tool is named if the file has other joints than "
     "those of fingers"
 )
-"""What plans need, as a clause."""
+"""End of the sentence that refuses a plan: the condition that the arm does not meet."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,7 +127,7 @@ class GeneralArm(Arm):
             "it needs a five-axis arm with a pan axis, three parallel axes and a roll axis",
         )
 
-    def circle(  # type: ignore[override]  # A pitch alone is no orientation of these arms.
+    def circle(  # type: ignore[override]  # rpy in place of the pitch and roll of five axes
         self,
         centre: npt.ArrayLike,
         radius: float,

@@ -29,7 +29,7 @@ RELEVANT = (
 """Entries that show why a simulation may not give the same bits."""
 
 OF_PROCESS = ("blas_core", "libm_rounding", "blas_rounding", "numpy_rounding")
-"""Those that the environment of a process changes."""
+"""The entries that depend on the environment variables of the process, not on the machine."""
 
 PROBES = 2000
 """Number of arguments with which the rounding of functions is tried."""
