@@ -137,6 +137,7 @@ def test_arm_obeys_a_valid_browser_after_the_attacks(server: AppServer) -> None:
     async def obey() -> None:
         async with opened(server.url) as (bad, _), opened(server.url) as (good, control):
             await control.say("take")
+            await control.wait(mine=True)
             for attack in ATTACKS.values():
                 await attack(bad)
             heard = await moves_the_arm(good, 12.5)
