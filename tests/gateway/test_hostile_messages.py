@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from typing import Any
 
 import msgspec
@@ -107,14 +107,16 @@ def test_message_that_no_page_sends_changes_nothing(server: AppServer) -> None:
 
 def test_invalid_message_is_not_answered(server: AppServer) -> None:
     async def attack() -> None:
-        async with peers(server.url) as (_, good):
+        async with peers(server.url) as (_, good), AsyncExitStack() as stack:
+            bad = await asyncio.gather(
+                *(stack.enter_async_context(opened(server.url)) for _ in RUDE)
+            )
             # On a busy machine the scene arrives with pauses.
             await good.listen(1.0)
-            for name, send in RUDE.items():
-                async with opened(server.url) as (bad, _):
-                    with suppress(ConnectionClosed):
-                        await send(bad)
-                        await bad.listen(BRIEF)
+            for (name, send), (peer, _) in zip(RUDE.items(), bad, strict=True):
+                with suppress(ConnectionClosed):
+                    await send(peer)
+                    await peer.listen(BRIEF)
                 assert await good.listen(BRIEF) == [], name
 
     asyncio.run(attack())
