@@ -292,3 +292,21 @@ def test_undone_change_is_kept_only_if_the_arm_refuses_its_inverse(
         table.hub.move(driver, cmd.Hold())
     reported.set_result(outcome)
     assert undoable() == left
+
+
+def test_command_counts_though_a_callback_after_its_delivery_fails(
+    table: Table, caplog: pytest.LogCaptureFixture
+) -> None:
+    gate, driver = table.hub.gate, table.join(PAGES[0])
+    noted: list[cmd.Command] = []
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("The callback fails.")
+
+    gate.delivered += [fail, lambda command, *_: noted.append(command)]
+    before = gate.motions
+    table.hub.move(driver, cmd.Home())
+    assert table.arm.commands == [cmd.Home()]
+    assert gate.motions == before + 1
+    assert noted == [cmd.Home()]
+    assert "The callback fails." in caplog.text

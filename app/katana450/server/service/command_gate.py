@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from katana450.arm.control import commands as cmd
@@ -22,6 +23,7 @@ from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.last_pause import LastPause
 from katana450.server.service.recorder import Recorder
+from katana450.server.service.runner import guarded
 from katana450.server.service.stop_state import ClearBy, ClearRights, StopRecord
 
 log = logging.getLogger(__name__)
@@ -97,10 +99,10 @@ class CommandGate:
                     arm = self.present()
                     before, caught_up = arm.state, arm.caught_up
                     ticket = arm.deliver(command, granted)
-                    for note in self.delivered:
-                        note(command, granted, before, caught_up)
                     self.motions += any(each.traits.supersedes for each in command.parts)
                     self.last_pause = LastPause.after(self.last_pause, command, actor, before)
+                    for note in self.delivered:
+                        guarded(partial(note, command, granted, before, caught_up))()
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise

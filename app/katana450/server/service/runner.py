@@ -104,13 +104,14 @@ class Runner(RequestHandler):
 def guarded(note: Callable[[], None]) -> Callable[[], None]:
     """Return ``note`` with its errors logged and not raised.
 
-    For ``stopped`` and ``redirected``, which are on the path of a stop to the arm.
+    For ``stopped`` and ``redirected``, which are on the path of a stop to the arm, and for
+    callbacks after a command was delivered, which nothing can take back.
     """
 
     def noted() -> None:
         try:
             note()
         except Exception:
-            log.exception("Error in the runner.")
+            log.exception("Error in a callback on the path of commands and stops.")
 
     return noted
