@@ -21,6 +21,8 @@ from katana450.extensions.rosbridge.servoing import (
     joint_rates,
     tool_rates,
 )
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.freedoms import pitched_frame
 
 Q = np.array([0.6, -1.1, 1.3, 0.2, 0.4])
@@ -35,27 +37,34 @@ def given(v: np.ndarray, omega: np.ndarray) -> Twist:
 def test_rates_of_a_twist_are_those_that_the_arm_can_have(arm: MountedArm, units: Units) -> None:
     axes = pitched_frame(arm.chain, Q)
     v, omega = np.array([0.05, -0.1, 0.2]), 0.3 * axes[:, 1] - 0.2 * axes[:, 0]
-    rates = tool_rates(given(v, omega), np.eye(3), arm.chain, Q, units)
+    rates = tool_rates(given(v, omega), np.eye(3), axes, units)
     linear, angular = (SCALE.linear, SCALE.rotational) if units is Units.UNITLESS else (1.0, 1.0)
     assert rates == pytest.approx([*(linear * v), angular * 0.3, angular * -0.2])
     # The same velocities, given in another frame.
     R = axes
-    turned = tool_rates(given(R.T @ v, R.T @ omega), R, arm.chain, Q, units)
+    turned = tool_rates(given(R.T @ v, R.T @ omega), R, axes, units)
     assert turned == pytest.approx(rates)
+
+
+@pytest.mark.parametrize("R", [np.eye(3), so3.exp(np.array([0.3, -0.4, 0.5]))])
+def test_other_arms_take_any_rotation(R: FloatArray) -> None:
+    v, omega = np.array([0.05, -0.1, 0.2]), np.array([0.3, -0.2, 0.1])
+    rates = tool_rates(given(v, omega), R, None, Units.SPEED_UNITS)
+    assert rates == pytest.approx([*(R @ v), *(R @ omega)])
 
 
 def test_rotation_without_an_axis_is_refused_with_its_direction(arm: MountedArm) -> None:
     axes = pitched_frame(arm.chain, Q)
     for omega in (axes[:, 2], axes[:, 1] + 0.5 * axes[:, 2]):
         with pytest.raises(InputError, match="five axes of the arm cannot make"):
-            tool_rates(given(np.zeros(3), omega), np.eye(3), arm.chain, Q, Units.SPEED_UNITS)
+            tool_rates(given(np.zeros(3), omega), np.eye(3), axes, Units.SPEED_UNITS)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), 1.01])
-def test_number_out_of_range_is_refused(arm: MountedArm, bad: float) -> None:
+def test_number_out_of_range_is_refused(bad: float) -> None:
     twist = given(np.array([bad, 0.0, 0.0]), np.zeros(3))
     with pytest.raises(InputError, match=r"`linear\.x` is"):
-        tool_rates(twist, np.eye(3), arm.chain, Q, Units.UNITLESS)
+        tool_rates(twist, np.eye(3), None, Units.UNITLESS)
     with pytest.raises(InputError, match="The velocity of b is"):
         joint_rates(JointJog(joint_names=["b"], velocities=[bad]), "ab", Units.UNITLESS)
 

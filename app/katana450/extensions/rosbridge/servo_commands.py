@@ -14,6 +14,7 @@ from katana450.extensions.rosbridge.servoing import (
     tool_rates,
 )
 from katana450.extensions.rosbridge.stream import ServoStream
+from katana450.maths.kinematics.freedoms import pitched_frame
 from katana450.server.service.hub import Hub
 
 
@@ -32,8 +33,10 @@ class ServoCommands:
         state, mounted = arm.state, arm.arm
         found = frames(arm.robot, arm.robot.joint_values(state.q, state.gripper))
         R = rotation_of(message.header.frame_id, found, arm.robot.links[0].name)
-        chain = mounted.chain_to(state.tool)
-        self._stream.tool(tool_rates(message.twist, R, chain, state.q, self._units))
+        pitched = None
+        if mounted.kinematics_to(state.tool).freedoms == 5:
+            pitched = pitched_frame(mounted.chain_to(state.tool), state.q)
+        self._stream.tool(tool_rates(message.twist, R, pitched, self._units))
 
     def jog(self, message: JointJog) -> None:
         """Move joints. Raises KatanaError if that is refused."""

@@ -1,9 +1,9 @@
 """Twists and rates of joints as MoveIt Servo takes them, and the rates of the arm that they mean.
 
-An arm of five axes turns its tool about two axes only: that of pitch, which is horizontal and
-across the arm, and that of roll, which is the tool's own. How it turns about a third follows from
-the path of the tool point. So a twist without rotation keeps pitch and roll, and a rotation about
-another axis is refused.
+An arm of the five-axis family turns its tool about two axes only: that of pitch, which is
+horizontal and across the arm, and that of roll, which is the tool's own. How it turns about a third
+follows from the path of the tool point. So a twist without rotation keeps pitch and roll, and a
+rotation about another axis is refused. Other arms take any rotation.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.rosbridge.messages import GivenHeader, JointJog, Twist, Vector3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.freedoms import pitched_frame
 from katana450.server.api.fields import MAX_ANGULAR_RATE, MAX_LINEAR_RATE
 
 COMMAND_TIMEOUT = 0.1
@@ -76,18 +74,20 @@ def check_fresh(header: GivenHeader, now: float) -> None:
 def tool_rates(
     twist: Twist,
     R_shoulder_frame: FloatArray,
-    chain: Chain,
-    q: FloatArray,
+    R_shoulder_pitched: FloatArray | None,
     units: Units,
     scale: Scale = SCALE,
 ) -> FloatArray:
-    """Return the rates (5,) of a jog along {S}: (x, y, z) [m/s], pitch and roll [rad/s].
+    """Return the rates of a jog along {S}.
+
+    They are (5,): (x, y, z) [m/s], pitch and roll [rad/s]. For an arm outside the five-axis family
+    they are (6,): (x, y, z) [m/s] and the angular velocity [rad/s].
 
     Args:
         twist: velocity of the tool point, and angular velocity of the tool.
         R_shoulder_frame: (3, 3) orientation in {S} of the frame of ``twist``.
-        chain: the arm.
-        q: (5,) joint angles [rad].
+        R_shoulder_pitched: (3, 3) the axes of ``pitched_frame`` in {S}; None for an arm outside the
+            five-axis family.
         units: units of ``twist``.
         scale: speeds that 1 stands for.
 
@@ -96,8 +96,10 @@ def tool_rates(
     """
     linear = _scaled(twist.linear, units, scale.linear, MAX_LINEAR_RATE, "linear", "m/s")
     angular = _scaled(twist.angular, units, scale.rotational, MAX_ANGULAR_RATE, "angular", "rad/s")
-    omega = R_shoulder_frame @ angular
-    roll_axis, pitch_axis, other = pitched_frame(chain, q).T
+    v, omega = R_shoulder_frame @ linear, R_shoulder_frame @ angular
+    if R_shoulder_pitched is None:
+        return np.concatenate((v, omega))
+    roll_axis, pitch_axis, other = R_shoulder_pitched.T
     size, impossible = float(np.linalg.norm(omega)), float(other @ omega)
     if abs(impossible) > IMPOSSIBLE * size:
         # Without a minus sign in front of a zero.
@@ -108,7 +110,7 @@ def tool_rates(
             "about the tool's own axis (roll) and about the horizontal axis across the arm "
             "(pitch). Set this part of `angular` to 0."
         )
-    return np.array([*(R_shoulder_frame @ linear), pitch_axis @ omega, roll_axis @ omega])
+    return np.array([*v, pitch_axis @ omega, roll_axis @ omega])
 
 
 def joint_rates(

@@ -51,12 +51,13 @@ class ServoStream:
         return self._motion is not ServoMotion.NOTHING
 
     def tool(self, rates: FloatArray) -> None:
-        """Move the tool at ``rates`` (5,), see ``requests.Jog``. Raises KatanaError if refused."""
+        """Move the tool at ``rates``, see ``requests.Jog``. Raises KatanaError if refused."""
         self._received()
         if not rates.any():
             self._end(ServoMotion.TOOL)
             return
         self._begin(ServoMotion.TOOL)
+        self._rates = rates
         self._send(requests.Jog(rates=tuple(rates.tolist()), revocations=self._revocations))
 
     def joints(self, rates: FloatArray) -> None:
@@ -121,6 +122,7 @@ class ServoStream:
         self._motion = ServoMotion.NOTHING
         if motion is ServoMotion.TOOL:
             # Keeps the tool on its line; a hold brakes each joint by itself.
-            self._ask(requests.Jog(rates=(0.0,) * 5, revocations=self._revocations))
+            rest = (0.0,) * len(self._rates)
+            self._ask(requests.Jog(rates=rest, revocations=self._revocations))
         else:
             self._ask(requests.Hold(revocations=self._revocations))
