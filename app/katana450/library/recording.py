@@ -25,6 +25,7 @@ from katana450.extensions.recording.files.checking import (
     state_numbers,
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.replay import Verification
@@ -56,6 +57,23 @@ class RecordedCommand:
     t: float
     command: Command
     giver: str
+
+
+@dataclass(frozen=True)
+class RecordedProgram:
+    """A run of a script in a recording.
+
+    Attributes:
+        name: name of the script.
+        start: time at which it began [s], maybe before the recording.
+        end: time at which it ended [s]; None if it had not ended at the end of the recording.
+        text: text of the script, with those of all files that it names.
+    """
+
+    name: str
+    start: float
+    end: float | None
+    text: str
 
 
 class Recording:
@@ -148,6 +166,20 @@ class Recording:
         """All events, each with its time ``t`` [s] and its ``kind``. Raises InputError."""
         with RecordingFile.open(self.path) as file:
             return tuple(state_numbers(message) for message in file.messages(EVENTS))
+
+    @cached_property
+    def programs(self) -> tuple[RecordedProgram, ...]:
+        """All runs of scripts by their begin, with the texts. Raises InputError."""
+        with RecordingFile.open(self.path) as file:
+            texts = {each.name: each.data for each in file.attachments()}
+            found = [run for run in script_runs([file]) if run.script in texts]
+        for run in found:
+            if sha256(texts[run.script]) != run.sha256:
+                raise InputError(f"{self.path} is damaged: {run.script} is not the text that ran.")
+        return tuple(
+            RecordedProgram(run.name, run.start, run.end, texts[run.script].decode("utf-8"))
+            for run in found
+        )
 
     @cached_property
     def episodes(self) -> tuple[Episode, ...]:

@@ -21,6 +21,7 @@ from katana450.extensions.recording.scoring.score_options import add_score_optio
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
+    from katana450.server.service.runner import Runner
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
 
@@ -90,6 +91,7 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
 
         folder, episodes = options.record or default_folder(port), _episodes_folder(options, port)
         follow_episodes(context.hub, episodes, port)
+        _note_scripts(context.hub.runner, folder, port)
 
     def make() -> list[BaseRoute]:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes
@@ -105,6 +107,15 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
 
     names = [f"{ROOT}/{name}" for name in ("recording", "playback", "episodes")]
     return LateRoutes(names, make).routes()
+
+
+def _note_scripts(runner: Runner, folder: Path, port: int) -> None:
+    """Let the scripts that ``runner`` runs be attached to the recording in ``folder``."""
+    from katana450.extensions.programs.server.program_runner import ProgramRunner
+    from katana450.extensions.recording.live.script_notes import ScriptNoter, notes_folder
+
+    if isinstance(runner, ProgramRunner):
+        runner.follow_run = ScriptNoter(notes_folder(folder, port)).note
 
 
 def _folder(context: FolderContext) -> PanelFolder:

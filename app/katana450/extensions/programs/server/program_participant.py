@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 
 from katana450.arm.control import commands as cmd
@@ -13,6 +14,9 @@ from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 
+FollowRun = Callable[[str, str, float, float | None], None]
+"""Function of name and text of a script, and the times at which it began and ended [s]."""
+
 
 class ProgramParticipant:
     """The participant of one run of a program.
@@ -23,10 +27,18 @@ class ProgramParticipant:
         allowed: maximum fraction of full speed that a person has allowed since the run began.
     """
 
-    def __init__(self, hub: Hub, name: str, owner: Participant) -> None:
+    def __init__(
+        self,
+        hub: Hub,
+        name: str,
+        owner: Participant,
+        follow_run: Callable[[float, float | None], None],
+    ) -> None:
         """Join ``hub`` as the program ``name`` of ``owner``, and take the lease.
 
-        Raises LeaseError if another participant holds it, or the arm is stopped.
+        ``follow_run`` is called with the time at which the run begins [s] and None, and at its end
+        with both times. Raises LeaseError if another participant holds the lease, or the arm is
+        stopped.
         """
         self._hub = hub
         identity, alive = program_identity(name, owner.person), AlwaysAlive(hub.clock)
@@ -48,6 +60,8 @@ class ProgramParticipant:
         self._speed = self._commanded = hub.present().state.speed
         self._tool = hub.present().state.tool
         self.allowed = 1.0
+        self._began, self._follow_run = hub.clock(), follow_run
+        follow_run(self._began, None)
 
     @property
     def drives(self) -> bool:
@@ -77,6 +91,7 @@ class ProgramParticipant:
         that was interrupted continues with its own.
         """
         hub = self._hub
+        self._follow_run(self._began, hub.clock())
         if done and self.drives and hub.present().state.tool != self._tool:
             with suppress(InputError, LeaseError):
                 self.send(cmd.SetTool(self._tool))

@@ -10,6 +10,7 @@ from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import msgspec
 
@@ -24,7 +25,7 @@ from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
-from katana450.extensions.programs.server.program_participant import ProgramParticipant
+from katana450.extensions.programs.server.program_participant import FollowRun, ProgramParticipant
 from katana450.extensions.programs.server.program_planner import PLANNED_ORDERS, ProgramPlanner
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.server.run_progress import run_progress
@@ -46,12 +47,7 @@ class ProgramRunner(Runner):
     controls = ("Script", "Program", "Look at")
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
-        """Prepare to run programs of ``hub``.
-
-        ``options.owner_silence`` is the heartbeat timeout of the owner [s], after which a program
-        ends. ``options.no_unattended``: see ``ProgramOwner``. ``options.no_idle_planning``: scripts
-        are planned only when they are asked for.
-        """
+        """Prepare to run programs of ``hub``. ``options``: see ``extension.add_serve_options``."""
         super().__init__(hub, options)
         allowed = not options.no_unattended
         self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
@@ -59,6 +55,8 @@ class ProgramRunner(Runner):
         self._interruption: Interruption | None = None
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
+        self.follow_run: FollowRun = lambda *_: None
+        """Called with name and text of a script that begins or has ended, and these times [s]."""
 
     @property
     def running(self) -> bool:
@@ -353,7 +351,8 @@ class ProgramRunner(Runner):
         assert planning.program is not None
         planning.refused, planning.note = None, ""
         program, began = planning.program, self.hub.clock()
-        self._runs_as = ProgramParticipant(self.hub, program.name, participant)
+        follow = partial(self.follow_run, program.name, planning.text)
+        self._runs_as = ProgramParticipant(self.hub, program.name, participant, follow)
         self._owner.begin(participant, began, unattended=unattended)
         self._interruption = None
         self._run = replace(

@@ -30,6 +30,7 @@ from katana450.extensions.recording.datasets.ros_messages import (
 )
 from katana450.extensions.recording.files.checking import state_numbers
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
+from katana450.extensions.recording.files.script_runs import FOLDER, scripts_in
 from katana450.extensions.recording.state_message import NANO, pose_of
 from katana450.extensions.recording.topics import CHECKPOINTS, EVENTS, STATE
 from katana450.maths.geometry.arrays import FloatArray, finite_array
@@ -93,6 +94,7 @@ def write_bag(
         with (folder / name).open("wb") as target:
             bag = _Bag(target, file, robot)
             bag.add_part(start, end)
+            bag.add_scripts(start, end)
             bag.close()
         if not bag.counts[JOINT_STATES]:
             raise InputError(f"{file.path} has no states in that time.")
@@ -149,6 +151,13 @@ class _Bag:
                 self._add(BAG_EVENTS, t, text_message(message.data.decode(errors="replace")))
             else:
                 self._add_state(t, state_numbers(message))
+
+    def add_scripts(self, start: float, end: float) -> None:
+        """Attach the scripts that ran from ``start`` to ``end`` [s]."""
+        for each in scripts_in([self._file], start, end)[0]:
+            if each.name.startswith(FOLDER):
+                t = min(max(each.log_time + self._offset, 0), MAX_TIME)
+                self._writer.add_attachment(t, t, each.name, each.media_type, each.data)
 
     def close(self) -> None:
         """Write the index and the end of the file."""

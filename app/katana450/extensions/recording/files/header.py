@@ -34,11 +34,15 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Attachment:
-    """A file that belongs to a recording: its name, its media type and its content."""
+    """A file that belongs to a recording: its name, its media type and its content.
+
+    ``log_time``: the time to which it belongs [ns], if it does not belong to all.
+    """
 
     name: str
     media_type: str
     data: bytes
+    log_time: int = 0
 
 
 def attached_scene(path: Path) -> tuple[Attachment, ...]:
@@ -93,7 +97,7 @@ def header_of(
         urdf: file of the robot, which is attached.
         tool: the link to which targets refer; None for that of the file.
         environment: gives the poses of objects in the hand.
-        attachments: further files, such as scene and script.
+        attachments: further files, such as that of the scene.
     """
     try:
         described = urdf.read_bytes()

@@ -66,11 +66,10 @@ class MessageWriter:
         # In the first chunk, so that the beginning of a file alone can be read.
         self._content = bytearray(packed_records(described))
         self._add_metadata(metadata)
-        for each in attachments:
-            self._add_attachment(each)
         statistics = self._summary.statistics
+        for each in attachments:
+            self.attach(each)
         statistics.schema_count = statistics.channel_count = len(TOPICS)
-        statistics.attachment_count = len(self._summary.attachment_indexes)
         statistics.metadata_count = len(self._summary.metadata_indexes)
 
     def _add_metadata(self, metadata: Mapping[str, str]) -> None:
@@ -78,11 +77,17 @@ class MessageWriter:
         length = write_records(self._file, [Metadata(METADATA, dict(metadata))])
         self._summary.metadata_indexes.append(MetadataIndex(at, length, METADATA))
 
-    def _add_attachment(self, added: Attachment) -> None:
+    def attach(self, added: Attachment) -> None:
+        """Attach a file, unless one of its name is attached."""
+        found = self._summary.attachment_indexes
         at, (name, kind, data) = self._file.tell(), (added.name, added.media_type, added.data)
-        length = write_records(self._file, [McapAttachment(0, 0, name, kind, data)])
-        index = AttachmentIndex(at, length, 0, 0, len(data), name, kind)
-        self._summary.attachment_indexes.append(index)
+        if any(each.name == name for each in found):
+            return
+        t = added.log_time
+        length = write_records(self._file, [McapAttachment(t, t, name, kind, data)])
+        found.append(AttachmentIndex(at, length, t, t, len(data), name, kind))
+        if self._summary.statistics is not None:
+            self._summary.statistics.attachment_count = len(found)
 
     def add(self, topic: str, number: int, log_time: int, data: bytes) -> None:
         """Write a message; see ``recording_file.Message``. Other topics are left out."""

@@ -21,6 +21,7 @@ from katana450.extensions.recording.files.fingerprint import OF_PROCESS, differe
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
+from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.trimming import Trimmed, trim
 from katana450.extensions.recording.files.verifying import simulates_apart, verified
 from katana450.extensions.recording.places import recordings_in
@@ -86,7 +87,11 @@ def _info(path: Path) -> int:
         for topic, count in file.counts().items():
             print(printable(f"  {topic}: {count} messages"))
         for each in file.attachments():
-            print(printable(f"  attached: {each.name}, {len(each.data)} bytes"))
+            about = f"{len(each.data)} bytes, SHA-256 {sha256(each.data)}"
+            print(printable(f"  attached: {each.name}, {about}"))
+        for run in script_runs([file]):
+            end = "" if run.end is None else f" to {run.end:.3f}"
+            print(printable(f"  script {run.name} from {run.start:.3f}{end} s: {run.script}"))
         for name, value in sorted(file.metadata.items()):
             print(printable(f"  {name}: {value}"))
     return 0

@@ -239,7 +239,7 @@ class RecordingFile:
         """Yield the files that belong to the recording. Raises InputError."""
         with self._faults():
             for each in self._reader.iter_attachments():
-                yield Attachment(each.name, each.media_type, each.data)
+                yield Attachment(each.name, each.media_type, each.data, each.log_time)
 
     def counts(self) -> dict[str, int]:
         """Return the number of messages of each topic. Raises InputError."""

@@ -16,6 +16,11 @@ from katana450.extensions.recording.codec import Codec, json_text
 from katana450.extensions.recording.digest import Digester
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.message_writer import MessageWriter
+from katana450.extensions.recording.files.script_runs import (
+    PROGRAM,
+    attached_script,
+    program_event,
+)
 from katana450.extensions.recording.form_error import FormError
 from katana450.extensions.recording.pseudonyms import Pseudonyms
 from katana450.extensions.recording.state_message import StateMessages, nanoseconds
@@ -64,6 +69,7 @@ class RecordingWriter:
         self._messages = StateMessages(header.robot, header.environment)
         self._number = 0
         self._written = _Written()
+        self._scripts: set[tuple[str, float, bool]] = set()
         file.flush()
 
     def prepare(self, records: Sequence[TickRecord]) -> None:
@@ -109,6 +115,17 @@ class RecordingWriter:
     def event(self, t: float, kind: str, what: Mapping[str, Any]) -> None:
         """Record an event at ``t`` [s] with further fields, which are JSON values."""
         self._add(EVENTS, t, {"t": t, "kind": kind, **what})
+
+    def script(self, t: float, name: str, text: str, since: float, *, began: bool) -> None:
+        """Record at ``t`` [s] that a script began or ended, and attach its text once.
+
+        ``since``: the time at which it began [s], maybe before the file.
+        """
+        script = attached_script(name, text, since)
+        if (script.name, since, began) not in self._scripts:
+            self._scripts.add((script.name, since, began))
+            self._writer.attach(script)
+            self.event(t, PROGRAM, program_event(name, script, since, began=began))
 
     def episode(self, t: float, message: Mapping[str, Any]) -> None:
         """Record the description of an episode at ``t`` [s]; see ``episodes.episode``."""

@@ -125,9 +125,8 @@ def _scan(file: BinaryIO) -> _Found:
                 case Metadata(name=name, metadata=metadata) if name == METADATA:
                     found.metadata = dict(metadata)
                 case McapAttachment():
-                    found.attachments.append(
-                        Attachment(record.name, record.media_type, record.data)
-                    )
+                    name, kind = record.name, record.media_type
+                    found.attachments.append(Attachment(name, kind, record.data, record.log_time))
                 case Chunk():
                     times = [
                         each.log_time / NANO

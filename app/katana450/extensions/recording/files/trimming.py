@@ -18,6 +18,7 @@ from katana450.extensions.recording.files.recording_file import (
     RecordingFile,
     nanoseconds_of,
 )
+from katana450.extensions.recording.files.script_runs import begun_before, scripts_in
 from katana450.extensions.recording.state_message import nanoseconds
 from katana450.extensions.recording.topics import (
     CHECKPOINTS,
@@ -63,8 +64,9 @@ def trim(
 
     The sources are files of one session, which are put into the order of their times. The ticks
     from the last complete state before ``start`` on are kept too, so that the part can be simulated
-    again. ``episode``: message on ``/episodes`` that replaces all those of the sources. Raises
-    InputError if there is nothing in that time, or a file cannot be read.
+    again, and the texts of the scripts that ran in it. ``episode``: message on ``/episodes`` that
+    replaces all those of the sources. Raises InputError if there is nothing in that time, or a file
+    cannot be read.
     """
     with ExitStack() as stack:
         files = [stack.enter_context(RecordingFile.open(path)) for path in sources]
@@ -100,7 +102,8 @@ def _write(
 ) -> None:
     start, end = part
     metadata = {**files[0].metadata, PART_START: repr(start)}
-    copy = RecordingCopy(target, metadata, files[0].attachments())
+    attachments, runs = scripts_in(files, start, end)
+    copy = RecordingCopy(target, metadata, attachments)
     needed: set[bytes] = set()
     for message in _simulated(files, begin, end):
         needed.update(KEY.findall(message.data))
@@ -116,6 +119,9 @@ def _write(
     if episode is not None:
         # The part begins with it, although an arm at rest may have no states until later.
         copy.add(Message(EPISODES, 0, nanoseconds(start), episode))
+    for run in runs:
+        if run.start < start:
+            copy.add(Message(EVENTS, 0, nanoseconds(start), begun_before(run, start)))
     number = 0
     for message in _merged(files, begin, start, end):
         number = message.number

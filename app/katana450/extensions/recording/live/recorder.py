@@ -83,6 +83,7 @@ def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
     from katana450.assembly.robot_session import find_robot
     from katana450.extensions.recording.files.header import attached_scene, header_of
     from katana450.extensions.recording.live.ring import Ring
+    from katana450.extensions.recording.live.script_notes import ScriptReader, notes_folder
 
     facts = config.facts
     found = find_robot(facts.settings, facts.urdf, facts.tool)
@@ -91,7 +92,8 @@ def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
     header = header_of(
         found.robot, facts.settings, facts.urdf, facts.tool, environment, attachments
     )
-    return Ring(config.folder, header), header
+    scripts = ScriptReader(notes_folder(config.folder, facts.port))
+    return Ring(config.folder, header, scripts=scripts), header
 
 
 def _keeper(config: RecorderConfig, ring: Ring, header: RecordingHeader) -> EpisodeKeeper | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import threading
 import time
@@ -19,6 +20,7 @@ from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.live.run_events import RunEvents
+from katana450.extensions.recording.live.script_notes import ScriptReader
 from katana450.extensions.recording.places import SUFFIX, recordings_in
 from katana450.platform_support import claim_file, create_file
 
@@ -52,8 +54,12 @@ class Ring:
         folder: Path,
         header: RecordingHeader,
         clock: Callable[[], float] = time.monotonic,
+        scripts: ScriptReader | None = None,
     ) -> None:
-        """Use ``folder``, which need not exist. Files that a crash left open are repaired."""
+        """Use ``folder``, which need not exist. Files that a crash left open are repaired.
+
+        ``scripts``: the scripts that run, whose texts are attached.
+        """
         self._folder = folder
         self._header = header
         self._clock = clock
@@ -67,6 +73,9 @@ class Ring:
         self._before: State | None = None
         self._newest = ""
         self._run_events = RunEvents()
+        self._scripts = scripts
+        # Times of the first tick, and of the first one since the last sync [s].
+        self._first_t, self._unsynced_t = math.inf, math.inf
         self.unsynced = False
         """Whether ``sync`` has anything to bring to the disk."""
         self.lock = threading.RLock()
@@ -109,6 +118,8 @@ class Ring:
         self._unwritten += 1
         self.unsynced = True
         self.last_t = record.t
+        self._first_t = min(self._first_t, record.t)
+        self._unsynced_t = min(self._unsynced_t, record.t)
 
     def describe(self, t: float, episode: Mapping[str, Any]) -> None:
         """Write and sync the message ``episode`` about an episode at ``t`` [s]."""
@@ -155,6 +166,20 @@ class Ring:
             }
             self._writer.event(entry.t, "finding", what)
 
+    def _note_scripts(self) -> None:
+        """Attach the scripts that run, or have run since the last sync. Raises OSError."""
+        if self._writer is None or self._scripts is None or self._unsynced_t > self.last_t:
+            return
+        for name, text, since, ended in self._scripts.read():
+            if ended is not None and ended < self._first_t:
+                continue
+            for began, t in ((True, since), (False, ended)):
+                if t is not None:
+                    # A time without ticks is not part of the recording.
+                    at = min(max(t, self._unsynced_t), self.last_t)
+                    self._writer.script(at, name, text, since, began=began)
+        self._unsynced_t = math.inf
+
     def lost(self, t: float, ticks: int) -> None:
         """Note that ``ticks`` ticks until ``t`` [s] never came."""
         self._lost += ticks
@@ -167,6 +192,7 @@ class Ring:
         if self._writer is None or self._file is None:
             return
         try:
+            self._note_scripts()
             self._writer.flush()
             os.fsync(self._file.fileno())
             full = self._file.tell() >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
@@ -181,14 +207,16 @@ class Ring:
     def close(self) -> None:
         """End the present file."""
         writer, file = self._writer, self._file
-        self._writer = self._file = None
+        self._file = None
         if writer is None or file is None:
             return
         try:
+            self._note_scripts()
             writer.close()
             os.fsync(file.fileno())
         except OSError as error:
             self._report(error)
+        self._writer = None
         with suppress(OSError):
             file.close()
 

@@ -26,7 +26,7 @@ WITHOUT_MARK = frozenset((Reason.STOPPED, Reason.PAUSED, Reason.WAITING))
 class Mark(NamedTuple):
     """A mark at ``t`` [s].
 
-    Its ``kind`` is stop, clear_stop, driver, step, contact, limit or episode.
+    Its ``kind`` is stop, clear_stop, driver, program, step, contact, limit or episode.
     """
 
     t: float
@@ -68,6 +68,8 @@ def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
             return kind, "Stop cleared"
         case run_events.DRIVER:
             return kind, f"{form.get('name')} drives"
+        case "program" if form.get("began") is True:
+            return kind, f"Script {form.get('name')} begins"
         case run_events.STEP:
             seconds = form.get("seconds")
             length = f" of {seconds:.1f} s" if isinstance(seconds, int | float) else ""

@@ -1,0 +1,342 @@
+"""The texts of scripts that run are attached to recordings, each once, where they ran."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+
+import katana450
+from katana450.arm.runtime.tick import TickRecord
+from katana450.cli.main import main
+from katana450.client import Client, RefusedError
+from katana450.errors import InputError
+from katana450.extensions.programs.script_files import script_text
+from katana450.extensions.recording.files.copying import RecordingCopy
+from katana450.extensions.recording.files.keeping import whole_copy
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recovery import recover
+from katana450.extensions.recording.files.script_runs import FOLDER, script_runs
+from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.live import ring, script_notes
+from katana450.extensions.recording.live.ring import Ring
+from katana450.extensions.recording.live.script_notes import (
+    ScriptNoter,
+    ScriptReader,
+    notes_folder,
+)
+from katana450.extensions.recording.places import recordings_in
+from katana450.extensions.recording.playback.run import PlaybackRun
+from katana450.library.script_run import run_script
+from tests.browser.server import RECORDING_APP, AppServer
+from tests.recording.recorded import header, run, swinging
+from tests.recording.test_recorder import RECORDER, _other_child, waited_for
+
+TURN = "name: {name}\nsteps:\n  - joints: [{angle}, -60, 80, 20, 0]\n"
+NOD = "name: Nod\ninclude: [more.yaml]\nsteps:\n  - call: nod\n"
+MORE = "define:\n  nod:\n    steps:\n      - wait: 0.2\n      - joints: [5, -55, 80, 20, 0]\n"
+
+
+def scripts_of(path: Path) -> dict[str, str]:
+    """Return the texts of the scripts that are attached to the recording at ``path``."""
+    with RecordingFile.open(path) as file:
+        found = [each for each in file.attachments() if each.name.startswith(FOLDER)]
+    assert len({each.name for each in found}) == len(found)
+    return {each.name: each.data.decode() for each in found}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("scripts")
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[AppServer]:
+    places = ("--record", str(folder / "ring"), "--episodes", str(folder / "episodes"))
+    with AppServer((*RECORDING_APP, "--silence", "2.0", *places)) as running:
+        yield running
+
+
+def kept(folder: Path, *options: str) -> Path:
+    """Return a recording that is kept of the ring in ``folder``."""
+    path = folder / "kept.mcap"
+    assert main(["record", "keep", str(folder / "ring"), *options, "--out", str(path)]) == 0
+    return path
+
+
+LEFT, RIGHT = (TURN.format(name=f"Turn {each}", angle=each) for each in (20, -20))
+
+
+@pytest.fixture(scope="module")
+def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
+    """Return a recording of four runs of three scripts, and the file of an episode of one."""
+    named = folder / "nod.yaml"
+    named.write_text(NOD, encoding="utf-8")
+    (folder / "more.yaml").write_text(MORE, encoding="utf-8")
+    with katana450.connect(server.url, name="Ada") as client:
+        run_script(client, LEFT, 1.0)
+        waited_for(lambda: _started(client), "episodes")
+        assert main(["run", str(named), "--url", server.url]) == 0
+        episode = client.episodes.stop("success")
+        for text in (LEFT, RIGHT):
+            run_script(client, text, 1.0)
+
+    def has_all() -> bool:
+        with suppress(InputError), RecordingFile.open(kept(folder)) as file:
+            return [each.end is None for each in script_runs([file])] == [False] * 4
+        return False
+
+    waited_for(has_all, "four runs in the recording")
+    path = kept(folder).rename(folder / "all.mcap")
+    return path, folder / "episodes" / f"episode-{episode:04d}.mcap"
+
+
+def test_texts_of_a_server_are_attached_once_with_their_runs(
+    ran: tuple[Path, Path], folder: Path
+) -> None:
+    path, episode = ran
+    nod = script_text(folder / "nod.yaml")
+    assert MORE.splitlines()[0] in nod
+    found = scripts_of(path)
+    assert sorted(found.values()) == sorted((LEFT, nod, RIGHT))
+    for name, text in found.items():
+        assert hashlib.sha256(text.encode()).hexdigest()[:12] in name
+    programs = katana450.open(path).programs
+    assert [each.name for each in programs] == ["Turn 20", "Nod", "Turn 20", "Turn -20"]
+    assert [each.text for each in programs] == [LEFT, nod, LEFT, RIGHT]
+    for each in programs:
+        assert each.end is not None
+        assert 0.1 < each.end - each.start < 20.0
+    # The file of an episode has what ran in it.
+    assert list(scripts_of(episode).values()) == [nod]
+    # The timeline shows when each began.
+    shown = PlaybackRun(lambda: [path])
+    shown.update()
+    begun = [each.text for each in shown.marks() if each.kind == "program"]
+    assert begun == [f"Script {each.name} begins" for each in programs]
+
+
+def test_parts_have_the_scripts_that_ran_in_them(ran: tuple[Path, Path], folder: Path) -> None:
+    path, part = ran[0], folder / "part.mcap"
+    recording = katana450.open(path)
+    first, second, _, last = recording.programs
+    assert first.end is not None
+    middle = second.start + 0.3 - recording.start
+    for begin, end, text in (
+        (last.start - recording.start, 1e3, RIGHT),
+        (middle, middle + 0.1, second.text),
+        (0.0, first.end - recording.start, LEFT),
+    ):
+        cut = ["trim", str(path), "--from", str(begin), "--to", str(end), "--out", str(part)]
+        assert main(["record", *cut]) == 0
+        assert list(scripts_of(part).values()) == [text]
+        assert [each.text for each in katana450.open(part).programs] == [text]
+        assert katana450.open(part).verify().identical
+    # A part of that part has it, too.
+    again = folder / "again.mcap"
+    trim([part], again, 0.0, 1e9)
+    assert list(scripts_of(again).values()) == [LEFT]
+
+
+def test_info_repair_and_export_keep_scripts(
+    ran: tuple[Path, Path], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, broken, bag = ran[0], folder / "broken.mcap", folder / "bag"
+    found = scripts_of(path)
+    assert main(["record", "info", str(path)]) == 0
+    shown = capsys.readouterr().out
+    for name, text in found.items():
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        assert f"attached: {name}, {len(text.encode())} bytes, SHA-256 {digest}" in shown
+    assert shown.count("script Turn 20 from ") == 2
+    broken.write_bytes(path.read_bytes()[:-200])
+    assert recover(broken, broken) is not None
+    assert scripts_of(broken) == found
+    assert main(["record", "export", str(path), "--format", "rosbag2", "--out", str(bag)]) == 0
+    with (bag / "bag_0.mcap").open("rb") as opened:
+        attached = list(make_reader(opened, validate_crcs=True).iter_attachments())
+    assert {each.name: each.data.decode() for each in attached} == found
+    with Reader(bag) as reader:
+        assert reader.message_count > 100
+
+
+def _started(client: Client) -> bool:
+    try:
+        client.episodes.start("nod")
+    except RefusedError:
+        # The process that records starts some seconds later.
+        return False
+    return True
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_script_that_runs_is_attached_again_after_a_crash(server: AppServer, folder: Path) -> None:
+    """Both files have it: the one that is repaired, and that of the next process."""
+    turns = (f"  - joints: [{10 - 20 * (each % 2)}, -60, 80, 20, 0]\n" for each in range(40))
+    text = f"name: Long\nsteps:\n{''.join(turns)}"
+    with katana450.connect(server.url, name="Ada") as client:
+        thread = threading.Thread(target=lambda: suppressed(client, text), daemon=True)
+        thread.start()
+        waited_for(lambda: _attached(folder / "ring", text), "the script on the disk")
+        recorder, before = server.child(RECORDER), recordings_in(folder / "ring")
+        os.kill(recorder, signal.SIGKILL)
+        waited_for(partial(_other_child, server, recorder), "another recorder")
+
+        def in_new_file() -> bool:
+            return recordings_in(folder / "ring") != before and _attached(folder / "ring", text)
+
+        waited_for(in_new_file, "the script in the next file")
+        client.stop()
+        thread.join(20.0)
+        client.clear_stop()
+    assert text in scripts_of(before[-1]).values()
+    waited_for(lambda: not list(notes(folder, server)), "the note to be removed")
+    (last,) = (each for each in katana450.open(kept(folder)).programs if each.name == "Long")
+    assert last.end is not None
+
+
+def suppressed(client: Client, text: str) -> None:
+    with suppress(RefusedError):
+        run_script(client, text, 1.0)
+
+
+def notes(folder: Path, server: AppServer) -> Iterator[Path]:
+    return notes_folder(folder / "ring", server.port).iterdir()
+
+
+def _attached(folder: Path, text: str) -> bool:
+    """Return whether the newest file of ``folder``, which is being written, has ``text``."""
+    copy = folder.parent / "copy.mcap"
+    path = whole_copy(recordings_in(folder)[-1], copy)
+    return path is not None and text in scripts_of(path).values()
+
+
+def recorded_ring(folder: Path, notes: Path, times: tuple[tuple[float, float | None], ...]) -> None:
+    """Record 300 ticks from 1000 s in files of 100; scripts run at ``times`` [s]."""
+    records: list[TickRecord] = []
+    run(300, 1, records.append, swinging, odd=False)
+    kept = Ring(folder, header(), scripts=ScriptReader(notes))
+    noter = ScriptNoter(notes)
+    for number, (began, ended) in enumerate(times):
+        noter.note(f"S{number}", f"name: S{number}\n", began, None)
+        if ended is not None:
+            noter.note(f"S{number}", f"name: S{number}\n", began, ended)
+    waited_for(lambda: not noter.waits, "the notes")
+    for number, each in enumerate(records):
+        kept.put(each)
+        if number % 50 == 49:
+            kept.sync()
+    kept.close()
+
+
+def test_each_file_of_a_ring_has_the_scripts_that_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ring, "MAX_FILE_TICKS", 100)
+    folder, notes = tmp_path / "ring", tmp_path / "notes"
+    # One that ended before the first tick, one that ended, and one that runs to the end.
+    recorded_ring(folder, notes, ((900.0, 901.0), (1000.1, 1000.5), (1000.2, None)))
+    files = recordings_in(folder)
+    assert [list(scripts_of(each).values()) for each in files] == [
+        ["name: S1\n", "name: S2\n"],
+        ["name: S2\n"],
+        ["name: S2\n"],
+    ]
+    for path in files:
+        with RecordingFile.open(path) as file:
+            (last,) = (each for each in script_runs([file]) if each.name == "S2")
+        assert last.start == 1000.2
+        assert last.end is None
+    # The note of the one that runs waits for the next process; a process that ends ends it.
+    assert [each.suffix for each in notes.iterdir()] == [".begun"]
+    ScriptNoter(notes)
+    waited_for(lambda: len(list(notes.iterdir())) == 2, "the end of the script")
+    reader = ScriptReader(notes)
+    assert [each.ended is None for each in reader.read()] == [False]
+    assert not reader.read()
+    assert not list(notes.iterdir())
+
+
+def test_same_text_is_attached_once_and_each_run_is_listed(tmp_path: Path) -> None:
+    folder, notes = tmp_path / "ring", tmp_path / "notes"
+    notes.mkdir()
+    records: list[TickRecord] = []
+    run(50, 1, records.append, swinging, odd=False)
+    kept = Ring(folder, header(), scripts=ScriptReader(notes))
+    noter = ScriptNoter(notes)
+    for at in (1000.1, 1000.2):
+        for ended in (None, at + 0.05):
+            # Names become names of files.
+            noter.note("../a b", "name: ../a b\nsteps: []\n", at, ended)
+    waited_for(lambda: not noter.waits, "the notes")
+    kept.put_all(records)
+    kept.close()
+    (path,) = recordings_in(folder)
+    ((name, _),) = scripts_of(path).items()
+    assert re.fullmatch(r"scripts/a-b-[0-9a-f]{12}\.yaml", name)
+    programs = katana450.open(path).programs
+    assert [(each.name, each.start) for each in programs] == [
+        ("../a b", 1000.1),
+        ("../a b", 1000.2),
+    ]
+    assert [each.end for each in programs] == pytest.approx([1000.15, 1000.25])
+
+
+def test_damaged_notes_are_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    notes = tmp_path / "notes"
+    assert ScriptReader(notes).read() == []
+    noter = ScriptNoter(notes)
+    noter.note("kept", "name: kept\n", 1.0, None)
+    waited_for(lambda: not noter.waits, "the note")
+    (notes / "00000000000000000002.begun").write_bytes(b"{")
+    old = {"name": "old", "text": "", "began": 3.0, "utc_offset": 0.0}
+    (notes / "00000000000000000003.begun").write_bytes(json.dumps(old).encode())
+    reader = ScriptReader(notes)
+    assert [each.name for each in reader.read()] == ["kept"]
+    assert caplog.text.count("is left out") == 2
+    assert [each.name for each in reader.read()] == ["kept"]
+    assert len(list(notes.iterdir())) == 1
+
+
+def test_notes_that_nobody_takes_are_bounded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(script_notes, "MAX_NOTES", 3)
+    noter = ScriptNoter(tmp_path / "notes")
+    for number in range(5):
+        noter.note(f"S{number}", "", float(number), None)
+    waited_for(lambda: not noter.waits, "the notes")
+    assert len(list((tmp_path / "notes").iterdir())) == 3
+    assert caplog.text.count("is not attached") == 2
+
+
+def test_changed_text_is_refused(tmp_path: Path) -> None:
+    folder, notes = tmp_path / "ring", tmp_path / "notes"
+    recorded_ring(folder, notes, ((1000.1, None),))
+    (path,) = recordings_in(folder)
+    content = path.read_bytes()
+    assert content.count(b"name: S0\n") == 1
+    changed = tmp_path / "changed.mcap"
+    with RecordingFile.open(path) as file, changed.open("wb") as out:
+        attachments = [
+            replace(each, data=each.data.replace(b"S0", b"S1")) for each in file.attachments()
+        ]
+        copy = RecordingCopy(out, file.metadata, attachments)
+        for message in file.messages(*file.counts()):
+            copy.add(message)
+        copy.close()
+    with pytest.raises(InputError, match="is not the text that ran"):
+        _ = katana450.open(changed).programs
