@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -62,7 +62,7 @@ class AppServer:
 
     `command` contains ``{port}`` in place of the port. The process prints a line
     ``… is ready: URL`` when it can be used. `seconds` is the timeout of each start and each stop.
-    The process starts in `folder`.
+    The process starts in `folder`, with the variables `environment` instead of those of this one.
     """
 
     def __init__(
@@ -73,11 +73,13 @@ class AppServer:
         seconds: float = 60.0,
         scheme: str = "http",
         folder: Path = ROOT,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         self.port = free_port() if port is None else port
         self.url = f"{scheme}://127.0.0.1:{self.port}"
         self._command = [part.replace("{port}", str(self.port)) for part in command]
         self._folder = folder
+        self._environment = None if environment is None else dict(environment)
         self._seconds = seconds
         self._lines: deque[str] = deque(maxlen=KEPT_LINES)
         self._process: subprocess.Popen[str] | None = None
@@ -167,6 +169,7 @@ class AppServer:
         self._process = subprocess.Popen(
             self._command,
             cwd=self._folder,
+            env=self._environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
