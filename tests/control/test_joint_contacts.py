@@ -15,13 +15,16 @@ from hypothesis import strategies as st
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.messages import sentence
+from katana450.arm.control.scene_objects import Attachment
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.arm.robot.loader import load
+from katana450.errors import InputError
 from katana450.extensions.bodies.robot_world import robot_world
-from katana450.maths.collision.clearance import DISTANCE_ROUNDING, STOP
+from katana450.maths.collision.clearance import DEPTH_ROUNDING, DISTANCE_ROUNDING, STOP
 from katana450.maths.collision.world import CollisionWorld
-from tests.robot.hands import hand, rail
+from tests.robot.hands import column, hand, rail
+from tests.robot.on_the_table import block
 
 DT = 0.01
 
@@ -216,3 +219,82 @@ def test_a_robot_that_begins_in_a_contact_can_leave_it(make: Make) -> None:
     assert nearer.blocked
     away = after(session, replace(state, blocked=False), 2.0, made.move(slide_left=0.0))
     assert away.setpoint[0] == 0.0
+
+
+def height(state: State) -> float:
+    """Return the height of the underside of the beam of a column over its foot [m]."""
+    return float(state.setpoint[0]) + 0.35 - 0.02
+
+
+@pytest.mark.parametrize("foot", [0.0, -0.3])
+def test_a_beam_stops_before_the_table(make: Make, foot: float) -> None:
+    made = make(column(foot))
+    seen = list(ticks(made.session, begun(made.session), 4.0, made.move(lift=-0.4)))
+    state = seen[-1]
+    assert min(map(height, seen)) >= STOP - DISTANCE_ROUNDING
+    assert height(state) == pytest.approx(STOP, abs=1.5e-3)
+    (finding,) = state.findings
+    assert (finding.reason, set(finding.parts or ())) == (Reason.CONTACT, {"beam", "table"})
+    assert sentence(state).startswith("Beam and table are ")
+
+
+def test_an_object_is_an_obstacle_until_it_is_removed(make: Make) -> None:
+    made = make(column(-0.3))
+    session = made.session
+    state = after(session, begun(session), 0.05, cmd.PlaceObject(block(-0.3)))
+    seen = list(ticks(session, state, 4.0, made.move(lift=-0.4)))
+    state = seen[-1]
+    assert min(map(height, seen)) >= 0.1 + STOP - DISTANCE_ROUNDING
+    assert height(state) == pytest.approx(0.1 + STOP, abs=3e-3)
+    assert (state.status, state.findings[0].parts) == (Status.BLOCKED, ("beam", "block"))
+    # The goal stays, so the beam continues down to the table once the object is away.
+    state = after(session, state, 3.0, cmd.Remove("block"))
+    assert height(state) == pytest.approx(STOP, abs=3e-3)
+    assert state.near == {"beam", "table"}
+
+
+def test_an_object_beside_the_beam_stops_its_swing(make: Make) -> None:
+    made = make(column())
+    session = made.session
+    state = after(session, begun(session), 0.05, cmd.PlaceObject(block(y=0.2)))
+    low = after(session, state, 4.0, made.move(lift=-0.28))
+    assert not low.findings
+    swung = after(session, low, 4.0, made.move(swing=1.5))
+    assert 0.3 < swung.setpoint[1] < 0.8
+    assert swung.near == {"beam", "block"}
+    over = after(session, swung, 2.0, made.move(lift=-0.2, swing=swung.setpoint[1]))
+    free = after(session, over, 4.0, made.move(swing=1.5))
+    assert (free.setpoint[1], free.findings) == (1.5, ())
+
+
+def test_an_object_that_is_placed_into_the_beam_can_be_left(make: Make) -> None:
+    made = make(column())
+    session = made.session
+    low = after(session, begun(session), 4.0, made.move(lift=-0.24))
+    state = after(session, low, 0.1, cmd.PlaceObject(block()))
+    deeper = after(session, state, 1.0, made.move(lift=-0.3))
+    assert abs(deeper.setpoint[0] - low.setpoint[0]) < 2.0 * DEPTH_ROUNDING
+    assert deeper.near == {"beam", "block"}
+    up = after(session, deeper, 3.0, made.move(lift=0.0))
+    assert (up.setpoint[0], up.findings) == (0.0, ())
+
+
+def test_commands_about_a_hand_or_water_are_refused(make: Make) -> None:
+    session = make(column()).session
+    held = replace(block(), fixed=True)
+    for command in (cmd.Attach("block", Attachment.HAND), cmd.PlaceObject(held)):
+        with pytest.raises(InputError, match="Nothing can be fixed to a hand: there is no arm"):
+            session.check(command)
+    with pytest.raises(InputError, match="There is no cup to fill"):
+        session.check(cmd.Fill(1e-5))
+    with pytest.raises(InputError, match="There is no cup to fill"):
+        session.check(cmd.Batch((cmd.ReplaceScene((block(),), 1e-5),)))
+    with pytest.raises(InputError, match="Only its joints can be driven"):
+        session.check(cmd.SetTool("tcp"))
+
+
+def test_an_object_is_put_down_on_the_table_below_the_base(make: Make) -> None:
+    session = make(column(-0.3)).session
+    state = after(session, begun(session), 0.05, cmd.PlaceObject(block(0.2)))
+    (down,) = after(session, state, 0.05, cmd.Attach("block", Attachment.TABLE)).objects
+    np.testing.assert_allclose(down.T[:3, 3], (0.2, 0.0, -0.3), atol=1e-6)

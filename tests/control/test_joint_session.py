@@ -152,9 +152,9 @@ def test_stream_is_followed_and_ends_at_rest(session: Session, state: State) -> 
 @pytest.mark.parametrize(
     "command",
     [
-        cmd.SetPose(np.eye(4)), cmd.MoveTool(np.zeros(3)), cmd.TurnTool(0.0, 0.0), cmd.Fill(1e-4),
+        cmd.SetPose(np.eye(4)), cmd.MoveTool(np.zeros(3)), cmd.TurnTool(0.0, 0.0),
         cmd.SetTool("tcp"), cmd.SetGripper(0.1), cmd.GoAlong(0.5), cmd.Jog(np.ones(5)),
-        cmd.Remove("cup"), cmd.Batch((cmd.Home(), cmd.SetGripper(0.0))),
+        cmd.Batch((cmd.Home(), cmd.SetGripper(0.0))),
     ],
 )  # fmt: skip
 def test_tool_command_without_an_arm_is_refused_with_the_reason(

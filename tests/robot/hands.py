@@ -1,4 +1,4 @@
-"""URDF texts of made-up robots with bodies: a hand with a thumb, and carriages on one rail."""
+"""URDF texts of made-up robots with bodies: a hand, carriages on a rail, a lift on a column."""
 
 from __future__ import annotations
 
@@ -47,9 +47,10 @@ def hand(fingers: int = 4, *, pitch: float = 0.03, thumb: bool = True) -> str:
 def rail(kind: str = "collision", gap: float = 0.2) -> str:
     """Return two carriages of 50 mm on one rail, whose middles are ``gap`` [m] apart at rest.
 
-    kind: the element of their shapes. A third one follows the second, 100 mm behind it.
+    kind: the element of their shapes. A third one follows the second, 100 mm behind it. Their
+    middles are 100 mm above the table.
     """
-    shape = SHAPE.format(kind=kind, middle=0, size="0.05 0.05 0.05")
+    shape = SHAPE.format(kind=kind, middle=0.1, size="0.05 0.05 0.05")
     return f"""<robot name="rail">
 <link name="base"/>
 <link name="left">{shape}</link>
@@ -65,6 +66,40 @@ def rail(kind: str = "collision", gap: float = 0.2) -> str:
 <limit lower="-0.5" upper="0.3" velocity="0.5" effort="1"/></joint>
 </robot>
 """
+
+
+def column(foot: float = 0.0, *, carried: str = "base") -> str:
+    """Return a column 0.4 m high with a beam that is lifted along it and swings about it.
+
+    foot: height of its underside over its base [m]. carried: "base" if the column is the base, or
+    "wheel" if it is a wheel on its side that turns about it. At rest the middle of the beam is 0.35
+    m over the foot; it ends 0.3 m beside the axis, and is 40 mm thick.
+    """
+    post = _box_at("0.06 0.06 0.4", 0.0, foot + 0.2)
+    links = f'<link name="base">{post if carried == "base" else ""}</link>'
+    wheel = ""
+    if carried == "wheel":
+        wheel = (
+            f'<link name="wheel">{post}</link><joint name="roll" type="continuous">'
+            '<parent link="base"/><child link="wheel"/><axis xyz="0 0 1"/>'
+            '<limit velocity="1" effort="1"/></joint>'
+        )
+    beam = _box_at("0.26 0.04 0.04", 0.17, 0.0)
+    return f"""<robot name="column">{links}{wheel}
+<link name="carriage"/><link name="beam">{beam}</link>
+<joint name="lift" type="prismatic"><parent link="base"/><child link="carriage"/>
+<origin xyz="0 0 {foot + 0.35}"/><axis xyz="0 0 1"/>
+<limit lower="-0.4" upper="0.1" velocity="0.3" effort="1"/></joint>
+<joint name="swing" type="revolute"><parent link="carriage"/><child link="beam"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+</robot>
+"""
+
+
+def _box_at(size: str, x: float, z: float) -> str:
+    return (
+        f'<collision><origin xyz="{x} 0 {z}"/><geometry><box size="{size}"/></geometry></collision>'
+    )
 
 
 def _box(size: str, middle: float) -> str:

@@ -13,7 +13,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_arm
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.maths.collision.clearance import STOP
-from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.collision.world import CollisionWorld, Part
 from tests.exchange.trees import tree
 from tests.robot.hands import hand, rail
 
@@ -25,7 +25,13 @@ def read(tmp_path: Path, text: str) -> Robot:
 
 
 def pairs(world: CollisionWorld) -> set[frozenset[str]]:
-    return {frozenset((world.parts[a].name, world.parts[b].name)) for a, b in world.pairs}
+    """Return the pairs of the robot's own parts, which test_table.py leaves out."""
+    found = {frozenset((world.parts[a].name, world.parts[b].name)) for a, b in world.pairs}
+    return {pair for pair in found if "table" not in pair}
+
+
+def own(world: CollisionWorld) -> list[Part]:
+    return [part for part in world.parts if part.name != "table"]
 
 
 def test_bodies_of_a_tree_are_where_its_links_are(tmp_path: Path) -> None:
@@ -39,7 +45,7 @@ def test_bodies_of_a_tree_are_where_its_links_are(tmp_path: Path) -> None:
     for q in np.random.default_rng(2).uniform(joints.lower, joints.upper, (5, joints.n)):
         frames = robot.frames(robot.joint_values(q, 0.0))
         T = world.linkage.poses(np.append(q, 0.0))
-        for part in world.parts:
+        for part in own(world):
             (at,), (shape,) = part.T_mover_shape, part.shapes
             here = T[part.mover] @ at @ np.append(shape.centre, 1.0)
             (visual,) = by_name[part.name].visuals
@@ -50,12 +56,12 @@ def test_bodies_of_a_tree_are_where_its_links_are(tmp_path: Path) -> None:
 def test_drawn_shapes_count_only_where_no_link_has_collision_shapes(tmp_path: Path) -> None:
     world, notes = robot_world(read(tmp_path, rail("visual")))
     assert world is not None
-    assert [part.name for part in world.parts] == ["left", "right", "follower"]
+    assert [part.name for part in own(world)] == ["left", "right", "follower"]
     assert notes == ()
     mixed = rail().replace("collision>", "visual>", 2)
     world, notes = robot_world(read(tmp_path, mixed))
     assert world is not None
-    assert [part.name for part in world.parts] == ["right", "follower"]
+    assert [part.name for part in own(world)] == ["right", "follower"]
     assert notes == ("Not checked, because they have no collision shapes: left.",)
 
 
@@ -166,7 +172,7 @@ def test_meshes_get_few_corners_and_are_read_once(
     text = rail().replace('<box size="0.05 0.05 0.05"/>', f'<mesh filename="ball.{form}"/>')
     world, _ = robot_world(read(tmp_path, text))
     assert world is not None
-    for part in world.parts:
+    for part in own(world):
         (shape,) = part.shapes
         assert 0.04 <= shape.radius < 0.046
     monkeypatch.setattr(trimesh, "load_scene", lambda *_: pytest.fail("read again"))
@@ -185,6 +191,6 @@ def test_unreadable_collision_mesh_is_left_out_with_a_note(
     text = rail().replace('<box size="0.05 0.05 0.05"/>', f'<mesh filename="{file}"/>', 1)
     world, (note,) = robot_world(read(tmp_path, text))
     assert world is not None
-    assert [part.name for part in world.parts] == ["right", "follower"]
+    assert [part.name for part in own(world)] == ["right", "follower"]
     assert "link 'left' is left out" in note
     assert problem in note

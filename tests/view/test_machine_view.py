@@ -10,13 +10,20 @@ import numpy as np
 import pytest
 import viser
 
+from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import Appearance, AppearanceTrait
+from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.robot.loader import load
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
+from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.extensions.bodies.robot_world import robot_world
 from katana450.extensions.joint_view.machine_nodes import MachineNodes
 from katana450.extensions.joint_view.machine_panel import MachinePanel, page
+from katana450.extensions.joint_view.machine_view import MachineView
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -25,7 +32,8 @@ from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.labels import PERSONAL
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
-from tests.robot.hands import rail
+from tests.robot.hands import column, rail
+from tests.robot.on_the_table import block
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
 
@@ -77,14 +85,15 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
     server: viser.ViserServer, robot: Robot
 ) -> None:
     state = standing(robot)
-    MachinePanel(server.gui, robot, RecordedGestures(), state)
+    MachinePanel(server, robot, RecordedGestures(), lambda: state, Environment(None, None))
     controls = {
         handle.label: handle for handle in internals.controls(server)
         if isinstance(handle, viser.GuiSliderHandle)
     }  # fmt: skip
     joints = robot.joint_group
     labels = [f"{axis + 1} {name}" for axis, name in enumerate(joints.names)]
-    assert set(controls) == set(labels)
+    # The others are those of the chosen object.
+    assert set(controls) == {*labels, "Opacity", "Turn"}
     for axis, label in enumerate(labels):
         unit = 1e3 if joints.slides[axis] else float(np.degrees(1.0))
         assert controls[label].min == pytest.approx(unit * joints.lower[axis], abs=0.01)
@@ -95,6 +104,29 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
     assert "mm" in page(joints, labels, state)
     texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]
     assert any("It is &lt;b&gt;no&lt;/b&gt; arm." in text for text in texts)
+
+
+def test_objects_and_floor_are_shown_at_the_height_of_the_table(
+    server: viser.ViserServer, tmp_path: Path
+) -> None:
+    path = tmp_path / "column.urdf"
+    path.write_text(column(foot=-0.3))
+    robot = load(path)
+    joints, (world, _) = robot.joint_group, robot_world(robot)
+    session = Session(joints, joints.ready, world, travel=robot.distance)
+    publisher = StatePublisher(
+        Snapshot(session.begin(session.ready, 0.0, 0.0), 0), LoopTiming(0.01)
+    )
+    gestures = RecordedGestures()
+    view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, Meshes())
+    floor: Any = internals.nodes(server)["/floor"]
+    assert floor.position[2] == pytest.approx(-0.3, abs=1e-3)
+    state = session.step(publisher.snapshot.state, (cmd.PlaceObject(block(-0.3)),), 0.0)
+    view.show(replace(publisher.snapshot, state=state))
+    np.testing.assert_allclose(shown(server, "/objects/1")[:3, 3], (0.2, 0.0, -0.3))
+    assert [each.label for each in internals.controls(server)].count("Handles on objects") == 1
+    handle: Any = internals.nodes(server)["/handles/block"]
+    assert not handle.visible
 
 
 def test_links_before_a_contact_are_coated_with_what_is_checked(

@@ -123,7 +123,7 @@ def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene 
     """Return the robot if it was read for the scene that an extension starts with, and that."""
     from katana450.arm.control.session import Session
     from katana450.arm.robot.object_meshes import Meshes
-    from katana450.assembly.robot_session import describe_robot, find_arm
+    from katana450.assembly.robot_session import find_robot
 
     if config.options is None:
         return None, None
@@ -131,7 +131,7 @@ def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene 
 
     def session() -> Session:
         if not found_robots:
-            found_robots.append(describe_robot(config.settings, config.urdf, config.tool, find_arm))
+            found_robots.append(find_robot(config.settings, config.urdf, config.tool))
         return found_robots[0].session
 
     scene = None

@@ -67,7 +67,7 @@ def build_frontend(
                 raise ConfigurationError(f"{layer.what} {robot.why}")
         front_end.start()
         gateway.attach(ArmHandle(robot, session, front_end, None, nodes))
-        return front_end, _joint_view(gateway, config, robot, front_end), None
+        return front_end, _joint_view(gateway, config, found, front_end, meshes), None
     planning_worker = PlanningWorker(session, front_end.state_publisher, front_end)
     folders = partial(_folders, gateway, config.options, robot, front_end)
     options = ViewOptions(added, meshes, folders, find_gizmo(robot.arm.kinematics.freedoms))
@@ -146,13 +146,18 @@ def _folders(
 
 
 def _joint_view(
-    gateway: Gateway, config: FrontendConfig, robot: Robot, front_end: FrontEnd
+    gateway: Gateway,
+    config: FrontendConfig,
+    found: DescribedRobot,
+    front_end: FrontEnd,
+    meshes: Meshes,
 ) -> ViewUpdater:
     """Return the view of a robot without a tool; without an extension, one that shows nothing."""
     publisher, rate = front_end.state_publisher, config.settings.frame_rate
     for each in extensions():
         if each.joint_view is not None:
             gestures, last_ticket = gateway.gestures, lambda: front_end.last_ticket
-            view = each.joint_view()
-            return view(gateway.viser, robot, publisher, gestures, last_ticket, rate)
+            view, (robot, session, _) = each.joint_view(), found
+            shown = gateway.viser, robot, publisher, gestures, last_ticket, session, rate
+            return view(*shown, meshes)
     return ViewUpdater(gateway.viser, publisher, rate)

@@ -21,23 +21,25 @@ AZIMUTHS = tuple(math.radians(sign * angle) for angle in range(0, 110, 12) for s
 """[rad] Directions to try, from straight ahead outwards to both sides."""
 
 
-def free_place(scene_object: SceneObject, objects: Sequence[SceneObject]) -> FloatArray:
+def free_place(
+    scene_object: SceneObject, objects: Sequence[SceneObject], table: float = 0.0
+) -> FloatArray:
     """Return the pose (4, 4) in the base frame of a free place for ``scene_object``.
 
     The place is straight ahead if there is room, else aside, else farther out. If there is room
-    nowhere, it is straight ahead too.
+    nowhere, it is straight ahead too. ``table``: its height [m].
     """
     others = [each for each in objects if each.name != scene_object.name and not each.carried]
     for distance in np.arange(MIN_DISTANCE, MAX_DISTANCE, 0.06).tolist():
         for azimuth in AZIMUTHS:
-            at = np.array((distance * math.cos(azimuth), distance * math.sin(azimuth), 0.0))
+            at = np.array((distance * math.cos(azimuth), distance * math.sin(azimuth), table))
             gaps = (
                 math.hypot(*(each.T[:2, 3] - at[:2])) - girth(each) - girth(scene_object)
                 for each in others
             )
             if all(gap >= OBJECT_GAP for gap in gaps):
                 return se3.from_rotation_translation(np.eye(3), at)
-    return se3.from_rotation_translation(np.eye(3), (MIN_DISTANCE, 0.0, 0.0))
+    return se3.from_rotation_translation(np.eye(3), (MIN_DISTANCE, 0.0, table))
 
 
 def girth(scene_object: SceneObject) -> float:

@@ -31,21 +31,23 @@ FARTHEST_TARGET = 1e6
 one is a mistake, and its square can overflow in a search.
 """
 
-NO_HAND = "This arm has no collision checking, so nothing can be fixed to its hand."
+NO_HAND = "Nothing can be fixed to a hand: there is no arm, or no collision checking."
 
 
-def check_joints(joints: JointSet, command: cmd.Command) -> None:
+def check_joints(joints: JointSet, environment: Environment, command: cmd.Command) -> None:
     """Raise InputError if a robot with ``joints`` and no arm does not support ``command``."""
     match command:
         case cmd.Batch(commands=commands):
             for each in commands:
-                check_joints(joints, each)
+                check_joints(joints, environment, each)
         case _ if not command.traits.joints_only:
             raise InputError(joints.refusal)
         case cmd.AxisCommand():
             command.targets(np.zeros(joints.n))
         case cmd.SetJoints(q=q) | cmd.Servo(q=q):
             joints.check(q)
+        case _:
+            _check_objects(None, environment, command)
 
 
 def check(

@@ -16,8 +16,8 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.liquid import WATER, Liquid
 
-SCENE_TRAITS = CommandTraits(while_stopped=True, supersedes=False, passive=True)
-"""Traits of the commands about objects and water."""
+SCENE_TRAITS = CommandTraits(while_stopped=True, supersedes=False, passive=True, joints_only=True)
+"""Traits of the commands about objects, water and appearance."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,7 @@ class SetAppearance(BaseCommand):
     See ``LinkAppearance.having``.
     """
 
-    traits: ClassVar[CommandTraits] = CommandTraits(
-        while_stopped=True, supersedes=False, passive=True, joints_only=True
-    )
+    traits: ClassVar[CommandTraits] = SCENE_TRAITS
 
     name: str
     trait: AppearanceTrait

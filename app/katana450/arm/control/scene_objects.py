@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -264,6 +264,13 @@ class Environment:
         self.hand = hand
         self.table = table
 
+    @cached_property
+    def table_height(self) -> float:
+        """Height of the table in the base frame [m]."""
+        parts = () if self._world is None else self._world.parts
+        tables = [each.T_mover_shape[0][2, 3] for each in parts if each.name == "table"]
+        return float(tables[0]) if tables else 0.0
+
     def world(self, objects: Sequence[SceneObject]) -> CollisionWorld | None:
         """Return the collision world with ``objects``; None if contacts are not checked."""
         if self._world is None:
@@ -332,7 +339,7 @@ class Environment:
         if to is Attachment.HAND:
             return replace(scene_object, T=self.into_hand(scene_object.T, x), fixed=True)
         if to is Attachment.TABLE:
-            return self.left(scene_object, x)
+            return self.left(scene_object, x, self.table_height)
         return replace(scene_object, T=self.pose(scene_object, x), fixed=False)
 
     def left(self, scene_object: SceneObject, x: FloatArray, height: float = 0.0) -> SceneObject:

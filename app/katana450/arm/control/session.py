@@ -176,7 +176,7 @@ class Session:
     def check(self, command: cmd.Command) -> None:
         """Raise InputError if this robot does not support ``command``."""
         if isinstance(self._robot, JointSet):
-            check_joints(self._robot, command)
+            check_joints(self._robot, self.environment, command)
         else:
             check(self._robot, self.pouring, self.environment, command)
 

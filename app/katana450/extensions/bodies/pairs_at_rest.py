@@ -50,6 +50,17 @@ def pairs_at_rest(
         and parts[a].mover != above[b]
         and parts[b].mover != above[a]
     ]
+    return judged_at_rest(linkage, parts, candidates, x, home)
+
+
+def judged_at_rest(
+    linkage: Linkage,
+    parts: Sequence[Part],
+    candidates: Sequence[tuple[int, int]],
+    x: FloatArray,
+    home: FloatArray | None = None,
+) -> RestPairs:
+    """Return those of ``candidates``, pairs of parts, that may meet; see ``pairs_at_rest``."""
     nearest = _nearest(linkage, parts, candidates, x)
     touching = [pair for pair, distance in nearest.items() if distance < TOUCH_DISTANCE]
     if home is not None and touching:

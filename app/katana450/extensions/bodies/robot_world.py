@@ -11,6 +11,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
 from katana450.extensions.bodies.pieces import pieces
+from katana450.extensions.bodies.table import standing
 from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
@@ -22,22 +23,31 @@ def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
 
     x is that of ``world_of``. An arm of the five-axis family keeps the pairs that sampled postures
     bring near each other, and its collision shapes count as convex. All other shapes are divided by
-    ``pieces``. The world is None if no link has a shape.
+    ``pieces``. A robot that is driven joint by joint has its table here, an arm in its session. The
+    world is None if no link has a shape.
     """
     if robot.arm is not None and robot.arm.chain.n == ARM_JOINTS:
         return world_of(robot, as_modelled if robot.collides else pieces)
-    touching: list[str] = []
+    found: list[str] = []
 
     def make(linkage: Linkage, parts: Sequence[Part]) -> CollisionWorld:
-        found = pairs_at_rest(linkage, parts, _at_rest(robot), _at_home(robot))
-        touching.extend(f"{parts[a].name} and {parts[b].name}" for a, b in found.touching)
-        return CollisionWorld(linkage, parts, found.checked, found.close)
+        rest = pairs_at_rest(linkage, parts, _at_rest(robot), _at_home(robot))
+        touching = [f"{parts[a].name} and {parts[b].name}" for a, b in rest.touching]
+        if touching:
+            found.append(f"Not checked, because they touch at rest: {'; '.join(touching)}.")
+        if robot.arm is not None:
+            return CollisionWorld(linkage, parts, rest.checked, rest.close)
+        under = standing(linkage, parts, robot.joint_group)
+        found.extend(under.notes)
+        return CollisionWorld(
+            linkage,
+            (*parts, *under.table),
+            (*rest.checked, *under.pairs.checked),
+            {**rest.close, **under.pairs.close},
+        )
 
     world, notes = world_of(robot, pieces, make)
-    if touching:
-        listed = "; ".join(touching)
-        notes = (*notes, f"Not checked, because they touch at rest: {listed}.")
-    return world, notes
+    return world, (*notes, *found)
 
 
 def _at_rest(robot: Robot) -> FloatArray:

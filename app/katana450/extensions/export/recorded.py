@@ -14,11 +14,13 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.joint_view.machine_nodes import MachineNodes
+from katana450.extensions.joint_view.machine_view import FLOOR_GAP
 from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.water.nodes import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.room import set_up_room
+from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import Preset
 from katana450.server.viser_bridge.recording_page import titled
@@ -53,8 +55,14 @@ def recorded(
 def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callable[[State], None]:
     """Build the scene of ``robot``; return what shows a state in it."""
     if robot.arm is None:
-        set_up_room(server)
+        set_up_room(server, session.environment.table_height - FLOOR_GAP)
         nodes = MachineNodes(server, robot)
-        return lambda state: nodes.move(robot.joint_values(state.q, state.gripper))
+        objects = SceneObjectNodes(server, load_props(), session.environment, Meshes())
+
+        def show(state: State) -> None:
+            nodes.move(robot.joint_values(state.q, state.gripper))
+            objects.follow(state)
+
+        return show
     layers = (ConduitLayer(), WaterLayer(), TracesLayer())
     return Scenery(server, robot, session, load_props(), NoGestures(), Meshes(), layers).show

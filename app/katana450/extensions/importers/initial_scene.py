@@ -57,7 +57,7 @@ def load_initial_scene(
         raise InputError(f"{scene}: {error}") from error
     objects, meshes, notes = list(stored.scene.objects), list(stored.meshes), []
     for argument in object_files:
-        mesh, scene_object = _object(argument, objects)
+        mesh, scene_object = _object(argument, objects, session.environment.table_height)
         objects.append(scene_object)
         meshes.append(mesh)
         notes.append(f"{scene_object.name}: {mesh.text}")
@@ -67,7 +67,9 @@ def load_initial_scene(
     return complete, tuple(notes)
 
 
-def _object(argument: str, objects: Sequence[SceneObject]) -> tuple[Mesh, SceneObject]:
+def _object(
+    argument: str, objects: Sequence[SceneObject], table: float
+) -> tuple[Mesh, SceneObject]:
     match = PLACED.fullmatch(argument)
     assert match is not None
     mesh = read_mesh_file(Path(match["file"]))
@@ -85,7 +87,7 @@ def _object(argument: str, objects: Sequence[SceneObject]) -> tuple[Mesh, SceneO
         )
     scene_object = SceneObject(name, Shape.MESH, (), np.eye(4), solid=mesh.solid, scale=scale)
     if match["at"] is None:
-        return mesh, replace(scene_object, T=free_place(scene_object, objects))
+        return mesh, replace(scene_object, T=free_place(scene_object, objects, table))
     try:
         at = [1e-3 * float(each) for each in match["at"].split(",")]
     except ValueError:

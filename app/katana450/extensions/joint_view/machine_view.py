@@ -8,20 +8,28 @@ from collections.abc import Callable
 import viser
 
 from katana450.arm.control.messages import title
+from katana450.arm.control.session import Session
 from katana450.arm.robot.initial_camera import camera
+from katana450.arm.robot.object_meshes import Meshes
+from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.extensions.joint_view.machine_nodes import MachineNodes
 from katana450.extensions.joint_view.machine_panel import MachinePanel
+from katana450.extensions.objects.handles import ObjectHandles
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.room import set_up_room
+from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.tint import Tint
 from katana450.server.view.view_updater import ViewUpdater
 
+FLOOR_GAP = 5e-4
+"""Depth [m] of the floor below the table that is checked, so that objects on it do not flicker."""
+
 
 class MachineView(ViewUpdater):
-    """The links of the robot and a panel with its joints. The scene has no gizmo."""
+    """The links of the robot, objects, and a panel with joints and objects. There is no gizmo."""
 
     def __init__(
         self,
@@ -30,7 +38,9 @@ class MachineView(ViewUpdater):
         state_publisher: StatePublisher,
         gestures: GestureGate,
         last_ticket: Callable[[], int],
+        session: Session,
         frame_rate: float,
+        meshes: Meshes,
     ) -> None:
         """Build the scene and the panel.
 
@@ -40,12 +50,15 @@ class MachineView(ViewUpdater):
             state_publisher: The source of snapshots.
             gestures: The path of gestures to the arm.
             last_ticket: Returns the ticket of the newest command.
+            session: The session, which has the environment of objects.
             frame_rate: Maximum number of updates per second [Hz].
+            meshes: The meshes of scene objects.
         """
         super().__init__(server, state_publisher, frame_rate)
         self._robot = robot
         self._last_ticket = last_ticket
-        set_up_room(server)
+        environment = session.environment
+        set_up_room(server, environment.table_height - FLOOR_GAP)
         server.gui.set_panel_label(title(robot.name))
         look = camera(robot)
         server.initial_camera.position = look.eye
@@ -53,7 +66,12 @@ class MachineView(ViewUpdater):
         self._nodes = MachineNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
         self._tint = Tint(server, robot, self._nodes.path)
-        self._panel = MachinePanel(server.gui, robot, gestures, state_publisher.snapshot.state)
+        self._objects = SceneObjectNodes(server, load_props(), environment, meshes)
+        self._handles = ObjectHandles(server, environment, gestures)
+        self._panel = MachinePanel(
+            server, robot, gestures, lambda: state_publisher.snapshot.state, environment
+        )
+        self._panel.handles.on_update(lambda _: self._handles.show(self._panel.handles.value))
         self.show(state_publisher.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
@@ -61,6 +79,8 @@ class MachineView(ViewUpdater):
         state = snapshot.state
         with self._server.atomic():
             self._nodes.move(self._robot.joint_values(state.q, state.gripper))
+            self._objects.follow(state)
+            self._handles.follow(state)
             self._paint.follow(state)
             self._tint.follow(state)
             self._panel.follow(

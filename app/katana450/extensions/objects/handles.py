@@ -20,6 +20,9 @@ from katana450.server.view.scene import node_name
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place
 
+HANDLES = "Handles on objects"
+"""Label of the checkbox that shows them."""
+
 HANDLE = 0.09
 """Length [m] of a handle's arrows: they end outside cup and basin."""
 
@@ -35,7 +38,7 @@ class HandlesLayer(ViewLayer):
     def add_controls(self, gui: viser.GuiApi) -> None:
         """Add the checkbox that shows the handles."""
         handles = gui.add_checkbox(
-            "Handles on objects",
+            HANDLES,
             initial_value=False,
             hint="Arrows that move cup, basin and other objects on the table",
         )

@@ -56,11 +56,10 @@ class ObjectRequests(RequestHandler):
             raise InputError(f"There are {MAX_OBJECTS} objects already: remove one first.")
         scene_object = self._shaped(request, known)
         if request.T is None:
-            return (
-                scene_object
-                if known is not None
-                else replace(scene_object, T=free_place(scene_object, arm.state.objects))
-            )
+            if known is not None:
+                return scene_object
+            table = arm.environment.table_height
+            return replace(scene_object, T=free_place(scene_object, arm.state.objects, table))
         T = se3.printed(request.T, f"The pose of {request.name!r}")
         if request.frame is requests.Frame.SHOULDER:
             T = arm.arm.T_base_shoulder @ T

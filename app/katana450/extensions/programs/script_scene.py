@@ -125,7 +125,12 @@ def begun(session: Session, scene: Scene) -> State:
 def check_scene(session: Session, scene: Scene) -> None:
     """Raise InputError if the arm of ``session`` cannot begin in ``scene``."""
     if scene.joints is not None:
-        chain = session.require_arm().chain
+        if session.arm is None:
+            raise InputError(
+                "`joints` are the angles of an arm, and this robot is driven joint by joint. Leave "
+                "them out."
+            )
+        chain = session.arm.chain
         if not chain.within_limits(chain.check_q(scene.joints)):
             raise InputError("The joints lie outside the limits of this arm.")
     if scene.water is not None and all(each.name != CUP for each in scene.objects):

@@ -10,8 +10,11 @@ FLOOR_AT = -0.0255
 """Height [m] of the floor, slightly below the table so that the two do not flicker."""
 
 
-def set_up_room(server: viser.ViserServer) -> None:
-    """Light the scene and set the light theme, which the page replaces in a dark window."""
+def set_up_room(server: viser.ViserServer, floor: float = FLOOR_AT) -> None:
+    """Light the scene and set the light theme, which the page replaces in a dark window.
+
+    ``floor``: its height [m].
+    """
     scene = server.scene
     scene.configure_default_lights(enabled=False)
     # The key light shines from the front, left and above; the rim light sets arm and sky apart.
@@ -21,7 +24,7 @@ def set_up_room(server: viser.ViserServer) -> None:
     scene.add_light_directional("/light/rim", intensity=0.9, color=(226, 238, 255), position=RIM)
     scene.add_light_directional("/light/fill", intensity=0.35, position=FILL)
     scene.configure_environment_map("studio", environment_intensity=0.45)
-    _paint(scene, LIGHT)
+    _paint(scene, LIGHT, floor)
     set_sky(server, LIGHT)
 
 
@@ -29,7 +32,7 @@ KEY, RIM, FILL = (0.7, -0.9, 1.9), (-1.0, 1.4, 0.9), (1.2, 1.0, 0.6)
 """Positions [m] of the lights, which shine towards the base."""
 
 
-def _paint(scene: viser.SceneApi, theme: Theme) -> None:
+def _paint(scene: viser.SceneApi, theme: Theme, floor: float) -> None:
     scene.add_grid(
         "/floor",
         infinite_grid=True,
@@ -43,5 +46,5 @@ def _paint(scene: viser.SceneApi, theme: Theme) -> None:
         plane_opacity=1.0,
         fade_distance=5.0,
         shadow_opacity=theme.shadow,
-        position=(0.0, 0.0, FLOOR_AT),
+        position=(0.0, 0.0, floor),
     )

@@ -1,0 +1,152 @@
+"""Robots driven joint by joint on a real server: the table and scene objects are obstacles."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from katana450.cli.main import main
+from katana450.client import Client, RefusedError, connect
+from katana450.server.api import answers, requests
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import ask, opened
+from tests.robot.hands import column
+
+pytestmark = pytest.mark.long
+
+STOP = 0.005
+"""[m] Distance that stays to every obstacle."""
+
+SHORT = 4e-3
+"""[m] Maximum length by which a brake ends earlier."""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
+    folder = tmp_path_factory.mktemp("column")
+    path, box = folder / "column.urdf", folder / "crate.stl"
+    path.write_text(column(-0.3))
+    # STL files are in millimetres.
+    trimesh.creation.box((60.0, 60.0, 80.0)).export(box)
+    with AppServer((*APP, "--urdf", str(path), "--object", f"{box}@0,200,-300")) as server:
+        yield server
+
+
+@pytest.fixture
+def robot(server: AppServer) -> Iterator[Client]:
+    with connect(server.url) as client:
+        client.clear_stop()
+        client.ask(requests.Home(wait=30))
+        yield client
+        client.clear_stop()
+
+
+def height(client: Client) -> float:
+    """Return the height of the underside of the beam over the table [m]."""
+    return client.query(answers.State).q[0] + 0.35 - 0.02
+
+
+def end(answer: object) -> answers.MotionEnd:
+    assert isinstance(answer, answers.Done)
+    assert answer.end is not None
+    return answer.end
+
+
+def place(client: Client, *, y: float = 0.0) -> None:
+    T = ((1, 0, 0, 0.2), (0, 1, 0, y), (0, 0, 1, -0.3), (0, 0, 0, 1))
+    client.ask(requests.Place(name="block", T=T, shape=requests.Shape.BOX, size=[0.05, 0.05, 0.1]))
+
+
+def test_table_is_named_at_the_start_and_stops_a_joint(server: AppServer, robot: Client) -> None:
+    assert "The table is 300 mm below the base, under base." in server.output
+    found = end(robot.ask(requests.Joint(axis=1, value=-0.4, wait=30)))
+    assert found.how == "contact"
+    assert found.why.startswith("Beam and table are ")
+    assert STOP - 1e-7 <= height(robot) <= STOP + SHORT
+
+
+def test_object_stops_a_joint_and_the_goal_is_reached_without_it(robot: Client) -> None:
+    place(robot)
+    try:
+        found = end(robot.ask(requests.Joint(axis=1, value=-0.29, wait=30)))
+        assert found.how == "contact"
+        assert found.why.startswith("Beam and block are ")
+        assert 0.1 + STOP - 1e-7 <= height(robot) <= 0.1 + STOP + SHORT
+    finally:
+        robot.ask(requests.Remove(name="block"))
+    found = end(robot.ask(requests.Joint(axis=1, value=-0.29, wait=30)))
+    assert (found.how, robot.query(answers.State).q[0]) == ("reached", -0.29)
+
+
+def test_object_of_the_command_line_stops_a_swing(robot: Client) -> None:
+    (crate,) = robot.query(answers.Objects).objects
+    assert (crate.name, crate.shape) == ("crate", "mesh")
+    robot.ask(requests.Joint(axis=1, value=-0.29, wait=30))
+    found = end(robot.ask(requests.Joint(axis=2, value=2.0, wait=30)))
+    assert found.how == "contact"
+    assert found.why.startswith("Beam and crate are ")
+    assert 0.5 < robot.query(answers.State).q[1] < 1.5
+    # A stream of joints meets it in the same way.
+    robot.ask(requests.Joint(axis=2, value=0.5, wait=30))
+    for number in range(60):
+        robot.ask(requests.Servo(q=[-0.29, 0.5 + 0.02 * number]))
+    assert robot.query(answers.State).q[1] < 1.5
+
+
+def test_object_is_attached_undone_and_saved_with_the_scene(
+    server: AppServer, robot: Client
+) -> None:
+    place(robot, y=-0.2)
+    robot.ask(requests.Attach(name="block", to=requests.Attachment.TABLE))
+    with pytest.raises(RefusedError, match="Nothing can be fixed to a hand: there is no arm"):
+        robot.ask(requests.Attach(name="block", to=requests.Attachment.HAND))
+    with pytest.raises(RefusedError, match="no cup"):
+        robot.ask(requests.Fill(ml=10.0))
+    status, _, body = ask(f"{server.url}/api/v1/scene")
+    assert (status, body[:2]) == (200, b"PK")
+    robot.ask(requests.Remove(name="block"))
+    robot.ask(requests.Undo())
+    assert {each.name for each in robot.query(answers.Objects).objects} == {"crate", "block"}
+    robot.ask(requests.Remove(name="block"))
+
+
+def test_new_object_stands_on_the_table(robot: Client) -> None:
+    robot.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.03]))
+    ball = next(each for each in robot.query(answers.Objects).objects if each.name == "ball")
+    robot.ask(requests.Remove(name="ball"))
+    assert np.array(ball.T)[2, 3] == pytest.approx(-0.3, abs=1e-6)
+
+
+def test_slider_and_panel_know_objects(server: AppServer) -> None:
+    async def act() -> None:
+        async with opened(server.url) as (peer, control):
+            assert peer.controls["Object"]["props"]["options"] == ["crate"]
+            assert "Handles on objects" in peer.controls
+            await control.say("acquire")
+            await peer.set("1 lift", value=-400.0)
+            async with asyncio.timeout(20.0):
+                while True:
+                    _, _, body = ask(f"{server.url}/api/v1/state")
+                    if json.loads(body)["status"] == "blocked":
+                        break
+                    await asyncio.sleep(0.05)
+            assert "table" in json.loads(body)["why"]
+            await control.say("release_lease")
+
+    asyncio.run(act())
+
+
+def test_scene_with_joints_is_refused_at_the_start(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    robot, scene = tmp_path / "column.urdf", tmp_path / "scene.yaml"
+    robot.write_text(column())
+    scene.write_text("scene: 1\njoints: [0, 0]\nobjects: []\n")
+    assert main(["serve", "--port", "0", "--urdf", str(robot), "--scene", str(scene)]) == 1
+    assert "driven joint by joint" in capfd.readouterr().err
