@@ -223,6 +223,17 @@ def test_program_is_planned_for_a_stopped_arm_as_for_a_free_one(
     assert list(map(summary, program.tasks)) == list(map(summary, free.tasks))
 
 
+def test_arm_that_reaches_over_its_shoulder_grasps_from_home(stage: Stage) -> None:
+    backwards = np.radians((-169.0, -122.0, 123.0, -112.0, 167.0))
+    start = replace(stage.session.begin(backwards, 0.0, 0.0), objects=(box("box", (330.0, 0.0)),))
+    script = parse("frame: base\nsteps:\n  - grasp: {object: box, side: front}\n")
+    program = compiled(script, stage.plan_context, start)
+    names = [task.name for task in program.tasks]
+    assert names[2:4] == ["grasp box: home", "grasp box: approach"]
+    begun = compiled(script, stage.plan_context, replace(stage.begin(), objects=start.objects))
+    assert "grasp box: home" not in [task.name for task in begun.tasks]
+
+
 @pytest.mark.parametrize("checked", [False, True])
 def test_run_fails_if_the_fingers_close_on_nothing(stage: Stage, checked: bool) -> None:
     """Somebody takes the object away while the arm approaches it."""

@@ -16,7 +16,6 @@ import katana450.extensions.programs
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.cli.main import main
 from katana450.client import connect
-from katana450.server.api import requests
 from katana450.server.api.motion_requests import OperateArm
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.real_arm.emulated import ROOT, emulator
@@ -135,9 +134,6 @@ def test_run_on_the_emulated_arm_with_slow_replies_is_reported_as_measured(
                     client.ask(OperateArm(act=act, confirmed=True))
                     wait_for(client, mode)
                 client.clear_stop()
-                # The paths begin on another branch than the posture after a calibration.
-                client.ask(requests.Speed(value=0.5))
-                client.go(requests.Home())
             command = ("run", str(LIBRARY / f"{name}.yaml"), "--speed", "0.5", "--url", app.url)
             done = command_done(*command, "--report", str(out), seconds=300.0)
             assert done.returncode == 0, done.stderr

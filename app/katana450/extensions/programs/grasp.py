@@ -143,14 +143,28 @@ class Grasp:
             builder.note("tool grasp", UseTool("grasp"), replace(builder.state, tool="grasp"))
         opened = builder.plan_context.arm.gripper.upper
         builder.note("open", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
+        branch_of, ready = builder.plan_context.arm.kinematics.branch_of, builder.plan_context.ready
+        # Pitches of a grasp are those of the posture at Home; an arm that reaches over its shoulder
+        # would take the object with the hand upside down.
+        via_home = (False,) if branch_of(builder.q) == branch_of(ready) else (False, True)
+
+        def take(via: bool) -> None:
+            if via:
+                builder.move_to(ready, f"grasp {self.name}: home")
+            self._approach(builder, scene_object)
+
         try:
-            chosen = self._approaches(builder, scene_object)
-            try:
-                builder.first(chosen, lambda it: self._plan(builder, scene_object, it, JOINT_ROOM))
-            except InputError:
-                builder.first(chosen, lambda it: self._plan(builder, scene_object, it, 0.0))
+            builder.first(via_home, take)
         except InputError as error:
             raise InputError(f"{self.name} cannot be grasped at its place: {error}") from error
+
+    def _approach(self, builder: PlanBuilder, scene_object: SceneObject) -> None:
+        """Plan the grasp with the first approach that works. Raises InputError without one."""
+        chosen = self._approaches(builder, scene_object)
+        try:
+            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, JOINT_ROOM))
+        except InputError:
+            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, 0.0))
 
     def _approaches(self, builder: PlanBuilder, scene_object: SceneObject) -> list[Approach]:
         """Return the approaches to try, in their order, without those that were given up."""

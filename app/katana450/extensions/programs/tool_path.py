@@ -54,7 +54,8 @@ class ToolPath(CurvePath):
         chain: the arm with its tool.
         curve: the path of the tool.
         branch: the branch of the joints.
-        near: joint angles (5,) [rad]; each angle starts in the turn nearest to this.
+        near: joint angles (5,) [rad]; each angle starts in the turn nearest to this, or in another
+            one if only that is inside the limits.
     """
 
     chain: Chain
@@ -72,7 +73,7 @@ class ToolPath(CurvePath):
         bad = np.flatnonzero(~np.isfinite(qd).all(axis=1))
         if bad.size:
             self._refuse_reach(sigma, int(bad[0]))
-        q[0] += np.round((near - q[0]) / (2.0 * np.pi)) * (2.0 * np.pi)
+        q[0] = self._in_turn(q[0])
         q = np.unwrap(q, axis=0)
         object.__setattr__(self, "_sigma", sigma)
         even = np.searchsorted(sigma, np.linspace(0.0, 1.0, KNOTS + 1) - 0.5 * MIN_KNOT_GAP)
@@ -101,6 +102,15 @@ class ToolPath(CurvePath):
     def end(self) -> FloatArray:
         """The joint angles (5,) [rad] at the end."""
         return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
+
+    def _in_turn(self, q: FloatArray) -> FloatArray:
+        """Return the angles `q` (5,) [rad], known up to whole turns, as the path starts at them."""
+        lower, upper, slack = self.chain.lower, self.chain.upper, tolerances.LIMIT_SLACK
+        near, inside = (
+            q + np.rint((there - q) / math.tau) * math.tau
+            for there in (self.near, 0.5 * (lower + upper))
+        )
+        return np.where((near < lower - slack) | (near > upper + slack), inside, near)
 
     def _turn(self, axis: int, sigma: Coefficient, angle: Coefficient) -> Coefficient:
         """Return the number of turns to add to `angle`, which continue along the path."""
