@@ -145,7 +145,11 @@ def test_no_path_changes_its_branch(chain: Chain) -> None:
         (UR5E, "line: {by: {x: 0}}", "moves nothing"),
         (OPENMANIPULATOR_X, "line: {yaw: 10}", "yaw of a tool with 4 axes follows"),
         (OPENMANIPULATOR_X, "move: {by: {z: 5}, roll: 45}", "turn it in one plane"),
-        (OPENMANIPULATOR_X, "screw: {point: [0, 0, 0], axis: z, angle: 5}", "this one has 4"),
+        (
+            OPENMANIPULATOR_X,
+            "screw: {point: [0, 0, 0], axis: z, angle: 5}",
+            "at least six axes, or one of the five-axis family. This one has 4",
+        ),
     ],
 )
 def test_what_is_not_possible_is_refused_with_the_reason(

@@ -1,8 +1,8 @@
 """Curves of poses: tool point and rotation of the tool as functions of one parameter.
 
-They are formulas of sigma, from 0 to 1, on jets, like those of `curve`. For an
-arm with fewer than six axes rotations are those with axis 1 at zero, as in `ToolPose`. Lengths in
-m, angles in rad, frame {S}.
+They are formulas of sigma, from 0 to 1, on jets, like those of `curve`. For an arm with fewer than
+six axes rotations are those with axis 1 at zero, as in `ToolPose`. Lengths in m, angles in rad,
+frame {S}.
 """
 
 from __future__ import annotations
@@ -11,24 +11,18 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from katana450.errors import InputError
 from katana450.extensions.general_arms.pose_equations import PoseJets
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.curve import Curve
+from katana450.extensions.programs.tool_curves import rounded
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.planning.jet import Jet, sin_cos, sqrt
 from katana450.maths.planning.polyline import Polyline
-
-TURN_LENGTH: Final = 0.25
-"""Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
-
-VIA_TOLERANCE: Final = 1e-9
-"""Vias nearer to each other than this [m] are the same."""
 
 
 class PoseCurve(Protocol):
@@ -117,11 +111,8 @@ class PoseLines:
             [[*via.position, *turn] for via, turn in zip(self.vias, turns, strict=True)]
         )
         numbers = finite_array(rows, (len(rows), 7), "The vias of lines")
-        apart = [one.apart(other) for one, other in pairwise(self.vias)]
-        lengths = np.array([max(distance, TURN_LENGTH * angle) for distance, angle in apart])
-        if len(rows) < 2 or (lengths <= VIA_TOLERANCE).any():
-            raise InputError("Lines need at least two vias, each different from the one before.")
-        line = Polyline(frozen(numbers), lengths, self.blend)
+        apart = np.array([one.apart(other) for one, other in pairwise(self.vias)]).reshape(-1, 2)
+        line = rounded(numbers, apart[:, 0], apart[:, 1], self.blend)
         object.__setattr__(self, "blend", line.blend)
         object.__setattr__(self, "_line", line)
 

@@ -44,8 +44,8 @@ class PosePath(CurvePath):
     """The joints that keep the tool on ``curve``.
 
     At `places` the joint angles and their first three derivatives are exact. Between two places
-    each angle is the polynomial of seventh degree that they define; `followed` chooses the places
-    so that it is off by less than 1e-10 rad.
+    each angle is the polynomial of seventh degree that they define; `CurveSearch` chooses the
+    places so that it is off by less than 1e-10 rad.
 
     Attributes:
         chain: the arm with its tool.

@@ -167,8 +167,8 @@ class PosePlanning:
         """Return the screw, which the whole tool follows."""
         if self.axes < 6:
             raise InputError(
-                f"A screw needs an arm of five or six axes, and this one has {self.axes}. Use an "
-                "arc."
+                "A screw needs an arm with at least six axes, or one of the five-axis family. This "
+                f"one has {self.axes} axes. Use an arc."
             )
         start = self.kinematics.target_at(q)
         omega, v = twist[:3], twist[3:]

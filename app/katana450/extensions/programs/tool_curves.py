@@ -51,6 +51,25 @@ class Swing:
         return self.mean + self.sine * s + self.cosine * c
 
 
+def rounded(
+    vias: FloatArray, distances: FloatArray, angles: FloatArray, blend: FloatArray
+) -> Polyline:
+    """Return the legs through the vias of a tool, with rounded corners.
+
+    Args:
+        vias: (m, k) coordinates of the tool, two or more rows.
+        distances: (m - 1,) how far each leg moves the tool point [m].
+        angles: (m - 1,) how far each leg turns the tool [rad].
+        blend: (m - 2,) see `Polyline`.
+
+    Raises InputError for fewer than two vias, and for a leg that neither moves nor turns the tool.
+    """
+    lengths = np.maximum(distances, TURN_LENGTH * angles)
+    if len(vias) < 2 or (lengths <= VIA_TOLERANCE).any():
+        raise InputError("Lines need at least two vias, each different from the one before.")
+    return Polyline(frozen(vias), lengths, blend)
+
+
 @dataclass(frozen=True, eq=False)
 class ToolLines:
     """Straight lines from target to target with rounded corners; pitch and roll turn evenly.
@@ -71,11 +90,8 @@ class ToolLines:
         rows = [(*via.position.tolist(), via.pitch, via.roll) for via in self.vias]
         numbers = finite_array(rows, (len(rows), 5), "The vias of lines")
         legs = np.diff(numbers, axis=0)
-        distances = np.linalg.norm(legs[:, :3], axis=1)
-        lengths = np.maximum(distances, TURN_LENGTH * np.abs(legs[:, 3:]).max(axis=1, initial=0.0))
-        if len(rows) < 2 or (lengths <= VIA_TOLERANCE).any():
-            raise InputError("Lines need at least two vias, each different from the one before.")
-        line = Polyline(frozen(numbers), lengths, self.blend)
+        angles = np.abs(legs[:, 3:]).max(axis=1, initial=0.0)
+        line = rounded(numbers, np.linalg.norm(legs[:, :3], axis=1), angles, self.blend)
         object.__setattr__(self, "blend", line.blend)
         object.__setattr__(self, "_line", line)
 
