@@ -174,7 +174,8 @@ def page() -> str:
         parts += [_kind(kind, tag) for kind in kinds(union)]
         if tag == "do":
             for name, added in added_requests().items():
-                module = added[0].__module__
+                ours = added[0].__name__ in requests.__all__
+                module = requests.__name__ if ours else added[0].__module__
                 parts.append(f"## Requests of the extension `{name}`\n")
                 parts.append(
                     f"A server without this extension refuses them. The Python module is `{module}`.\n"
@@ -197,12 +198,11 @@ def page() -> str:
 
 
 def added_requests() -> dict[str, tuple[type[Request], ...]]:
-    """Return the requests of extensions, by the name of the extension."""
-    return {
-        each.name: each.serve.runner().request_types
-        for each in extensions()
-        if each.serve is not None and each.serve.runner is not None
-    }
+    """Return the requests of extensions, by the name of the extension, as a server has them."""
+    serve = {each.name: each.serve for each in extensions() if each.serve is not None}
+    runners = {name: part.runner().request_types for name, part in serve.items() if part.runner}
+    handlers = {name: part.handler().request_types for name, part in serve.items() if part.handler}
+    return runners | handlers
 
 
 def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:

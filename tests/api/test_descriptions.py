@@ -16,11 +16,11 @@ import jsonschema
 import pytest
 
 from katana450.extensions.api_description.asyncapi import asyncapi_json
-from katana450.extensions.api_description.messages import every_request, kinds
+from katana450.extensions.api_description.messages import kinds
 from katana450.extensions.api_description.openapi import openapi_json
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import tag_of
-from tests.api.test_documented import ADDED
+from tests.api.test_documented import EVERY_REQUEST
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.exchange.tools import ASYNCAPI_PARSER, OPENAPI_VALIDATOR, needs, needs_package, run
 from tests.gateway.client import ask
@@ -41,13 +41,13 @@ new (Parser.default ?? Parser.Parser ?? Parser)().parse(fs.readFileSync(process.
 
 @cache
 def openapi() -> dict[str, Any]:
-    described: dict[str, Any] = json.loads(openapi_json(ADDED))
+    described: dict[str, Any] = json.loads(openapi_json(EVERY_REQUEST))
     return described
 
 
 @cache
 def asyncapi() -> dict[str, Any]:
-    described: dict[str, Any] = json.loads(asyncapi_json(ADDED, HOST, secure=False))
+    described: dict[str, Any] = json.loads(asyncapi_json(EVERY_REQUEST, HOST, secure=False))
     return described
 
 
@@ -92,7 +92,7 @@ def test_fields_are_described_with_their_units() -> None:
 
 def test_every_request_is_an_operation_of_asyncapi_with_its_answers() -> None:
     operations = asyncapi()["operations"]
-    for kind in every_request(ADDED):
+    for kind in EVERY_REQUEST:
         for channel in ("socket", "lines"):
             name = f"{channel}_{tag_of(kind.__name__)}"
             if (channel, kind) == ("socket", requests.Hello):
@@ -175,7 +175,7 @@ def test_every_path_in_the_code_is_described() -> None:
 
 def test_paths_of_a_missing_extension_are_not_described() -> None:
     some = frozenset({"/api/v1/do", "/api/v1/scripts/{name}", "/api/v1/episodes{rest:path}"})
-    paths = json.loads(openapi_json((), some))["paths"]
+    paths = json.loads(openapi_json(EVERY_REQUEST, some))["paths"]
     assert {path.removeprefix("/api/v1/") for path in paths} == {
         *("do", "scripts", "scripts/{name}", "episodes", "episodes/{number}"),
     }

@@ -17,6 +17,7 @@ from katana450.client.files import LostError
 from katana450.extensions.api_description.messages import kinds
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
+from tests.api.test_documented import EVERY_REQUEST
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask
 from tests.gateway.lines import Lines, post, speaking
@@ -145,7 +146,7 @@ def test_openapi_lists_every_route(server: AppServer) -> None:
         assert status in ((404, 409) if recorded else (200, 405, 422)), path
         assert set(described["paths"][path]) <= {"get", "post"}
     shapes = described["components"]["schemas"]
-    for kind in (*kinds(requests.AnyRequest), *kinds(answers.AnyAnswer)):
+    for kind in (*EVERY_REQUEST, *kinds(answers.AnyAnswer)):
         assert kind.__name__ in shapes
 
 

@@ -13,6 +13,7 @@ import pytest
 from katana450.client import Client, RefusedError, connect
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
+from katana450.server.api.fields import Request
 from tests.browser.server import AppServer
 from tests.gateway.client import opened
 from tests.gateway.lines import post, speaking
@@ -126,7 +127,7 @@ def test_pause_during_planning_over_http(server: AppServer, arm: Client) -> None
     ],
 )
 def test_hold_stop_and_motions_during_planning_keep_it_from_running(
-    arm: Client, request_: requests.AnyRequest
+    arm: Client, request_: Request
 ) -> None:
     planning(arm)
     arm.ask(request_)

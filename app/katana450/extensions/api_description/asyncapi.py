@@ -15,7 +15,6 @@ from katana450.extensions.api_description.messages import (
     LICENSE,
     TITLE,
     documentation,
-    every_request,
     kinds,
     schemas,
     summary,
@@ -37,11 +36,11 @@ ANSWERS: dict[type, tuple[type, ...]] = {
 """Answers to requests that are not answered with ``done``. Each can be answered ``refused``."""
 
 
-def asyncapi_json(added: tuple[type[Request], ...], host: str, *, secure: bool) -> bytes:
+def asyncapi_json(asked: tuple[type[Request], ...], host: str, *, secure: bool) -> bytes:
     """Return the document as JSON.
 
-    ``added``: requests of an extension. ``host``: host and port of the server. ``secure``: whether
-    the server uses TLS.
+    ``asked``: the requests of the server. ``host``: its host and port. ``secure``: whether it uses
+    TLS.
     """
     servers = {
         SOCKET: {
@@ -58,15 +57,15 @@ def asyncapi_json(added: tuple[type[Request], ...], host: str, *, secure: bool) 
             "variables": {"port": {"default": "5560", "description": "The port of `--lines`."}},
         },
     }
-    document = {"asyncapi": "3.0.0", "servers": servers, **_parts(added)}
+    document = {"asyncapi": "3.0.0", "servers": servers, **_parts(asked)}
     return msgspec.json.encode(document)
 
 
 @functools.cache
-def _parts(added: tuple[type[Request], ...]) -> dict[str, msgspec.Raw]:
+def _parts(asked: tuple[type[Request], ...]) -> dict[str, msgspec.Raw]:
     """Return the parts of the document that are the same on every address, as JSON."""
-    _, _, components = schemas(added)
-    asked, answered = every_request(added), kinds(answers.AnyAnswer)
+    _, _, components = schemas(asked)
+    answered = kinds(answers.AnyAnswer)
     parts = {
         "info": {
             "title": TITLE,

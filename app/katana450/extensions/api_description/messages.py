@@ -8,7 +8,7 @@ from typing import Any, Union, get_args
 
 import msgspec
 
-from katana450.server.api import answers, requests
+from katana450.server.api import answers
 from katana450.server.api.fields import Request
 
 TITLE = "katana450"
@@ -31,11 +31,6 @@ def kinds(union: Any) -> tuple[type[msgspec.Struct], ...]:
     return get_args(union)
 
 
-def every_request(added: tuple[type[Request], ...]) -> tuple[type[msgspec.Struct], ...]:
-    """Return the requests of the core, then those ``added`` by an extension."""
-    return (*kinds(requests.AnyRequest), *added)
-
-
 def summary(kind: type) -> str:
     """Return the first line of the docstring of ``kind``."""
     return (inspect.getdoc(kind) or "").partition("\n")[0]
@@ -53,15 +48,15 @@ def documentation(kind: type) -> tuple[str, dict[str, str]]:
     return text, fields
 
 
-def schemas(added: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str, Any], Any]:
+def schemas(asked: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str, Any], Any]:
     """Return the schemas of a request and of an answer, and those of all classes by name.
 
-    Each field is described by the entry of its class under ``Attributes``. ``added``: requests of
-    an extension.
+    Each field is described by the entry of its class under ``Attributes``. ``asked``: the requests
+    of the server.
     """
-    shapes: list[Any] = [Union[every_request(added)], answers.AnyAnswer]  # noqa: UP007
+    shapes: list[Any] = [Union[asked], answers.AnyAnswer]  # noqa: UP007
     (request, answer), components = msgspec.json.schema_components(shapes, ref_template=REFERENCE)
-    messages = {each.__name__: each for each in (*every_request(added), *kinds(answers.AnyAnswer))}
+    messages = {each.__name__: each for each in (*asked, *kinds(answers.AnyAnswer))}
     for name, schema in components.items():
         text, fields = _divided(inspect.cleandoc(schema.get("description", "")))
         if name in messages:

@@ -31,15 +31,13 @@ READABLE = {
 
 
 @functools.cache
-def openapi_json(
-    added: tuple[type[Request], ...] = (), served: frozenset[str] | None = None
-) -> bytes:
+def openapi_json(asked: tuple[type[Request], ...], served: frozenset[str] | None = None) -> bytes:
     """Return the document as JSON.
 
-    ``added``: requests of an extension. ``served``: paths of the server, of which only the first
+    ``asked``: the requests of the server. ``served``: paths of the server, of which only the first
     name below ``/api/v1`` counts; None to describe all paths.
     """
-    request, answer, components = schemas(added)
+    request, answer, components = schemas(asked)
     paths: dict[str, Any] = {
         **{path: {"get": _question(path, kind)} for path, kind in READABLE.items()},
         "stop": {"post": _stop()},

@@ -17,15 +17,16 @@ def description_routes(context: RouteContext) -> list[BaseRoute]:
 
     They describe the paths and requests of this server, also those of its extensions.
     """
-    added = context.hub.runner.request_types
+    hub = context.hub
     secure = context.authenticator.address.secure
 
     async def openapi(request: Request) -> Response:
         present = frozenset(getattr(route, "path", "") for route in request.app.routes)
-        return Response(openapi_json(added, present), media_type="application/json")
+        return Response(openapi_json(hub.requests.kinds, present), media_type="application/json")
 
     async def asyncapi(request: Request) -> Response:
         host = request.headers["host"]
-        return Response(asyncapi_json(added, host, secure=secure), media_type="application/json")
+        document = asyncapi_json(hub.requests.kinds, host, secure=secure)
+        return Response(document, media_type="application/json")
 
     return [Route(f"{ROOT}/openapi.json", openapi), Route(f"{ROOT}/asyncapi.json", asyncapi)]

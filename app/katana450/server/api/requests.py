@@ -317,28 +317,19 @@ AnyRequest = (
     | Branch
     | EndDrag
     | Go
-    | Undo
     | Home
     | GoToZero
     | Hold
     | OperateArm
     | Pause
     | Resume
-    | Place
-    | Attach
-    | Load
-    | Remove
-    | Fill
     | Set
     | Get
     | Watch
     | Query
     | Rename
-    | ListPeople
-    | Kick
-    | Mute
-    | Unmute
 )
+"""The requests that every server answers. Extensions answer more."""
 
 
 class _Named(msgspec.Struct):
@@ -350,13 +341,14 @@ _names = msgspec.json.Decoder(_Named)
 
 
 class RequestDecoder:
-    """Decoder of the requests of the core and of an extension."""
+    """Decoder of the requests that a server answers, of the classes ``kinds``."""
 
     def __init__(self, added: tuple[type[Request], ...] = ()) -> None:
-        """Accept the requests of the core, and those of the classes ``added`` by an extension."""
+        """Accept the requests of AnyRequest, and those of the classes ``added`` by extensions."""
         kinds: Any = Union[(AnyRequest, *added)]
+        self.kinds: tuple[type[Request], ...] = get_args(kinds)
         self._decoder: msgspec.json.Decoder[Request] = msgspec.json.Decoder(kinds)
-        self._known = {tag_of(kind.__name__) for kind in get_args(kinds)}
+        self._known = {tag_of(kind.__name__) for kind in self.kinds}
 
     def decoded(self, text: str | bytes) -> Request:
         """Return the request in ``text``. Raises InputError with the reason if it is invalid."""

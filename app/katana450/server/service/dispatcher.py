@@ -170,8 +170,6 @@ class Dispatcher:
                 hub.decline(participant, number)
             case requests.Rename(name=name):
                 hub.rename(participant, name)
-            case _:
-                raise InputError(f"Install the extension that answers {type(request).__name__}.")
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of ``request``; None for a request about the lease."""
