@@ -16,7 +16,7 @@ from katana450.arm.robot.weight import loads_of
 from katana450.client import Client, RefusedError
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.statics import holding_torques
-from katana450.maths.kinematics.velocity import condition_number, limit_distances, manipulability
+from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Matrix4
 from tests.gateway.postures import READY, THERE
@@ -84,8 +84,9 @@ def test_state_includes_values_derived_from_the_posture(
     assert state.margins.limit == pytest.approx(distances.min())
     assert state.margins.axis == distances.argmin() + 1
     assert state.margins.limits == pytest.approx(distances.tolist())
-    assert state.margins.condition_number == pytest.approx(condition_number(arm.chain, q))
-    assert state.margins.manipulability == pytest.approx(manipulability(arm.chain, q))
+    values = singular_values(arm.chain, q)
+    assert state.margins.condition_number == pytest.approx(values[0] / values[-1])
+    assert state.margins.manipulability == pytest.approx(values.prod())
     assert state.margins.clearance is not None
     assert state.margins.clearance > 0.005
     program.send(requests.Joints(q=THERE.tolist()))

@@ -11,7 +11,7 @@ import pytest
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.velocity import condition_number, limit_distances, manipulability
+from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.view.controls import ends
 from katana450.server.view.pose_display import BASE, SHOULDER, UNITS, PoseDisplay
 from katana450.server.view.readout import details, page
@@ -33,8 +33,9 @@ def test_limit_distance_of_every_axis_is_shown_and_the_nearest_marked(
 def test_velocity_measures_equal_those_of_the_kinematics(arm: MountedArm, session: Session) -> None:
     chain, state = arm.chain, session.begin(session.ready, 0.0, 0.0)
     text = details(arm, state)
-    assert f"<td data-now='condition'>{condition_number(chain, state.q):.0f}</td>" in text
-    assert f"<td data-now='manipulability'>{manipulability(chain, state.q):.3f}</td>" in text
+    values = singular_values(chain, state.q)
+    assert f"<td data-now='condition'>{values[0] / values[-1]:.0f}</td>" in text
+    assert f"<td data-now='manipulability'>{values.prod():.3f}</td>" in text
 
 
 def test_condition_is_infinite_in_a_singularity(arm: MountedArm, session: Session) -> None:

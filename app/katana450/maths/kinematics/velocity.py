@@ -3,8 +3,8 @@
 A twist has two units, so singular values need a length to be comparable: translations are divided
 by the arm's characteristic length. Twists are (omega, v), with v the velocity of the tool point.
 
-Sources: Yoshikawa (1985) for the manipulability; Nakamura & Hanafusa (1986) for the damping; Lynch
-& Park, Modern Robotics (2017), ch. 5.3 and 5.4.
+Sources: Nakamura & Hanafusa (1986) for the damping; Lynch & Park, Modern Robotics (2017), ch. 5.3
+and 5.4.
 """
 
 from __future__ import annotations
@@ -70,20 +70,6 @@ def singular_values(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     J = jacobian_body(chain, q)
     J[3:] /= characteristic_length(chain)
     return np.asarray(np.linalg.svd(J, compute_uv=False))
-
-
-def manipulability(chain: Chain, q: npt.ArrayLike) -> float:
-    """Return Yoshikawa's measure [1]: sqrt(det(J^T J)), the product of the singular values."""
-    return float(np.prod(singular_values(chain, q)))
-
-
-def condition_number(chain: Chain, q: npt.ArrayLike) -> float:
-    """Return the largest over the smallest singular value, at least 1.
-
-    The value is infinite in a singularity.
-    """
-    values = singular_values(chain, q)
-    return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf
 
 
 def limit_distances(chain: Chain, q: npt.ArrayLike) -> FloatArray:
