@@ -168,6 +168,18 @@ def run(
     return loop
 
 
+def dragging(
+    rng: np.random.Generator, _state: State, _session: DescribedRobot
+) -> Iterator[cmd.Command]:
+    """Yield a drag in 60 % of all ticks, without a pause, as a restless hand sends it."""
+    if rng.random() < 0.6:
+        at = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
+        yield cmd.MoveTool(at)
+        DRAGGED[id(rng)] = np.clip(
+            at + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
+        )
+
+
 def header(*attachments: Attachment) -> RecordingHeader:
     """Return the header of a recording of the shipped arm."""
     found = described()

@@ -24,6 +24,7 @@ from katana450.cli.main import main
 from katana450.client import connect
 from katana450.extensions.recording.files.header import header_of
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.server.api import answers, requests
 from katana450.settings import Settings
@@ -78,7 +79,9 @@ def test_states_have_all_axes_and_the_tool(path: Path, described: DescribedRobot
     assert run.q.shape[1] == 6
     arm = described.robot.require_arm()
     T = arm.T_base_shoulder @ forward(arm.chain, run.q[-1])
-    np.testing.assert_allclose(run.position[-1], T[:3, 3], atol=2e-6)
+    np.testing.assert_allclose(run.position[-1], T[:3, 3], atol=2e-5)
+    x, y, z, w = run.orientation[-1]
+    np.testing.assert_allclose(so3.from_quaternion((w, x, y, z)), T[:3, :3], atol=1e-12)
     assert float(np.ptp(run.position[:, 1])) > 0.09
 
 

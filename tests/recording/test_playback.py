@@ -132,7 +132,7 @@ def test_broken_files_are_refused(recorded: tuple[Path, list[TickRecord]], tmp_p
         path.write_bytes(damaged)
         try:
             run = read(path)
-            for t in (run.spans[0].start, run.spans[-1].end):
+            for t in [each for span in run.spans for each in span]:
                 run.at(t)
             run.marks()
         except InputError:
@@ -282,7 +282,7 @@ def test_axis_leaves_out_the_rests() -> None:
 
 
 def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
-    first = StateRow(0.0, [0.0, 0.1], position=[0.3, 0.0, 0.1])
+    first = StateRow(0.0, [0.0, 0.1], [0.0, 0.1], position=[0.3, 0.0, 0.1])
     second = replace_row(first, q=[np.radians(3.0), 0.1], position=[0.3, 0.004, 0.103])
     found = difference([0.0, 1.0, 2.0], [first, first, None], [first, second, second])
     assert found.t == [0.0, 1.0]

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from katana450.arm.control.commands import Command
 from katana450.errors import ConfigurationError, InputError
+from katana450.extensions.recording.datasets.tool_orientation import orientations
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_file import episodes_in, shown_part
 from katana450.extensions.recording.files.checking import (
@@ -140,10 +141,11 @@ class Recording:
         """Tool point (N, 3) in the base frame [m]. Raises InputError for a robot without a tool."""
         return self._column("position")
 
-    @property
+    @cached_property
     def orientation(self) -> FloatArray:
         """Unit quaternion (N, 4) x, y, z, w of the tool in the base frame. Raises InputError."""
-        return self._column("orientation")
+        with RecordingFile.open(self.path) as file:
+            return orientations(file, self.start, self.end)
 
     @cached_property
     def commands(self) -> tuple[RecordedCommand, ...]:

@@ -21,9 +21,9 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.extensions.recording.form_error import FormError
 
-DIGEST_BYTES = 6
-"""Length of a digest [bytes]; in text it has twice as many digits. One of 3 * 10^14 states that
-differ has the same digest by chance."""
+DIGEST_DIGITS = 10
+"""Length of a digest. One of 10^10 states that differ has the same digest by chance. Decimal digits
+take less room than others beside numbers."""
 
 APART = ("t", "mode", "objects")
 PLAIN = tuple(each.name for each in fields(State) if each.name not in APART)
@@ -67,9 +67,8 @@ class Digester:
     def digest(self, state: State, content: bytes | None = None) -> str:
         """Return the digest of ``state``. ``content``: its content, if it is known."""
         content = self.content(state) if content is None else content
-        return hashlib.blake2b(
-            self._encoder.encode(state.t) + content, digest_size=DIGEST_BYTES
-        ).hexdigest()
+        found = hashlib.blake2b(self._encoder.encode(state.t) + content, digest_size=8).digest()
+        return f"{int.from_bytes(found) % 10**DIGEST_DIGITS:0{DIGEST_DIGITS}d}"
 
 
 def _mode(mode: Mode) -> tuple[Any, ...]:

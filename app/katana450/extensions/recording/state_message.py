@@ -26,8 +26,8 @@ from katana450.maths.water.flow import Water
 from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import MILLILITRE
 
-DIGITS, SHOWN_DIGITS = 6, 5
-"""Decimals [m, rad, 1] of derived numbers, and of those that are only displayed."""
+DIGITS, SHOWN_DIGITS, RATE_DIGITS = 6, 5, 4
+"""Decimals [m, rad, 1] of poses, of numbers that are only displayed, and of rates [rad/s, m/s]."""
 
 NANO = 1_000_000_000
 
@@ -77,23 +77,28 @@ class StateMessages:
 
     def state(self, state: State) -> dict[str, Any]:
         """Return the message of ``state`` on the topic of states."""
-        message: dict[str, Any] = {
-            "t": state.t,
-            "q": state.q.tolist(),
-            "qd": _rounded(state.motion.qd, DIGITS),
-            "setpoint": state.setpoint.tolist(),
+        setpoint = state.setpoint
+        message: dict[str, Any] = {"t": state.t}
+        if state.q is not setpoint and state.q.tobytes() != setpoint.tobytes():
+            message["q"] = state.q.tolist()
+        # Numbers that change stand together, so that what stays the same is packed better.
+        message["setpoint"] = setpoint.tolist()
+        message["qd"] = _rounded(state.motion.qd, RATE_DIGITS)
+        T = self.tool_pose(state)
+        if T is not None:
+            # Its orientation follows from the joints, and displays get it by their topic.
+            message["position"] = _rounded(T[:3, 3], SHOWN_DIGITS)
+        message |= {
+            "target": _target(state),
+            "findings": [finding_text(each) for each in state.findings],
             "gripper": state.gripper,
             "gripper_setpoint": state.gripper_setpoint,
             "mode": type(state.intent).__name__,
             "status": state.status.value,
-            "findings": [finding_text(each) for each in state.findings],
             "speed": state.speed,
-            "target": _target(state),
         }
-        T = self.tool_pose(state)
         if T is not None:
             message["tool"] = state.tool
-            message["position"], message["orientation"] = pose_of(T)
         message.update(self._changed_objects(state))
         if state.poured is not None:
             water = state.poured.water
@@ -199,12 +204,13 @@ def _target(state: State) -> dict[str, Any]:
             return {"q": _rounded(q, DIGITS)}
         case PoseTarget(T=T):
             return {"T": [_rounded(row, DIGITS) for row in T]}
-        case ToolTarget(pitch=pitch, roll=roll) as target:
-            return {"position": _rounded(target.position, DIGITS), "pitch": pitch, "roll": roll}
+        case ToolTarget(position=position, pitch=pitch, roll=roll):
+            # As in the command, which makes the file smaller.
+            return {"position": position.tolist(), "pitch": pitch, "roll": roll}
         case ToolPose(T=T):
             return {"T": [_rounded(row, DIGITS) for row in T]}
         case target:
-            return {"position": _rounded(target.position, DIGITS)}
+            return {"position": target.position.tolist()}
 
 
 def _time(t: float) -> dict[str, int]:

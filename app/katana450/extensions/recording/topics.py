@@ -98,16 +98,15 @@ TOPICS: Final = (
         "katana450.State",
         _object(
             "what changed in a tick",
-            ("t", "q", "setpoint"),
+            ("t", "setpoint"),
             t=T,
-            q=_numbers("joints as the driver reported them [rad or m]"),
+            q=_numbers("joints as the driver reported them [rad or m], unless these are setpoints"),
             qd=_numbers("rates of the setpoints [rad/s or m/s]"),
             setpoint=_numbers("setpoints of the joints [rad or m]"),
             gripper=_number("finger joint [rad or m]"),
             gripper_setpoint=_number("its setpoint [rad or m]"),
             tool=_text("tool frame"),
             position=_numbers("(3,) tool point in the base frame [m]"),
-            orientation=_numbers("(4,) x, y, z, w of the tool in the base frame"),
             target=_object(
                 "target as given: of the joints, or of the tool in the frame {S}",
                 q=_numbers("[rad or m]"),

@@ -82,11 +82,16 @@ class TickReader:
 
 
 def state_numbers(message: Message) -> dict[str, Any]:
-    """Return the content of a message of the topic of states. Raises InputError."""
+    """Return the content of a message of a state or an event, a state with its joints ``q``.
+
+    Raises InputError.
+    """
     with _placed(message):
         form = json_form(message.data)
         if not isinstance(form, dict):
             raise FormError("it is not an object")
+        if "setpoint" in form:
+            form.setdefault("q", form["setpoint"])
         return form
 
 

@@ -19,6 +19,17 @@ MAGIC = b"\x89MCAP0\r\n"
 FOOTER = struct.Struct("<BQQQI")
 """Opcode and length of the footer, the begins of summary and offsets, and the checksum."""
 
+PACKING = zstandard.ZstdCompressionParameters(
+    strategy=zstandard.STRATEGY_BTOPT,
+    window_log=18,
+    hash_log=15,
+    chain_log=15,
+    search_log=2,
+    min_match=3,
+    target_length=64,
+)
+"""Parameters for digits: a tenth smaller than by default, in 40 instead of 3 us for a tick."""
+
 DATA_END_BYTES = 13
 """Length of the record between the data and the summary."""
 
@@ -48,7 +59,8 @@ def write_chunk(out: BinaryIO, summary: Summary, content: bytes, index: Index) -
     """
     times = [at for places in index.values() for at, _ in places]
     first, last = min(times), max(times)
-    start, packed = out.tell(), zstandard.compress(content)
+    packed = zstandard.ZstdCompressor(compression_params=PACKING).compress(content)
+    start = out.tell()
     chunk = Chunk("zstd", packed, last, first, zlib.crc32(content), len(content))
     chunk_length = write_records(out, [chunk])
     index_at, places_at = out.tell(), {}

@@ -39,7 +39,7 @@ from katana450.extensions.recording.topics import (
 CHECKPOINT_PERIOD = 10.0
 """[s] Time between two complete states: a simulation from one to any moment takes a second."""
 
-SHOWN_PERIOD = 0.05
+SHOWN_PERIOD = 0.125
 """[s] Minimum time between two messages that only displays read."""
 
 

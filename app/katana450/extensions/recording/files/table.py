@@ -19,8 +19,8 @@ from katana450.extensions.recording.topics import CHECKPOINTS, STATE
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 NUMBERS = ("t", "gripper", "gripper_setpoint", "speed", "q", "qd", "setpoint")
-POSE = ("position", "orientation")
-"""Names of the columns of every robot, and of those with a tool only."""
+POSITION = "position"
+"""Names of the columns of every robot, and of that of a robot with a tool only."""
 
 
 def rows(
@@ -61,12 +61,12 @@ def columns(
     """Return the numbers of all states as arrays with one row for each, by their names.
 
     Names: ``t``, ``q``, ``qd``, ``setpoint``, ``gripper``, ``gripper_setpoint``, ``speed``, and
-    ``position`` and ``orientation`` of an arm. Raises InputError for a damaged recording.
+    ``position`` of an arm. Raises InputError for a damaged recording.
     """
     found = list(rows(file, start, end))
     if not found:
         raise InputError(f"{file.path} has no states in that time.")
-    names = [*NUMBERS, *(name for name in POSE if name in found[0])]
+    names = [*NUMBERS, *([POSITION] if POSITION in found[0] else [])]
     table = {}
     for name in names:
         first = found[0].get(name)

@@ -59,7 +59,8 @@ class StateRow(msgspec.Struct):
     """The part of a recorded state that is played back; units as in docs/recording.md."""
 
     t: float
-    q: list[float]
+    setpoint: list[float]
+    q: list[float] = []
     gripper: float = 0.0
     status: str = ""
     position: list[float] | None = None
@@ -204,11 +205,14 @@ def still_flying(water: Water, environment: WaterEnvironment) -> Water:
 def state_row(message: Message) -> StateRow:
     """Return the state in ``message``. Raises InputError."""
     try:
-        return msgspec.json.decode(message.data, type=StateRow)
+        row = msgspec.json.decode(message.data, type=StateRow)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise InputError(
             f"The recording is damaged in the state at t = {message.t:.3f} s: {error}."
         ) from error
+    # Joints without a report of the driver are where they should be.
+    row.q = row.q or row.setpoint
+    return row
 
 
 class Describer:

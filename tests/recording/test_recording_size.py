@@ -1,0 +1,36 @@
+"""An hour of motion without a pause takes at most 60 MB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from katana450.arm.runtime.tick import TickRecord
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from tests.conftest import LONG
+from tests.recording.recorded import PERIOD, Commands, dragging, header, run, swinging
+
+TICKS = 6000 if LONG else 660
+"""Ticks of a minute, as in a file of a server, or fewer."""
+
+
+@pytest.mark.parametrize("commands", [swinging, dragging])
+def test_hour_without_a_pause_takes_at_most_60_mb(tmp_path: Path, commands: Commands) -> None:
+    path = tmp_path / "hour.mcap"
+    sizes: list[int] = []
+    with path.open("wb") as opened:
+        writer = RecordingWriter(opened, header())
+        records: list[TickRecord] = []
+        run(TICKS, 1, records.append, commands, odd=False)
+        for number, each in enumerate(records):
+            writer.put(each)
+            # As often as a server syncs.
+            if number % 60 == 59:
+                writer.flush()
+                sizes.append(opened.tell())
+        writer.close()
+    # Beginning and end of a file; a server begins another one each minute.
+    fixed = sizes[0] + path.stat().st_size - sizes[-1]
+    minutes = PERIOD * 60 * (len(sizes) - 1) / 60.0
+    assert 60.0 * ((sizes[-1] - sizes[0]) / minutes + fixed) < 60e6
