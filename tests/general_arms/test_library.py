@@ -11,6 +11,7 @@ import pytest
 
 import katana450
 from katana450.maths.geometry import se3, so3
+from tests.robot.hands import hand
 from tests.robot.public_arms import PX100, two_sided, written
 
 Urdf = Callable[[str], Path]
@@ -95,6 +96,16 @@ def test_one_of_several_fingers_is_chosen_by_its_tip(tmp_path: Path) -> None:
         "right_elbow",
         "right_wrist_angle",
     )
+
+
+def test_posture_of_an_arm_among_other_joints_has_its_axes_alone(tmp_path: Path) -> None:
+    path = tmp_path / "hand.urdf"
+    path.write_text(hand(), encoding="utf-8")
+    arm = load(path, tool="finger1_link1")
+    assert (arm.n, len(arm.session.ready)) == (2, 16)
+    assert arm.ready.shape == (2,)
+    assert ((arm.lower <= arm.ready) & (arm.ready <= arm.upper)).all()
+    assert arm.fk(arm.ready).shape == (4, 4)
 
 
 def test_notes_say_how_poses_are_solved(urdf: Urdf) -> None:

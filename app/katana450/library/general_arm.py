@@ -21,7 +21,7 @@ from katana450.library.arm import Arm, Priority
 from katana450.library.motion_plan import MotionPlan
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.library.solutions import IKSolutions
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
@@ -66,6 +66,15 @@ class GeneralArm(Arm):
     def tool(self) -> str:
         """Link to which poses refer."""
         return self.described.default_tool
+
+    @property
+    def ready(self) -> FloatArray:
+        """(n,) posture in which the robot starts [rad]; plans begin there by default."""
+        if self.robot.arm is not None:
+            return self.session.ready
+        # The session has every joint of the file.
+        posture = dict(zip(self.robot.joint_group.names, self.session.ready, strict=True))
+        return frozen([posture[name] for name in self.chain.names])
 
     @property
     def T_base_frame(self) -> FloatArray:
