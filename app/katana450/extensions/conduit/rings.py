@@ -102,7 +102,7 @@ class ConduitLayer(ViewLayer):
     def attach(self, context: LayerContext) -> None:
         """Add the rings. Raises RobotDescriptionError."""
         self._robot = context.robot
-        self._conduits = Conduits(context.server, context.robot, context.path)
+        self._conduits = Conduits(context.server, context.robot, context.arm.path)
 
     def follow(self, state: State) -> None:
         """Bend the conduit as the joints of ``state`` do."""

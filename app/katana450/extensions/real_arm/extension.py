@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.robot import Robot
     from katana450.maths.geometry.arrays import FloatArray
+    from katana450.server.view.layer import ViewLayer
 
 
 def _emulate(options: Namespace) -> int:
@@ -55,6 +56,14 @@ def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> 
     return PlantDriver(robot, q, gripper, profile_named(options.plant))
 
 
+def _view_layer(options: Namespace) -> ViewLayer | None:
+    if options.arm is None:
+        return None
+    from katana450.extensions.real_arm.unknown_posture import UnknownPosture
+
+    return UnknownPosture()
+
+
 EXTENSION = Extension(
     "real_arm",
     (
@@ -71,5 +80,5 @@ EXTENSION = Extension(
             _emulate,
         ),
     ),
-    ServeExtension(add_serve_options, driver=_driver),
+    ServeExtension(add_serve_options, view_layer=_view_layer, driver=_driver),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import viser
@@ -11,6 +10,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.controls import GestureGate
+from katana450.server.view.scene import ArmNodes
 
 
 class LayerContext(NamedTuple):
@@ -20,14 +20,14 @@ class LayerContext(NamedTuple):
         server: viser's server.
         robot: The robot, which has an arm.
         session: The session, which has the environment of objects and the water model.
-        path: Path of the node of each link, by link name.
+        arm: The nodes of the robot.
         gestures: The path of gestures to the arm.
     """
 
     server: viser.ViserServer
     robot: Robot
     session: Session
-    path: Mapping[str, str]
+    arm: ArmNodes
     gestures: GestureGate
 
 

@@ -127,6 +127,12 @@ class FrameTree:
                 jointed.angle = angle
                 jointed.move(angle)
 
+    def show_moving(self, visible: bool) -> None:
+        """Show or hide the links that a joint moves. Only changes are sent."""
+        for jointed in self._joints:
+            if jointed.frame.visible != visible:
+                jointed.frame.visible = visible
+
 
 class ArmNodes(FrameTree):
     """The arm itself, drawn from its GLB files, which keep normals and materials.

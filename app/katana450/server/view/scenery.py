@@ -53,7 +53,7 @@ class Scenery:
         self.arm = ArmNodes(server, robot)
         self._layers = layers
         for layer in layers:
-            layer.attach(LayerContext(server, robot, session, self.arm.path, gestures))
+            layer.attach(LayerContext(server, robot, session, self.arm, gestures))
 
     def show(self, state: State) -> None:
         """Show ``state``."""
