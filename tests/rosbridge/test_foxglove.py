@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import importlib
 import json
 import os
 import socket
 import struct
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -100,3 +102,29 @@ def test_foxglove_sees_and_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> Non
                 assert "Foxglove" in state["stopped"]
 
     asyncio.run(act())
+
+
+@needs_package(FOXGLOVE)
+def test_error_in_one_state_ends_neither_the_picture_nor_the_log(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.syspath_prepend(FOXGLOVE.folder)
+    module = importlib.import_module("katana450.extensions.rosbridge.foxglove_server")
+    server = object.__new__(module.FoxgloveServer)
+    monkeypatch.setattr(
+        server, "_hub", SimpleNamespace(arm=SimpleNamespace(age=0.0)), raising=False
+    )
+    published = iter((ValueError("first"), ValueError("first"), None, ValueError("first")))
+
+    def publish(_: object) -> None:
+        error = next(published, SystemExit())
+        if error is not None:
+            raise error
+
+    monkeypatch.setattr(server, "_publish", publish)
+    with pytest.raises(SystemExit):
+        server._run()
+    # An error that lasts is logged once; one that comes back, again.
+    assert [record.message for record in caplog.records] == [
+        "Error in the connection of Foxglove."
+    ] * 2

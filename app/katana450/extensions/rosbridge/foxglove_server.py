@@ -75,6 +75,7 @@ class FoxgloveServer:
         log.info("Foxglove can connect to ws://%s:%d.", HOST, port)
 
     def _run(self) -> None:
+        problem = ""
         while True:
             time.sleep(INTERVAL)
             arm = self._hub.arm
@@ -82,9 +83,12 @@ class FoxgloveServer:
                 continue
             try:
                 self._publish(arm)
-            except Exception:
-                log.exception("Error in the connection of Foxglove.")
-                return
+                problem = ""
+            except Exception as error:
+                # The next state may be shown again. An error that lasts is logged once.
+                if repr(error) != problem:
+                    log.exception("Error in the connection of Foxglove.")
+                problem = repr(error)
 
     def _publish(self, arm: ArmHandle) -> None:
         state = arm.state
