@@ -100,7 +100,7 @@ class MeshSurface:
 
 
 def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return the vertices that faces or lines use, and these with their new indices."""
+    """Return the vertices that ``faces`` (or lines) use, and ``faces`` with the new indices."""
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     return vertices[used], (np.cumsum(used) - 1)[faces]

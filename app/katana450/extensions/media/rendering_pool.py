@@ -56,13 +56,7 @@ class Shot(NamedTuple):
 class RenderingPool:
     """Processes that render pictures of states. A context: they end with it."""
 
-    def __init__(
-        self,
-        shots: Sequence[Shot],
-        urdf: Path,
-        bare: bool,
-        count: int,
-    ) -> None:
+    def __init__(self, shots: Sequence[Shot], urdf: Path, bare: bool, count: int) -> None:
         """Start when the first picture is taken.
 
         Args:

@@ -228,7 +228,7 @@ class Grasp:
         """Plan the grasp at ``grip``. Raises InputError if it is not possible."""
         point = _point(builder, scene_object, grip.height)
         distance, q = _smallest_distance(builder, point, approach, grip.distance)
-        # Before the way there, whose planning takes longer.
+        # Before the path there, whose planning takes longer.
         self._closed(builder, q)
 
         def start_at(away: float) -> FloatArray:

@@ -28,7 +28,7 @@ RIM_WIDTH, RIM_DEPTH = 1.5e-3, 4e-3
 what is pressed is hidden by what presses it. Those at the centre of pressure are white."""
 
 ASIDE = 0.03
-"""[m] Distance of the force in newtons from the pad, behind the finger."""
+"""[m] Distance of the text with the force from the pad, behind the finger."""
 
 WHITE = np.full(3, 255.0)
 

@@ -124,10 +124,7 @@ class View(ViewUpdater):
         if view_options.gizmo is not None:
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
-        shows = DisplayOptions(
-            self._look_from,
-            view_options.layers,
-        )
+        shows = DisplayOptions(self._look_from, view_options.layers)
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
