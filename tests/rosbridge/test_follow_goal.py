@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from katana450.errors import LeaseError
 from katana450.extensions.rosbridge.follow_goal import FollowGoal
 from katana450.extensions.rosbridge.goals import GoalHost, GoalStatus
 from katana450.extensions.rosbridge.ops import SendActionGoal
@@ -78,6 +79,31 @@ def test_program_that_runs_with_the_next_tick_is_not_reported_as_cancelled(
 def test_cancel_voids_the_run_that_waits(goal: FollowGoal, runner: WaitingRunner) -> None:
     assert goal.end("The client cancelled it.").status is GoalStatus.CANCELED
     assert runner.ended == ["The client cancelled it"]
+
+
+def test_goal_before_the_arm_is_ready_is_aborted_with_the_reason(runner: WaitingRunner) -> None:
+    sent: list[dict[str, Any]] = []
+
+    def present() -> None:
+        raise LeaseError("The arm is not ready yet.")
+
+    hub: Any = SimpleNamespace(
+        runner=runner,
+        present=present,
+        arm=None,
+        clock=lambda: 0.0,
+        gate=SimpleNamespace(revocations=0, check_not_stopped=lambda: None),
+    )
+    participant: Any = SimpleNamespace()
+    host = GoalHost(hub, participant, lambda _: answers.Done(), sent.append, lambda *_: None)
+    args = msgspec.json.encode(trajectory((1.0, AWAY)))
+    found = FollowGoal(host, SendActionGoal(action=FOLLOW, args=msgspec.Raw(args), id="goal 1"))
+    found.begin()
+    found.tick()
+    assert found.ended
+    (result,) = sent
+    assert result["status"] == GoalStatus.ABORTED
+    assert result["values"].error_string == "The arm is not ready yet."
 
 
 def test_cancel_leaves_the_unread_program_of_another_client(

@@ -118,7 +118,8 @@ class Goal(ABC):
         t = self.host.hub.clock()
         if self._ends is not None:
             result, since = self._ends
-            if not self.host.arm.state.moving or t - since > REST_SECONDS:
+            arm = self.host.hub.arm
+            if arm is None or not arm.state.moving or t - since > REST_SECONDS:
                 self._finish(result)
             return
         self._advance(self.follow)
