@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from typing import TypeVar
 
 from katana450.extensions.real_arm.plant.profile import KATANA450, PROFILES
+
+N = TypeVar("N", int, float)
 
 PORT = 5566
 """TCP port of an arm."""
@@ -33,7 +38,10 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
         "as an arm after power-up: not calibrated, with its motors off."
     )
     parser.add_argument(
-        "--port", type=_port, default=PORT, help="0 for any free port (default: %(default)s)"
+        "--port",
+        type=_between("a port", int, 0, 65535),
+        default=PORT,
+        help="0 for any free port (default: %(default)s)",
     )
     parser.add_argument(
         "--host",
@@ -45,13 +53,13 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--view",
-        type=_port,
+        type=_between("a port", int, 0, 65535),
         metavar="PORT",
         help="serve a page there that shows the emulated arm where it really is",
     )
     parser.add_argument(
         "--object",
-        type=_width,
+        type=_between("a width in mm", float, 1.0, WIDEST_OBJECT),
         metavar="MM",
         help="width of an object between the fingers, in place of that in the script of faults",
     )
@@ -60,7 +68,7 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--calibration-scale",
-        type=_scale,
+        type=_between("a factor", float, 1.0, 100.0),
         default=1.0,
         metavar="N",
         help="calibrate N times as fast, for tests (default: %(default)g)",
@@ -86,7 +94,7 @@ def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
     )
     probe.add_argument(
         "--repeat",
-        type=_repeats,
+        type=_between("a number", int, 1, MAX_REPEATS),
         default=50,
         help="number of times that each reading is repeated for its reply time (default: "
         "%(default)s)",
@@ -152,29 +160,14 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _repeats(text: str) -> int:
-    repeats = int(text)
-    if not 1 <= repeats <= MAX_REPEATS:
-        raise argparse.ArgumentTypeError(f"a number is 1 to {MAX_REPEATS}, not {text}")
-    return repeats
+def _between(what: str, read: Callable[[str], N], lower: N, upper: N) -> Callable[[str], N]:
+    """Return the reader of an option: ``what``, a number from ``lower`` to ``upper``."""
 
+    def checked(text: str) -> N:
+        with suppress(ValueError):
+            value = read(text)
+            if lower <= value <= upper:
+                return value
+        raise argparse.ArgumentTypeError(f"{what} from {lower:g} to {upper:g}, not {text!r}")
 
-def _port(text: str) -> int:
-    port = int(text)
-    if not 0 <= port <= 65535:
-        raise argparse.ArgumentTypeError(f"a port is 0 to 65535, not {text}")
-    return port
-
-
-def _width(text: str) -> float:
-    width = float(text)
-    if not 1.0 <= width <= WIDEST_OBJECT:
-        raise argparse.ArgumentTypeError(f"a width is 1 to {WIDEST_OBJECT:g} mm, not {text}")
-    return width
-
-
-def _scale(text: str) -> float:
-    scale = float(text)
-    if not 1.0 <= scale <= 100.0:
-        raise argparse.ArgumentTypeError(f"a scale is 1 to 100, not {text}")
-    return scale
+    return checked
