@@ -255,7 +255,9 @@ def test_other_branch_keeps_the_pose(chain: Chain) -> None:
     usable = [
         each.metrics
         for each in choices
-        if each.metrics.position_error < 1e-6 and each.metrics.branch != start.branch
+        if not each.refusal
+        and each.metrics.position_error < 1e-6
+        and each.metrics.branch != start.branch
     ]
     assert usable
     goal = with_branch(arm, start, usable[-1].branch).goal

@@ -10,18 +10,25 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import State
-from katana450.extensions.general_arms.driven_tool import DrivenTool
+from katana450.extensions.general_arms.branch_solver import near_turns
+from katana450.extensions.general_arms.driven_tool import SETTLINGS, DrivenTool
+from katana450.extensions.general_arms.regularity import NEAR
+from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from tests.general_arms.published_arms import FOUR, SEVEN, SIX, SKEWED
 
 ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED}
 DRAGS_OF_A_TRIP = 10
 MAX_CALLS = 400
+"""Number of ticks of a drag after which it must have ended if its way is clear."""
+
+HELD_CALLS = 60
+"""Number of ticks after which a drag whose way is not clear is given up."""
+
 MAX_MOVE = 2.0
 """[rad] A call moves the goal by a few hops of 0.1 rad at most."""
 
@@ -43,24 +50,47 @@ class Dragged(NamedTuple):
     seconds: float
 
 
+def on_branch(tool: DrivenTool, place: ToolPose, branch: str, q: FloatArray) -> FloatArray | None:
+    """Return the posture of ``branch`` at ``place`` next to ``q``; None if there is none.
+
+    Four axes turn the pose with axis 1, and seven keep their swivel.
+    """
+    branches, chain = tool._branches, tool.chain
+    if isinstance(branches.solver, SevenAxes):
+        swivel = q[[branches.solver.swivel]]
+        found = branches.solver.at_swivels(place.T, swivel)[0][branches.names.index(branch)]
+        return near_turns(chain, found, q) if np.isfinite(found).all() else None
+    for _ in range(SETTLINGS if chain.n < 6 else 1):
+        pose = np.array(place.T)
+        pose[:3, :3] = tool._pan(q) @ pose[:3, :3]
+        found = branches.on_branch(pose, branch, q)
+        if found is None:
+            return None
+        q = found
+    return q
+
+
 def is_clear(tool: DrivenTool, q: FloatArray, branch: str, way: tuple[ToolPose, ToolPose]) -> bool:
     """Return whether ``branch`` has postures inside the limits all the way, without a leap.
 
-    Only six axes with a closed form can tell. The arm stands at the beginning of the way.
+    Only arms with a closed form can tell. The arm stands at the beginning of the way. Four and
+    seven axes are led by steps, which end at the edge of a branch: their way keeps away from it.
     """
     start, target = way
-    if not tool._branches.is_exact:
-        return False
+    descent = tool._tracker.descent
     for k in range(PLACES + 1):
         place = start.towards(target, k / PLACES)
-        found = tool._branches.on_branch(place.T, branch, q)
+        found = on_branch(tool, place, branch, q)
         if found is None or not tool.chain.within_limits(found):
             return False
         if np.abs(found - q).max() > CLEAR_STEP or tool.branch_of(found) != branch:
             return False
-        reached = ToolPose.of(forward(tool.chain, found))
-        if max(reached.apart(place)) > 1e-9:
+        if max(tool.target_at(found).apart(place)) > 1e-9:
             return False
+        if tool.chain.n != 6:
+            look = descent.look(descent.goal(place), tuple(found.tolist()))
+            if look.least < NEAR:
+                return False
         q = found
     return True
 
@@ -90,7 +120,7 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
             and priority is Priority.POSE
             and is_clear(tool, state.goal, str(state.branch), (since, target))
         )
-        for _ in range(MAX_CALLS):
+        for _ in range(MAX_CALLS if way_is_clear else HELD_CALLS):
             begin = time.thread_time()
             found = tool.track(state, target, since)
             seconds += time.thread_time() - begin
@@ -118,13 +148,16 @@ def test_drags_keep_branch_and_limits(name: str) -> None:
     found = drags(ARMS[name], 20)
     assert found.arrived + found.held == 20
     assert found.arrived >= 3
-    if name in SIX:
-        assert found.clear >= 3
+    if name != "skewed 6":
+        assert found.clear >= 2
 
 
 @pytest.mark.parametrize("name", SEVEN)
 def test_drags_of_seven_axes_keep_branch_and_limits(name: str) -> None:
-    assert drags(ARMS[name], 4).arrived >= 1
+    found = drags(ARMS[name], 52)
+    assert found.clear >= 5
+    # Free joints do not go on to the middle of their limits while the tool waits beside its place.
+    assert found.calls <= 20 * 52
 
 
 @pytest.mark.long

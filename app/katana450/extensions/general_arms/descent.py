@@ -42,6 +42,10 @@ DAMPING: Final = 1e-6
 CENTRING: Final = 0.02
 """[1] Part of the way to the middle of their limits that free joints take in a step."""
 
+CENTRED: Final = 0.02
+"""[rad], [arm lengths] Error below which they take less of it, in proportion. The bend of their
+path would else keep the tool beside its target, and the arm would creep for seconds."""
+
 HALVINGS: Final = 5
 """Maximum number of halvings of a step that brings the tool no nearer."""
 
@@ -185,7 +189,9 @@ class Descent:
         A = weighted @ now.J.T + DAMPING * np.eye(n)
         b = weighted @ now.error
         if n > 6 or not weights[0]:
-            b = b + DAMPING * CENTRING * (self._middle - np.array(now.q))
+            left = math.sqrt(float(weights @ now.error**2) / float(weights.max()))
+            part_of_way = CENTRING * min(1.0, left / CENTRED)
+            b = b + DAMPING * part_of_way * (self._middle - np.array(now.q))
         free = list(range(n))
         dq = np.zeros(n)
         while free:
