@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -22,10 +25,14 @@ from katana450.extensions.general_arms.spherical_wrist import Solve
 from katana450.extensions.general_arms.straight_line import Code
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.se3 import Rows
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.turns import nearest_turn
+
+# Looked up once: every call uses these.
+_ARRAY: Final = np.ndarray
+_FLOAT: Final = np.dtype(np.float64)
+_NUMBERS: Final = struct.Struct("16d").unpack
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +48,7 @@ class ClosedForm:
     chain: Chain
     form: Form
     is_reversed: bool = False
+    _solve_pose: Code = field(init=False, repr=False)
 
     @staticmethod
     def of(chain: Chain, links: DHLinks) -> ClosedForm | str:
@@ -72,15 +80,18 @@ class ClosedForm:
         return self.form.build(self.form.links, ARRAYS)
 
     @cached_property
-    def _usual(self) -> Code:
-        return self._written(thorough=False)
+    def _solve(self) -> Code:
+        return one_pose(self.chain, self.form, is_reversed=self.is_reversed)
 
-    @cached_property
-    def _thorough(self) -> Code:
-        return self._written(thorough=True)
+    def __post_init__(self) -> None:
+        # An attribute that is found faster than a cached property.
+        object.__setattr__(self, "_solve_pose", self._first_pose)
 
-    def _written(self, *, thorough: bool) -> Code:
-        return one_pose(self.chain, self.form, is_reversed=self.is_reversed, thorough=thorough)
+    def _first_pose(self, pose: Sequence[float]) -> list[tuple[float, ...]] | None:
+        code = one_pose(self.chain, self.form, is_reversed=self.is_reversed, checks=True)
+        object.__setattr__(self, "_solve_pose", code)
+        found: list[tuple[float, ...]] | None = code(pose)
+        return found
 
     def solve(self, T: FloatArray, free: Sequence[float] | None = None) -> list[tuple[float, ...]]:
         """Return the joint angles of all branches for the pose `T` (4, 4), without checks.
@@ -89,14 +100,15 @@ class ClosedForm:
         leaves them free; None for zeros. Each angle is in the turn inside its limits if there is
         one, else in [-pi, pi].
         """
-        return self._solved(T.tolist(), free)
+        return self._solved(T.ravel().tolist(), free)
 
-    def _solved(self, rows: Rows, free: Sequence[float] | None) -> list[tuple[float, ...]]:
+    def _solved(
+        self, pose: Sequence[float], free: Sequence[float] | None
+    ) -> list[tuple[float, ...]]:
         alpha = shift = self.form.links.shift
         if free is not None:
             alpha = tuple(map(float.__add__, free[::-1] if self.is_reversed else free, shift))
-        # The usual function is a tenth faster. It returns None for few poses.
-        found: list[tuple[float, ...]] = self._usual(rows, alpha) or self._thorough(rows, alpha)
+        found: list[tuple[float, ...]] = self._solve(pose, alpha)
         return found
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Postures:
@@ -106,14 +118,22 @@ class ClosedForm:
         point, or the wrist's centre, nearest along the links. Their errors give the difference.
         Two branches coincide where they meet.
         """
-        rows = se3.validated_rows(T)
-        if q_hint is None:
-            return Postures(self.chain, rows, self._solved(rows, None), self.branches)
-        hint = self.chain.check_q(q_hint)
-        found = self._solved(rows, hint.tolist())
-        if (self.chain.upper - self.chain.lower > math.tau).any():
-            found = [tuple(nearest_turn(self.chain, np.array(q), hint).tolist()) for q in found]
-        return Postures(self.chain, rows, found, self.branches)
+        found = Postures()
+        found.solver = self
+        if q_hint is None and type(T) is _ARRAY and T.dtype is _FLOAT and T.shape == (4, 4):
+            # One function checks the pose and solves it.
+            pose = _NUMBERS(T.tobytes())
+            angles = self._solve_pose(pose)
+            if angles is not None:
+                found.pose, found.angles = pose, angles
+                return found
+        pose = tuple(itertools.chain.from_iterable(se3.validated_rows(T)))
+        hint = None if q_hint is None else self.chain.check_q(q_hint)
+        angles = self._solved(pose, None if hint is None else hint.tolist())
+        if hint is not None and (self.chain.upper - self.chain.lower > math.tau).any():
+            angles = [tuple(nearest_turn(self.chain, np.array(q), hint).tolist()) for q in angles]
+        found.pose, found.angles = pose, angles
+        return found
 
     def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
         """Return the joint angles (N, branches, n) [rad] for poses `T` (N, 4, 4) [m].
@@ -133,7 +153,7 @@ class ClosedForm:
             # Where axes 4 and 6 are in line, case distinctions keep axis 4 in reach.
             in_line = (np.abs(np.sin(alpha[:, 4])) < LOOSE).any(axis=0)
             for number in np.flatnonzero(in_line).tolist():
-                q[number] = self._thorough(poses[number].tolist(), shift)
+                q[number] = self._solve(poses[number].ravel().tolist(), shift)
         return q
 
 

@@ -23,6 +23,9 @@ FREE: Final = 1e-13
 """[1] or [m] Distance from an axis below which the turn about it is free. Any turn then
 displaces the tool by less than rounding and the length of an arm."""
 
+DISTINCT: Final = 0.01
+"""[1] Sine of the angle between two axes above which each of their turns is known to 1e-14 rad."""
+
 
 class Operations(NamedTuple):
     """The functions of `math` or of numpy that the formulas use.
@@ -34,16 +37,19 @@ class Operations(NamedTuple):
         bounded: the nearest number in [-1, 1].
         rarely: (condition, function, arguments, usual) to function(*arguments) in the rare case in
             which the condition holds, else ``usual``. Arrays always have ``usual``.
+        quickly: (condition, quick, careful) to quick() where the condition holds, else careful(),
+            which is always right. Arrays always have careful().
     """
 
     atan2: Callable[[Number, Number], Number]
-    hypot: Callable[[Number, Number], Number]
+    hypot: Callable[..., Number]
     cos: Callable[[Number], Number]
     sin: Callable[[Number], Number]
     root: Callable[[Number], Number]
     select: Callable[[Number, Number, Number], Number]
     bounded: Callable[[Number], Number]
     rarely: Callable[[Number, Callable[..., Numbers], tuple[Number, ...], Numbers], Numbers]
+    quickly: Callable[[Number, Callable[[], Numbers], Callable[[], Numbers]], Numbers]
 
 
 def _root(x: float) -> float:
@@ -67,6 +73,7 @@ FLOATS: Final = Operations(
     _select,
     _bounded,
     lambda condition, function, arguments, usual: function(*arguments) if condition else usual,
+    lambda condition, quick, careful: quick() if condition else careful(),
 )
 
 ARRAYS: Final = Operations(
@@ -78,6 +85,7 @@ ARRAYS: Final = Operations(
     np.where,
     lambda x: np.clip(x, -1.0, 1.0),
     lambda _condition, _function, _arguments, usual: usual,
+    lambda _condition, _quick, careful: careful(),
 )
 
 Facing = tuple[tuple[Number, Number, Number], tuple[Number, Number, Number]]
@@ -94,12 +102,17 @@ def facing(f: Operations) -> Callable[[Number, Number, Number, Number], Facing]:
 
     def turns(x: Number, y: Number, d: Number, free: Number) -> Facing:
         rho = hypot(x, y)
-        on_axis = rho <= FREE
-        scale = 1.0 / select(on_axis, 1.0, rho)
-        x, y = select(on_axis, cos(free), x * scale), select(on_axis, sin(free), y * scale)
-        sine = bounded(d * scale)
+
+        def near() -> Numbers:
+            on_axis = rho <= FREE
+            scale = select(on_axis, 1.0, rho)
+            along = select(on_axis, cos(free), x / scale), select(on_axis, sin(free), y / scale)
+            return *along, d / scale
+
+        cx, cy, sine = f.quickly(rho > FREE, lambda: (x / rho, y / rho, d / rho), near)
+        sine = bounded(sine)
         cosine = root((1.0 - sine) * (1.0 + sine))
-        xc, yc, xs, ys = x * cosine, y * cosine, x * sine, y * sine
+        xc, yc, xs, ys = cx * cosine, cy * cosine, cx * sine, cy * sine
         ahead = rho * cosine
         return (xc + ys, yc - xs, ahead), (ys - xc, -yc - xs, -ahead)
 
@@ -108,24 +121,25 @@ def facing(f: Operations) -> Callable[[Number, Number, Number, Number], Facing]:
 
 def two_links(
     f: Operations, l1: float, l2: float
-) -> Callable[[Number, Number], tuple[Number, Number, Number]]:
+) -> Callable[[Number, Number], tuple[Number, Number, Number, Number]]:
     """Return a function for two links [m] that bring their end to (u, v) in a plane.
 
     It returns (towards, beside, bend) [rad]: the first link is at towards - beside with the second
     turned by +bend, or at towards + beside with -bend. Subproblems 3 and 1 by the law of cosines;
     its differences of squares are factored, so that no digits are lost where the links are
-    stretched or folded. Out of reach the links point at (u, v), or away from it.
+    stretched or folded. Out of reach the links point at (u, v), or away from it. The last number
+    is then negative, and 0 where the links are stretched or folded.
     """
     far, near = l1 + l2, abs(l1 - l2)
-    squares = (l1 - l2) * far
+    less, squares = (l1 - l2) * far, l1 * l1 + l2 * l2
     atan2, root, hypot = f.atan2, f.root, f.hypot
 
-    def bent(u: Number, v: Number) -> tuple[Number, Number, Number]:
+    def bent(u: Number, v: Number) -> tuple[Number, Number, Number, Number]:
         rho = hypot(u, v)
         stretched, folded = (far - rho) * (far + rho), (rho - near) * (rho + near)
-        sine = root(stretched * folded)
-        beside = atan2(sine, rho * rho + squares)
-        return atan2(v, u), beside, atan2(2.0 * sine, folded - stretched)
+        square = stretched * folded
+        sine, size = root(square), rho * rho
+        return atan2(v, u), atan2(sine, size + less), atan2(sine, size - squares), square
 
     return bent
 
@@ -134,26 +148,26 @@ Turns = tuple[Number, Number, Number, Number, Number]
 Row = tuple[Number, Number, Number]
 
 
-def three_turns(f: Operations, t: float, t2: float) -> Callable[..., tuple[Turns, Turns, Number]]:
+def three_turns(
+    f: Operations, t: float, t2: float, *, frees_last: bool = False
+) -> Callable[[Row, Row, Row, Number], tuple[Turns, Turns, Number]]:
     """Return a function that splits a rotation Q into Rz(a) Rx(t) Rz(b) Rx(t2) Rz(c).
 
-    It takes the first two rows of Q, the ends of its third row, and ``free`` [rad], the angle a
-    where Q leaves only the sum of a and c. It returns (a, b, c, cos a, sin a) twice, first
-    with sin b >= 0, and the sine of the angle between the outer axes, which is 0 in that singular
-    case. b is the angle of the spherical triangle with the sides t, t2 and the angle between the
-    outer axes (subproblem 4 on directions); a turns the inner axes into place, and c is what is
-    left (subproblem 1).
+    It takes the rows of Q, and ``free`` [rad], the angle a, or c if ``frees_last``, where Q leaves
+    only the sum or the difference of both. It returns (a, b, c, cos a, sin a) twice, first with
+    sin b >= 0, and the sine of the angle between the outer axes, which is 0 in that singular case.
+    b is the angle of the spherical triangle with the sides t, t2 and the angle between the outer
+    axes (subproblem 4 on directions); a turns the inner axes into place, and c is what is left
+    (subproblem 1).
     """
     (s, c), (s2, c2) = sine_and_cosine(t), sine_and_cosine(t2)
     if c == c2 == 0.0:
-        return _square_turns(f, s, s2)
+        return _square_turns(f, s, s2, frees_last=frees_last)
     atan2, hypot, root, select, cos, sin = f.atan2, f.hypot, f.root, f.select, f.cos, f.sin
     total, rest, sign = 0.5 * (t + t2), 0.5 * (t - t2), math.copysign(1.0, s * s2)
 
-    def split(
-        first: Row, second: Row, q31: Number, q33: Number, free: Number
-    ) -> tuple[Turns, Turns, Number]:
-        (q11, _, q13), (q21, _, q23) = first, second
+    def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
+        (q11, _, q13), (q21, _, q23), (q31, _, q33) = first, second, third
         radius = hypot(q13, q23)
         half = 0.5 * atan2(radius, q33)
         sine = root(sign * sin(total + half) * sin(total - half))
@@ -162,37 +176,62 @@ def three_turns(f: Operations, t: float, t2: float) -> Callable[..., tuple[Turns
         for signed in (sine, -sine):
             b = 2.0 * atan2(signed, cosine)
             cb, sb = cos(b), sin(b)
+
+            def left(ca: Number, sa: Number, cb: Number = cb, sb: Number = sb) -> Number:
+                x, y = ca * q11 + sa * q21, ca * q21 - sa * q11
+                y, z = c * y + s * q31, c * q31 - s * y
+                x, y = cb * x + sb * y, cb * y - sb * x
+                return atan2(c2 * y + s2 * z, x)
+
             a = atan2(q23, q13) - atan2(-c * s2 * cb - s * c2, s2 * sb)
-            a = select(radius <= FREE, free, a)
-            ca, sa = cos(a), sin(a)
-            x, y = ca * q11 + sa * q21, ca * q21 - sa * q11
-            y, z = c * y + s * q31, c * q31 - s * y
-            x, y = cb * x + sb * y, cb * y - sb * x
-            found.append((a, b, atan2(c2 * y + s2 * z, x), ca, sa))
+            taken = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
+            a = select(radius <= FREE, taken, a)
+            found.append((a, b, left(cos(a), sin(a)), cos(a), sin(a)))
         return found[0], found[1], radius
 
     return split
 
 
-def _square_turns(f: Operations, s: float, s2: float) -> Callable[..., tuple[Turns, Turns, Number]]:
+def _first(f: Operations, q33: Number, total: Number, last: Number) -> Number:
+    """Return the first of two turns about axes in line; ``total`` is the ``last`` without it."""
+    return f.select(q33 > 0.0, total - last, last - total)
+
+
+def _square_turns(
+    f: Operations, s: float, s2: float, *, frees_last: bool
+) -> Callable[[Row, Row, Row, Number], tuple[Turns, Turns, Number]]:
     """Return `three_turns` for twists of a quarter turn, with sines ``s`` and ``s2``.
 
-    The second row of Rz(-a) Q is then -s s2 (sin c, cos c, 0), and its first row ends in s2 sin b.
+    The last column of Q is then (s2 cos a sin b, s2 sin a sin b, -s s2 cos b), and its last row
+    begins with s sin b (cos c, -sin c). Where sin b is small, c follows from what Rz(-a) leaves of
+    Q: its second row is -s s2 (sin c, cos c, 0).
     """
     atan2, hypot, select, cos, sin = f.atan2, f.hypot, f.select, f.cos, f.sin
     sign = -s * s2
     pi = math.pi
 
-    def split(
-        first: Row, second: Row, _: Number, q33: Number, free: Number
-    ) -> tuple[Turns, Turns, Number]:
-        (q11, q12, q13), (q21, q22, q23) = first, second
+    def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
+        (q11, q12, q13), (q21, q22, q23), (q31, q32, q33) = first, second, third
         radius = hypot(q13, q23)
-        is_free = radius <= FREE
-        scale = s2 / select(is_free, 1.0, radius)
-        ca, sa = select(is_free, cos(free), scale * q13), select(is_free, sin(free), scale * q23)
-        a, b = atan2(sa, ca), atan2(radius, sign * q33)
-        c = atan2(sign * (ca * q21 - sa * q11), sign * (ca * q22 - sa * q12))
+
+        def apart() -> Numbers:
+            a, c = atan2(s2 * q23, s2 * q13), atan2(-s * q32, s * q31)
+            return a, c, s2 * q13 / radius, s2 * q23 / radius
+
+        def left(ca: Number, sa: Number) -> Number:
+            return atan2(sign * (ca * q21 - sa * q11), sign * (ca * q22 - sa * q12))
+
+        def near() -> Numbers:
+            # Of a direction any length gives the angles.
+            is_free = radius <= FREE
+            taken = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
+            x = select(is_free, cos(taken), s2 * q13)
+            y = select(is_free, sin(taken), s2 * q23)
+            length = select(is_free, 1.0, radius)
+            return atan2(y, x), left(x, y), x / length, y / length
+
+        a, c, ca, sa = f.quickly(radius > DISTINCT, apart, near)
+        b = atan2(radius, sign * q33)
         return (a, b, c, ca, sa), (a + pi, -b, c + pi, -ca, -sa), radius
 
     return split

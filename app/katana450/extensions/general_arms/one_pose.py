@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 from katana450 import tolerances
 from katana450.extensions.general_arms.form import Form
 from katana450.extensions.general_arms.functions import Number
 from katana450.extensions.general_arms.straight_line import Code, TermList
+from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 
@@ -16,17 +18,22 @@ Matrix = Sequence[Sequence[Number]]
 INPUTS = (("r11", "r12", "r13", "x"), ("r21", "r22", "r23", "y"), ("r31", "r32", "r33", "z"))
 """Names of the numbers of a pose."""
 
+LAST = ("o1", "o2", "o3", "one")
+"""Names of the numbers in its last row."""
 
-def one_pose(chain: Chain, form: Form, *, is_reversed: bool, thorough: bool) -> Code:
-    """Return solve(rows, free): the joint angles [rad] of all branches.
 
-    ``rows`` is T_S_tool (4, 4) as nested lists, and ``free`` (n,) the canonical angles [rad] that
-    are taken where the pose leaves them free. Each angle is in the turn inside its limits if there
-    is one, else in [-pi, pi]. Unless it is ``thorough``, the function returns None where the
-    formulas distinguish rare cases.
+def one_pose(chain: Chain, form: Form, *, is_reversed: bool, checks: bool = False) -> Code:
+    """Return solve(pose, free): the joint angles [rad] of all branches.
+
+    ``pose`` are the 16 numbers of T_S_tool, row by row, and ``free`` (n,) the canonical angles
+    [rad] that are taken where the pose leaves them free; zero joint angles by default. Each angle
+    is in the turn inside its limits if there is one, else in [-pi, pi]. If it ``checks``, the
+    function returns None for numbers that are no pose to within double precision.
     """
-    terms = TermList(thorough=thorough)
+    terms = TermList()
     rows: Matrix = [[terms.term(name) for name in names] for names in INPUTS]
+    if checks:
+        terms.require(*_is_clean(terms, rows))
     if is_reversed:
         rows = _inverse(rows)
     free = [terms.term(f"free[{k}]") for k in range(chain.n)]
@@ -38,8 +45,27 @@ def one_pose(chain: Chain, form: Form, *, is_reversed: bool, thorough: bool) -> 
         [terms.turned(alpha[k] - shift[k], lower, upper) for k, lower, upper in joints]
         for alpha in found
     ]
-    inputs = ", ".join(f"({', '.join(names)})" for names in INPUTS)
-    return terms.compiled(f"{inputs}, _ = rows", outputs)
+    inputs = ", ".join(itertools.chain(*INPUTS, LAST))
+    return terms.compiled(f"{inputs} = pose", outputs, shift)
+
+
+def _is_clean(terms: TermList, rows: Matrix) -> list[Number]:
+    """Return conditions under which `se3.validated_rows` corrects nothing.
+
+    Few poses are refused that it accepts: those that are farther away than any arm reaches.
+    """
+    hypot = terms.operations().hypot
+    (a, b, c, x), (d, e, f, y), (g, h, i, z) = rows
+    misfit = hypot(
+        a * a + d * d + g * g - 1.0,
+        b * b + e * e + h * h - 1.0,
+        a * b + d * e + g * h,
+        d * h - g * e - c,
+        g * b - a * h - f,
+        a * e - d * b - i,
+    )
+    last = terms.term("(not ({0} or {1} or {2}) and {3} == 1.0)", *map(terms.term, LAST))
+    return [misfit <= se3.MISFITS_EXACT, x * x + y * y + z * z <= tolerances.FARTHEST, last]
 
 
 def _inner(form: Form, rows: Matrix) -> Matrix:

@@ -32,6 +32,7 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.extensions.general_arms.functions import (
+    FLOATS,
     FREE,
     Number,
     Operations,
@@ -65,7 +66,8 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
     height = links.d[1] + flip2 * (links.d[2] + flip3 * (links.d[3] + c4 * d5))
     ex, ey = links.a[3], -flip * s4 * d5
     turns, bent = facing(f), two_links(f, links.a[1], links.a[2])
-    split = three_turns(f, links.t[3] + (0.0 if flip > 0.0 else math.pi), links.t[4])
+    t4 = links.t[3] + (0.0 if flip > 0.0 else math.pi)
+    split = three_turns(f, t4, links.t[4], frees_last=True)
     loosened = _loosened(links.a[1], links.a[2], ex, ey)
     atan2 = f.atan2
 
@@ -80,17 +82,23 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
             m11, m12, m13 = c * r11 + s * r21, c * r12 + s * r22, c * r13 + s * r23
             m31, m32, m33 = c * r21 - s * r11, c * r22 - s * r12, c * r23 - s * r13
             m21, m22, m23 = c1 * m31 + s1 * r31, c1 * m32 + s1 * r32, c1 * m33 + s1 * r33
-            m31, m33 = c1 * r31 - s1 * m31, c1 * r33 - s1 * m33
-            first, second, radius = split((m11, m12, m13), (m21, m22, m23), m31, m33, 0.0)
+            m31, m32, m33 = c1 * r31 - s1 * m31, c1 * r32 - s1 * m32, c1 * r33 - s1 * m33
+            first, second, radius = split(
+                (m11, m12, m13), (m21, m22, m23), (m31, m32, m33), free[5]
+            )
             u, v = ahead - a1, up
             for psi, five, six, cp, sp in (first, second):
-                psi, six, cp, sp = f.rarely(  # noqa: PLW2901
-                    radius <= LOOSE,
+                wx, wy = u - ex * cp + ey * sp, v - ex * sp - ey * cp
+                towards, opening, bend, square = bent(wx, wy)
+                moved = radius * f.sin(0.5 * (six - free[5]))
+                # Up to FREE alpha6 has the wanted angle already.
+                is_held = (radius > FREE) & (moved * moved <= 0.25 * HELD * HELD)
+                psi, six, towards, opening, bend = f.rarely(  # noqa: PLW2901
+                    (radius <= LOOSE) & ((square <= 0.0) | is_held),
                     loosened,
-                    (u, v, psi, six, free[5], radius, m33),
-                    (psi, six, cp, sp),
+                    (u, v, wx, wy, psi, six, free[5], f.select(m33 < 0.0, -radius, radius)),
+                    (psi, six, towards, opening, bend),
                 )
-                towards, opening, bend = bent(u - ex * cp + ey * sp, v - ex * sp - ey * cp)
                 for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
                     four = flip * (psi - two - bend_)
                     found.append((one, two, flip2 * bend_, four, five, six))
@@ -102,37 +110,49 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
 def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple[float, ...]]:
     """Return a function for psi and alpha6 [rad] where axes 4 and 6 are nearly in line.
 
-    It also returns the cosine and sine of psi.
-
     Of all turns that keep their sum, or difference, and turn the tool by less than HELD, it
     takes the one with alpha6 at the wanted angle, else the given one, and of these the nearest that
     keeps axis 4 in reach. Axis 4 lies at (u, v) less (ex, ey) turned by psi, and must be l1 - l2 to
-    l1 + l2 away: the law of cosines bounds the angle between the two vectors, subproblem 3.
+    l1 + l2 away: the law of cosines gives the angle between the two vectors there, subproblem 3.
+    ``radius`` is the sine of the angle between the two axes, and negative if they are opposed. The
+    function also returns the angles of `two_links`, which are stretched or folded there.
     """
+    bent = two_links(FLOATS, l1, l2)
     e, start = math.hypot(ex, ey), math.atan2(ey, ex)
     far, near = (l1 + l2) ** 2, (l1 - l2) ** 2
+    stretched, folded = (0.0, 0.0), (0.0 if l1 >= l2 else math.pi, math.pi)
 
     def loosened(
-        u: float, v: float, psi: float, six: float, free: float, radius: float, aligned: float
+        u: float,
+        v: float,
+        wx: float,
+        wy: float,
+        psi: float,
+        six: float,
+        free: float,
+        radius: float,
     ) -> tuple[float, ...]:
-        side = 1.0 if aligned >= 0.0 else -1.0
-        for wanted in (psi + side * (six - free), psi):
-            turn = wrapped(nearest(u, v, wanted) - psi)
+        side, radius = math.copysign(1.0, radius), abs(radius)
+        turn = 0.0 if radius <= FREE else math.remainder(six - free, math.tau)
+        if turn and radius * abs(turn) <= HELD:
+            psi, six = psi + side * turn, six - turn
+            c, s = math.cos(psi), math.sin(psi)
+            wx, wy = u - ex * c + ey * s, v - ex * s - ey * c
+        square = wx * wx + wy * wy
+        if near < square < far:
+            return wrapped(psi), wrapped(six), *bent(wx, wy)[:3]
+        g = math.hypot(u, v)
+        if e * g > FREE:
+            away = math.remainder(psi - math.atan2(v, u) + start, math.tau)
+            cosine = 0.5 * (g * g + e * e - (far if square >= far else near)) / (e * g)
+            angle = math.acos(-1.0 if cosine < -1.0 else 1.0 if cosine > 1.0 else cosine)
+            turn = (angle if away >= 0.0 else -angle) - away
             if radius <= FREE or radius * abs(turn) <= HELD:
                 psi, six = psi + turn, six - side * turn
-                break
-        return psi, six, math.cos(psi), math.sin(psi)
-
-    def nearest(u: float, v: float, wanted: float) -> float:
-        g = math.hypot(u, v)
-        if e * g <= FREE:
-            return wanted
-        middle = math.atan2(v, u) - start
-        away = wrapped(wanted - middle)
-        square, scale = g * g + e * e, 0.5 / (e * g)
-        least = math.acos(max(min((square - near) * scale, 1.0), -1.0))
-        most = math.acos(max(min((square - far) * scale, 1.0), -1.0))
-        return middle + math.copysign(min(max(abs(away), least), most), away)
+                c, s = math.cos(psi), math.sin(psi)
+                wx, wy = u - ex * c + ey * s, v - ex * s - ey * c
+        bend = stretched if square >= far else folded
+        return wrapped(psi), wrapped(six), math.atan2(wy, wx), *bend
 
     return loosened
 
@@ -168,7 +188,8 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
             one = atan2(s, c)
             m11, m21 = c * r11 + s * r21, c1 * (c * r21 - s * r11) + s1 * r31
             psi = f.select(hypot(m11, m21) <= FREE, 0.0, atan2(m21, m11))
-            towards, opening, bend = bent(ahead - a1 - length * cos(psi), up - length * sin(psi))
+            u, v = ahead - a1 - length * cos(psi), up - length * sin(psi)
+            towards, opening, bend, _ = bent(u, v)
             for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
                 found.append((one, two, flip2 * bend_, flip * (psi - two - bend_)))
         return found

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final, overload
+from typing import Final, Protocol, overload
 
 import numpy as np
 
 from katana450 import tolerances
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.geometry.se3 import Rows
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 
@@ -96,35 +95,44 @@ class GeneralPosture:
         return f"GeneralPosture(angles={self.angles}, branch={self.branch!r})"
 
 
+class Branched(Protocol):
+    """A solver of a chain with named branches."""
+
+    @property
+    def chain(self) -> Chain:
+        """The chain."""
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """Names of the branches, in the order of the solutions."""
+
+
 class Postures(Sequence[GeneralPosture]):
     """The postures of one pose in the order of the branches, created on first access."""
 
-    __slots__ = ("_angles", "_branches", "_chain", "_made", "_rows")
+    __slots__ = ("_made", "angles", "pose", "solver")
 
-    def __init__(
-        self,
-        chain: Chain,
-        rows: Rows,
-        angles: Sequence[tuple[float, ...]],
-        branches: Sequence[str],
-    ) -> None:
-        self._chain = chain
-        self._rows = rows
-        self._angles = angles
-        self._branches = branches
-        self._made: tuple[GeneralPosture, ...] | None = None
+    # Set by `ClosedForm.inverse` without a constructor, which would take a tenth of its time.
+    solver: Branched
+    pose: Sequence[float]
+    """The numbers of T_S_tool (4, 4), row by row."""
+    angles: Sequence[tuple[float, ...]]
+    """The joint angles [rad] of each branch."""
+    _made: tuple[GeneralPosture, ...]
 
     def _all(self) -> tuple[GeneralPosture, ...]:
-        if self._made is None:
-            T = np.array(self._rows)
-            self._made = tuple(
-                GeneralPosture(self._chain, T, angles, branch)
-                for angles, branch in zip(self._angles, self._branches, strict=True)
-            )
+        try:
+            return self._made
+        except AttributeError:
+            T = np.array(self.pose).reshape(4, 4)
+        self._made = tuple(
+            GeneralPosture(self.solver.chain, T, angles, branch)
+            for angles, branch in zip(self.angles, self.solver.branches, strict=True)
+        )
         return self._made
 
     def __len__(self) -> int:
-        return len(self._angles)
+        return len(self.angles)
 
     @overload
     def __getitem__(self, index: int) -> GeneralPosture: ...

@@ -78,7 +78,7 @@ def parallel_shoulder(links: DHLinks, f: Operations) -> Solve:
         found = []
         for c, s, ahead in turns(x, y, beside, free[0]):
             one = atan2(s, c)
-            towards, opening, bend = bent(ahead - a1, up)
+            towards, opening, bend, _ = bent(ahead - a1, up)
             m11, m12, m13 = c * r11 + s * r21, c * r12 + s * r22, c * r13 + s * r23
             m31, m32, m33 = c * r21 - s * r11, c * r22 - s * r12, c * r23 - s * r13
             m21, m22, m23 = c1 * m31 + s1 * r31, c1 * m32 + s1 * r32, c1 * m33 + s1 * r33
@@ -91,8 +91,7 @@ def parallel_shoulder(links: DHLinks, f: Operations) -> Solve:
                 first, second, _ = split(
                     (cb * m11 + sb * m21, cb * m12 + sb * m22, cb * m13 + sb * m23),
                     (ct * n21 + e1, ct * n22 + e2, ct * n23 + e3),
-                    ct * m31 - st * n21,
-                    ct * m33 - st * n23,
+                    (ct * m31 - st * n21, ct * m32 - st * n22, ct * m33 - st * n23),
                     free4,
                 )
                 three = flip * bend_ - bearing
@@ -167,8 +166,9 @@ def crossing_shoulder(
                     n3 = g13 * m1 + g23 * m2 + g33 * m3
                     n1, n2 = ct * n1 + st * n2, ct * n2 - st * n1
                     q.append((n1, c3 * n2 + s3 * n3, c3 * n3 - s3 * n2))
-                (q11, q21, q31), (q12, q22, _), (q13, q23, q33) = q
-                for a, b, c6, _, _ in split((q11, q12, q13), (q21, q22, q23), q31, q33, free4)[:2]:
+                (q11, q21, q31), (q12, q22, q32), (q13, q23, q33) = q
+                wrist = split((q11, q12, q13), (q21, q22, q23), (q31, q32, q33), free4)
+                for a, b, c6, _, _ in wrist[:2]:
                     found.append((one, two, three, a, b, c6))
         return found
 

@@ -1,4 +1,4 @@
-"""The formulas of a closed form written out for one arm, as one straight line of Python.
+"""The formulas of a closed form written out for one arm, as one Python function without calls.
 
 The formulas run once with terms in place of numbers, and the terms become the text of a function.
 Products with 0 and 1 vanish, loops and calls are unrolled, equal terms are computed once, and of
@@ -15,165 +15,135 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from katana450 import tolerances
-from katana450.extensions.general_arms.functions import FLOATS, Number, Operations
-from katana450.maths.kinematics.turns import in_turn
+from katana450.extensions.general_arms.function_text import FunctionText
+from katana450.extensions.general_arms.functions import FLOATS, Number, Numbers, Operations
+from katana450.extensions.general_arms.term import (
+    LESS,
+    MINUS,
+    NO_SPAN,
+    PLUS,
+    Fork,
+    Need,
+    Span,
+    Term,
+    TermBlock,
+    has,
+    span_of,
+)
+from katana450.maths.kinematics.turns import in_turn, wrapped
 
-Code = Callable[[Sequence[Any], Sequence[float]], Any]
-"""A function of inputs and of free angles [rad]."""
+Code = Callable[..., Any]
+"""A function of inputs, and of free angles [rad]."""
 
 NAMES: Final[dict[str, Any]] = {
     **{name: getattr(math, name) for name in ("atan2", "cos", "hypot", "remainder", "sin", "sqrt")},
     "in_turn": in_turn,
-    "pi": math.pi,
-    "tau": math.tau,
 }
-"""Functions and numbers that the text uses."""
+"""Functions that the text uses."""
 
-PLUS, LESS, MINUS = "({0} + {1})", "({0} - {1})", "(-{0})"
+ATAN2: Final = "atan2({0}, {1})"
+PI, TAU = repr(math.pi), repr(math.tau)
+THREE_HALVES: Final = 3.0 * math.pi + 1e-14
+NEXT: Final = f"({{0}} - {TAU} if {{0}} > {PI} else {{0}} + {TAU} if {{0}} < -{PI} else {{0}})"
+NEAREST: Final = (
+    f"({{0}} if -{PI} <= {{0}} <= {PI} else {{0}} - {TAU} if 0.0 < {{0}} <= {3.0 * math.pi!r} "
+    f"else {{0}} + {TAU} if -{3.0 * math.pi!r} <= {{0}} < 0.0 else remainder({{0}}, {TAU}))"
+)
+"""Angles in a turn: of an angle that is one turn away at most, and of any."""
 
-Span = tuple[float, float]
-
-NO_SPAN: Final[Span] = (-math.inf, math.inf)
+QUARTER: Final = 0.5 * math.pi
+HALF: Final[Span] = (0.0, math.pi)
+TURN: Final[Span] = (-math.pi, math.pi)
 
 ROUNDED: Final = 1e-14
 """[rad] Distance from the end of a turn that is only rounding."""
 
 
-class Term:
-    """A number that the function computes.
-
-    Attributes:
-        owner: list of all terms of the function.
-        text: its text with a place for each argument.
-        arguments: terms and numbers.
-        number: counts the terms.
-        span: between which numbers it lies.
-    """
-
-    # numpy leaves products with its numbers to this class.
-    __array_ufunc__ = None
-    __slots__ = ("arguments", "number", "owner", "span", "text")
-
-    def __init__(
-        self, owner: TermList, text: str, arguments: tuple[Number, ...], number: int, span: Span
-    ) -> None:
-        self.owner = owner
-        self.text = text
-        self.arguments = arguments
-        self.number = number
-        self.span = span
-
-    def __add__(self, other: Number) -> Number:
-        if _is(other, 0.0):
-            return self
-        if _has(other, MINUS):
-            return self - other.arguments[0]
-        (a, b), (c, d) = self.span, _span(other)
-        return self.owner.term(PLUS, self, other, span=(a + c, b + d))
-
-    def __radd__(self, other: Number) -> Number:
-        return self + other
-
-    def __sub__(self, other: Number) -> Number:
-        if _is(other, 0.0):
-            return self
-        if _has(other, MINUS):
-            return self + other.arguments[0]
-        (a, b), (c, d) = self.span, _span(other)
-        return self.owner.term(LESS, self, other, span=(a - d, b - c))
-
-    def __rsub__(self, other: Number) -> Number:
-        if other == 0.0:
-            return -self
-        a, b = self.span
-        return self.owner.term(LESS, other, self, span=(other - b, other - a))
-
-    def __mul__(self, other: Number) -> Number:
-        if not isinstance(other, Term):
-            return other * self
-        if self.text == MINUS:
-            return -(self.arguments[0] * other)
-        if other.text == MINUS:
-            return -(self * other.arguments[0])
-        return self.owner.term("({0} * {1})", self, other)
-
-    def __rmul__(self, other: Number) -> Number:
-        if other == 0.0:
-            return 0.0
-        if abs(other) == 1.0:
-            return self if other > 0.0 else -self
-        if self.text == MINUS:
-            return -other * self.arguments[0]
-        a, b = sorted((other * self.span[0], other * self.span[1]))
-        return self.owner.term("({0} * {1})", other, self, span=(a, b))
-
-    def __truediv__(self, other: Number) -> Number:
-        return self.owner.term("({0} / {1})", self, other)
-
-    def __rtruediv__(self, other: Number) -> Number:
-        return self.owner.term("({0} / {1})", other, self)
-
-    def __neg__(self) -> Number:
-        if self.text == MINUS:
-            return self.arguments[0]
-        if self.text == LESS:
-            first, second = self.arguments
-            return second - first
-        return self.owner.term(MINUS, self, span=(-self.span[1], -self.span[0]))
-
-    def __le__(self, other: Number) -> Number:
-        return self.owner.term("({0} <= {1})", self, other)
-
-    def __lt__(self, other: Number) -> Number:
-        return self.owner.term("({0} < {1})", self, other)
-
-    def __gt__(self, other: Number) -> Number:
-        return self.owner.term("({0} > {1})", self, other)
-
-
-def _is(value: Number, number: float) -> bool:
-    return not isinstance(value, Term) and bool(value == number)
-
-
-def _has(value: Number, text: str) -> bool:
-    return isinstance(value, Term) and value.text == text
-
-
-def _span(value: Number) -> Span:
-    return value.span if isinstance(value, Term) else (float(value), float(value))
-
-
 class TermList:
-    """The terms of one function, in the order in which they were made.
+    """The terms of one function, in the order in which they were made."""
 
-    ``thorough``: whether the function does what is rarely needed. Else it returns None there.
-    """
-
-    def __init__(self, *, thorough: bool = True) -> None:
-        self._thorough = thorough
-        self._terms: dict[tuple[object, ...], Term] = {}
-        self._rare: list[tuple[int, Term]] = []
+    def __init__(self) -> None:
+        self._blocks = [TermBlock()]
+        self._count = 0
         self._called: dict[str, Callable[..., tuple[float, ...]]] = {}
+        self._turned: dict[tuple[int, float], Term] = {}
 
     def term(self, text: str, *arguments: Number, span: Span = NO_SPAN) -> Term:
         """Return the term of ``text``; equal ones are the same object."""
         key = (text, *(id(each) if isinstance(each, Term) else each for each in arguments))
-        if key not in self._terms:
-            self._terms[key] = Term(self, text, arguments, len(self._terms), span)
-        return self._terms[key]
+        for block in self._blocks:
+            if key in block.known:
+                return block.known[key]
+        made = self._made(text, arguments, span)
+        self._blocks[-1].known[key] = made
+        self._blocks[-1].items.append(made)
+        return made
 
-    def turned(self, angle: Term, lower: float, upper: float) -> Term:
+    def _made(self, text: str, arguments: tuple[Number, ...], span: Span) -> Term:
+        self._count += 1
+        return Term(self, text, arguments, self._count, span)
+
+    def require(self, *conditions: Term) -> None:
+        """Let the function return None where one of the conditions does not hold."""
+        self._blocks[-1].items.append(Need(conditions))
+
+    def turned(self, angle: Number, lower: float, upper: float) -> Number:
         """Return ``angle`` [rad] in the turn inside its limits if there is one, else in a turn."""
+        return self._inside(self._in_turn(angle), lower, upper)
+
+    def _in_turn(self, angle: Number) -> Number:
+        if not isinstance(angle, Term):
+            return wrapped(angle)
+        sign, base, offset = _parts(angle)
+        if base.fork is not None and sign > 0.0:
+            return self._joined(base, offset)
+        quarters = round(offset / QUARTER)
+        if base.text == ATAN2 and abs(offset - quarters * QUARTER) < ROUNDED:
+            # A quarter turn is one of the direction, and costs nothing.
+            y, x = base.arguments
+            if base.span == HALF and quarters % 4 == 2:
+                return -sign * self.term(ATAN2, y, -x, span=HALF)
+            if base.span == TURN and sign > 0.0:
+                found = self.term(ATAN2, x, -y, span=TURN) if quarters % 2 else base
+                if quarters % 4 < 2:
+                    return found
+                return self.term(f"({{0}} - {PI} if {{0}} > 0.0 else {{0}} + {PI})", found)
         low, high = angle.span
-        turn = math.pi + ROUNDED
-        if -turn <= low and turn < high <= math.pi + math.tau:
-            angle = self.term("({0} if {0} <= pi else {0} - tau)", angle)
-        elif high <= turn and -math.pi - math.tau <= low < -turn:
-            angle = self.term("({0} if {0} >= -pi else {0} + tau)", angle)
-        elif low < -turn or high > turn:
-            angle = self.term("({0} if -pi <= {0} <= pi else remainder({0}, tau))", angle)
+        end, farthest = math.pi + ROUNDED, math.pi + math.tau + ROUNDED
+        if -end <= low and end < high <= farthest:
+            return self.term(f"({{0}} if {{0}} <= {PI} else {{0}} - {TAU})", angle)
+        if high <= end and -farthest <= low < -end:
+            return self.term(f"({{0}} if {{0}} >= -{PI} else {{0}} + {TAU})", angle)
+        if low < -end or high > end:
+            return self.term(NEXT if max(-low, high) <= THREE_HALVES else NEAREST, angle)
+        return angle
+
+    def _joined(self, base: Term, offset: float) -> Term:
+        """Return the angle ``base`` + ``offset`` [rad] in a turn, on both ways of its fork."""
+        key = (base.number, offset)
+        if key not in self._turned:
+            assert base.fork is not None
+            fork, place = base.fork
+            outside, values = self._blocks, []
+            for block, way in zip(fork.blocks, fork.values, strict=True):
+                self._blocks = [*fork.path, block]
+                values.append(self._in_turn(way[place] + offset))
+            self._blocks = outside
+            self._turned[key] = self._value(fork, *values)
+        return self._turned[key]
+
+    def _inside(self, angle: Term, lower: float, upper: float) -> Term:
         if not another_turn_helps(lower, upper):
             return angle
+        slack = tolerances.LIMIT_SLACK
+        # One comparison decides if the only other turn that can be inside is the next one.
+        is_low = lower <= slack - math.pi
+        if is_low and upper >= -math.pi:
+            end = max(upper + slack, lower - slack + math.tau)
+            return self.term(f"({{0}} if {{0}} <= {{1}} else {{0}} - {TAU})", angle, end)
+        if not is_low and lower <= math.pi:
+            end = min(lower - slack, upper + slack - math.tau)
+            return self.term(f"({{0}} if {{0}} >= {{1}} else {{0}} + {TAU})", angle, end)
         text = "({0} if {1} <= {0} <= {2} else in_turn({0}, {1}, {2}))"
         return self.term(text, angle, lower, upper)
 
@@ -181,18 +151,30 @@ class TermList:
         """Return the functions that make terms."""
         return Operations(
             self._atan2,
-            self._function("hypot", math.hypot, (0.0, math.inf)),
+            self._hypot,
             self._function("cos", math.cos, (-1.0, 1.0)),
             self._function("sin", math.sin, (-1.0, 1.0)),
             self._root,
             self._select,
             self._bounded,
             self._rarely,
+            self._quickly,
         )
 
     def _atan2(self, y: Number, x: Number) -> Number:
-        span = (0.0 if _span(y)[0] >= 0.0 else -math.pi, math.pi)
+        if has(y, MINUS) and has(x, MINUS):
+            # The opposite direction.
+            return self._atan2(-y, -x) + math.pi
+        span = (0.0 if span_of(y)[0] >= 0.0 else -math.pi, math.pi)
         return self._function("atan2", math.atan2, span)(y, x)
+
+    def _hypot(self, *sides: Number) -> Number:
+        """Return the root of the sum of squares, which of two sides is faster than `math.hypot`."""
+        if not any(isinstance(each, Term) for each in sides):
+            return math.hypot(*sides)
+        places = ", ".join(f"{{{k}}}" for k in range(len(sides)))
+        text = "sqrt({0} * {0} + {1} * {1})" if len(sides) == 2 else f"hypot({places})"
+        return self.term(text, *sides, span=(0.0, math.inf))
 
     def _root(self, x: Number) -> Number:
         if not isinstance(x, Term):
@@ -217,18 +199,58 @@ class TermList:
         arguments: tuple[Number, ...],
         usual: tuple[Number, ...],
     ) -> tuple[Number, ...]:
-        if not self._thorough:
-            if condition not in self._conditions:
-                self._rare.append((len(self._terms), condition))
-            return usual
         name = function.__name__
         self._called[name] = function
-        places = ", ".join(f"{{{k + 1}}}" for k in range(len(arguments)))
-        made = self.term(f"({name}({places}) if {{0}} else ())", condition, *arguments)
+
+        def called() -> Numbers:
+            places = ", ".join(f"{{{k}}}" for k in range(len(arguments)))
+            made = self.term(f"{name}({places})", *arguments)
+            # Where the usual value is an angle in a turn, so is this one.
+            spans = [
+                span if max(-span[0], span[1]) <= math.pi else NO_SPAN
+                for span in map(span_of, usual)
+            ]
+            return tuple(self.term(f"{{0}}[{k}]", made, span=span) for k, span in enumerate(spans))
+
+        return self._forked(condition, called, lambda: usual, rare=0)
+
+    def _quickly(
+        self, condition: Number, quick: Callable[[], Numbers], careful: Callable[[], Numbers]
+    ) -> Numbers:
+        return self._forked(condition, quick, careful, rare=1)
+
+    def _forked(
+        self,
+        condition: Number,
+        first: Callable[[], Numbers],
+        second: Callable[[], Numbers],
+        rare: int,
+    ) -> Numbers:
+        if not isinstance(condition, Term):
+            return first() if condition else second()
+        fork = Fork(condition, rare, tuple(self._blocks))
+        found = []
+        for block, function in zip(fork.blocks, (first, second), strict=True):
+            self._blocks.append(block)
+            found.append(function())
+            self._blocks.pop()
+        self._blocks[-1].items.append(fork)
         return tuple(
-            self.term(f"({{1}}[{k}] if {{0}} else {{2}})", condition, made, each)
-            for k, each in enumerate(usual)
+            a
+            if not isinstance(a, Term) and not isinstance(b, Term) and a == b
+            else self._value(fork, a, b)
+            for a, b in zip(*found, strict=True)
         )
+
+    def _value(self, fork: Fork, a: Number, b: Number) -> Term:
+        """Return the term that is ``a`` on one way of ``fork``, and ``b`` on the other."""
+        (low, high), (lower, upper) = span_of(a), span_of(b)
+        made = self._made("", (), (min(low, lower), max(high, upper)))
+        made.text, made.fork = f"t{made.number}", (fork, len(fork.terms))
+        fork.terms.append(made)
+        for values, each in zip(fork.values, (a, b), strict=True):
+            values.append(each)
+        return made
 
     def _function(
         self, name: str, function: Callable[..., float], span: Span
@@ -241,54 +263,40 @@ class TermList:
 
         return made
 
-    def compiled(self, inputs: str, outputs: Sequence[Sequence[Number]]) -> Code:
-        """Return the function of `text`."""
-        names = {**NAMES, **self._called}
+    def compiled(
+        self, inputs: str, outputs: Sequence[Sequence[Number]], free: Sequence[float] = ()
+    ) -> Code:
+        """Return the function of `text`, with ``free`` for the free angles by default."""
+        names = {**NAMES, **self._called, "usual": tuple(free)}
         exec(self.text(inputs, outputs), names)
         code: Code = names["solve"]
         return code
 
     def text(self, inputs: str, outputs: Sequence[Sequence[Number]]) -> str:
-        """Return the text of the function of (rows, free) for ``outputs``.
+        """Return the text of the function of (pose, free) for ``outputs``.
 
         ``inputs``: the statement that takes the inputs apart.
         """
-        uses = self._uses([*(each for values in outputs for each in values), *self._conditions])
-        written: dict[int, str] = {}
+        text = FunctionText(self._blocks[0], outputs)
+        tuples = ", ".join(f"({', '.join(map(text.of, each))},)" for each in outputs)
+        lines = ("def solve(pose, free=usual):", inputs, *text.lines, f"return [{tuples}]")
+        return "\n    ".join(lines)
 
-        def text_of(value: Number) -> str:
-            if not isinstance(value, Term):
-                return repr(float(value))
-            return written.get(value.number) or value.text.format(*map(text_of, value.arguments))
 
-        lines, rare = [inputs], list(self._rare)
-        for term in self._terms.values():
-            while rare and rare[0][0] <= term.number:
-                lines.append(f"if {text_of(rare.pop(0)[1])}: return None")
-            if uses.get(term.number, 0) > 1 and not _is_rarely_used(term):
-                lines.append(f"t{term.number} = {text_of(term)}")
-                written[term.number] = f"t{term.number}"
-        lines += [f"if {text_of(condition)}: return None" for _, condition in rare]
-        tuples = ", ".join(f"({', '.join(map(text_of, each))},)" for each in outputs)
-        lines.append(f"return [{tuples}]")
-        return "\n    ".join(("def solve(rows, free):", *lines))
-
-    @property
-    def _conditions(self) -> list[Number]:
-        return [condition for _, condition in self._rare]
-
-    def _uses(self, values: Sequence[Number]) -> dict[int, int]:
-        """Return how often the text has each term, by its number."""
-        found: dict[int, int] = {}
-        waiting = [each for each in values if isinstance(each, Term)]
-        while waiting:
-            term = waiting.pop()
-            found[term.number] = found.get(term.number, 0) + 1
-            if found[term.number] == 1:
-                for k, each in enumerate(term.arguments):
-                    if isinstance(each, Term):
-                        waiting += [each] * term.text.count(f"{{{k}}}")
-        return found
+def _parts(angle: Term) -> tuple[float, Term, float]:
+    """Return sign, term and offset of ``angle``, which is sign * term + offset."""
+    sign, offset = 1.0, 0.0
+    while True:
+        first, second = (*angle.arguments, None, None)[:2]
+        if angle.text == MINUS:
+            sign, angle = -sign, first
+        elif angle.text in (PLUS, LESS) and not isinstance(second, Term):
+            offset += sign * (second if angle.text == PLUS else -second)
+            angle = first
+        elif angle.text == LESS and not isinstance(first, Term):
+            offset, sign, angle = offset + sign * first, -sign, second
+        else:
+            return sign, angle, offset
 
 
 def another_turn_helps(lower: float, upper: float) -> bool:
@@ -298,8 +306,3 @@ def another_turn_helps(lower: float, upper: float) -> bool:
     """
     slack = tolerances.LIMIT_SLACK
     return (lower <= slack - math.pi) != (upper >= math.pi - slack)
-
-
-def _is_rarely_used(term: Term) -> bool:
-    """Return whether a term is an input, or made of a free angle, which is rarely used."""
-    return all(isinstance(each, Term) and each.text.startswith("free") for each in term.arguments)

@@ -25,7 +25,7 @@ Rows = list[list[float]]
 _ARRAY: Final = np.ndarray
 _FLOAT: Final = np.dtype(np.float64)
 _LAST_ROW: Final = [0.0, 0.0, 0.0, 1.0]
-_MISFITS_EXACT: Final = math.sqrt(6.0) * tolerances.ROTATION_EXACT
+MISFITS_EXACT: Final = math.sqrt(6.0) * tolerances.ROTATION_EXACT
 _FARTHEST: Final = tolerances.FARTHEST
 
 
@@ -154,4 +154,4 @@ def _is_clean(rows: Rows) -> bool:
         g * b - a * h - f,
         a * e - d * b - i,
     )
-    return misfits <= _MISFITS_EXACT and math.hypot(x, y, z) <= _FARTHEST and last == _LAST_ROW
+    return misfits <= MISFITS_EXACT and math.hypot(x, y, z) <= _FARTHEST and last == _LAST_ROW
