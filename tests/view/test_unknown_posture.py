@@ -17,7 +17,6 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.real_arm.extension import EXTENSION
-from katana450.extensions.real_arm.unknown_posture import TEXT
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.scenery import Scenery
 from tests.viser_bridge.internals import nodes
@@ -50,5 +49,3 @@ def test_links_of_an_arm_are_drawn_while_it_is_connected(
         for link in robot.links:
             if link.joint is not None:
                 assert drawn[link.name] == (not hidden)
-        assert drawn["unknown_posture"] == hidden
-    assert "not known" in TEXT
