@@ -5,6 +5,7 @@ import { ScriptRun } from "../teach/run.js";
 import * as api from "./api.js";
 import { atPlace, lengthOf, placeOf } from "./axis.js";
 import { Plot } from "./plot.js";
+import { Work } from "./work.js";
 
 const RING = "ring";
 const REFRESH = 3000; // ms between two looks at what was recorded meanwhile
@@ -15,6 +16,7 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const PRESENT = /^\/(ghost|cup|basin|water|velocity|(target|handles|objects|path|branch)\/[^/]+)$/;
 // Requests that do not concern what is seen.
 const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|list_people|kick|mute|unmute|breakpoints|speed)$/;
+const EXPORTS = [["csv", "CSV table"], ["parquet", "Parquet table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
 
 const icon = (d) => svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d }));
@@ -25,6 +27,7 @@ export class Timeline {
   #box;
   #part = {}; // elements by name
   #plot;
+  #work; // exports and verifications
   #run; // of a recorded motion
   #of = RING; // the recording
   #names = new Map([[RING, "Last minutes"]]);
@@ -47,6 +50,7 @@ export class Timeline {
     document.head.append(html("link", { rel: "stylesheet", href: new URL("timeline.css", import.meta.url).href }));
     this.#build();
     this.#plot = new Plot(this.#part.plot);
+    this.#work = new Work(this.#part.work);
     let stopped = Boolean(page.status()?.stopped);
     window.addEventListener("status", ({ detail }) => {
       if (detail.stopped && !stopped) this.live();
@@ -117,6 +121,8 @@ export class Timeline {
     };
     const part = (this.#part = {
       plot: html("div", { class: "plot", hidden: "" }),
+      work: html("div", { class: "work", hidden: "" }),
+      exports: html("select", { "aria-label": "Export the selection" }, option("", "Export…"), ...EXPORTS.map(([name, words]) => option(name, words))),
       play: button("Play", () => this.#play(this.#playing === null), icon(ICONS.play)),
       clock: html("output", { class: "clock" }, "Live"),
       marks: html("div", { class: "marks" }),
@@ -138,9 +144,12 @@ export class Timeline {
     const track = html("div", { class: "track" }, part.marks, part.now, part.begin, part.end);
     this.#box.replaceChildren(
       part.plot,
+      part.work,
       html("div", { class: "row" }, part.play, part.clock, track, part.speed, part.events, part.of, part.second,
         button("Save selection", () => this.#save()),
+        part.exports,
         button("Run again the selected motion", () => this.#again(), "Run again"),
+        button("Verify the selection: simulate it again and compare every tick", () => this.#start("verify", "Verify"), "Verify"),
         button("Copy link to this moment", () => this.#copy(), "Copy link"),
         button("Fold the timeline away", () => this.#page.fold(), "×"), part.file),
     );
@@ -149,7 +158,12 @@ export class Timeline {
   }
 
   #listen() {
-    const { now, begin, end, of, second, events, file } = this.#part;
+    const { now, begin, end, of, second, events, exports, file } = this.#part;
+    exports.addEventListener("change", () => {
+      const words = exports.selectedOptions[0].text;
+      this.#start(exports.value, `Export as ${words}`);
+      exports.value = "";
+    });
     events.addEventListener("change", () => {
       this.#seek(Number(events.value));
       events.value = "";
@@ -311,6 +325,11 @@ export class Timeline {
   #save() {
     const selection = this.#selection();
     if (selection) keep(this.#page.toast, selection);
+  }
+
+  #start(what, words) {
+    const selection = this.#selection();
+    if (selection) this.#work.start(what, selection, words);
   }
 
   // Drive the arm along the selected motion, as a program that the bar shows and steers.

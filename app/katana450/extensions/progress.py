@@ -1,9 +1,9 @@
-"""A progress bar on a terminal; no output on other streams."""
+"""A progress bar on a terminal; no output on other streams, and reports to another program."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from time import monotonic
 from typing import TextIO, TypeVar
 
@@ -13,13 +13,29 @@ _WIDTH = 30
 _PERIOD = 0.1  # s between two drawings
 
 
+_listeners: list[Callable[[float], None]] = []
+
+
+def report_to(listener: Callable[[float], None]) -> None:
+    """Call ``listener`` with each fraction (0 to 1) of the work of this process that is done."""
+    _listeners.append(listener)
+
+
+def report(fraction: float) -> None:
+    """Report that ``fraction`` (0 to 1) of the present work is done, to all listeners."""
+    for each in _listeners:
+        each(fraction)
+
+
 def progress(
     items: Iterable[T], total: int, label: str, stream: TextIO | None = None
 ) -> Iterator[T]:
     """Yield ``items``, of which there are ``total``, and show the fraction that was yielded."""
     stream = stream or sys.stderr
     if not stream.isatty():
-        yield from items
+        for done, item in enumerate(items):
+            report(done / max(total, 1))
+            yield item
         return
     start = drawn = monotonic()
     done = 0

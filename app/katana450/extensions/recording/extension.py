@@ -95,12 +95,15 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
 
     def make() -> list[BaseRoute]:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes
+        from katana450.extensions.recording.live.job_routes import JobRoutes
         from katana450.extensions.recording.live.route import recording_routes
         from katana450.extensions.recording.playback.routes import PlaybackRoutes
         from katana450.extensions.recording.playback.store import RecordingStore
 
         store = RecordingStore(folder)
-        routes = [*recording_routes(context, store), *PlaybackRoutes(context, store).routes()]
+        routes: list[BaseRoute] = [*recording_routes(context, store)]
+        routes += JobRoutes(context, store).routes()
+        routes += PlaybackRoutes(context, store).routes()
         if episodes is not None:
             routes += EpisodeRoutes(context, episodes, port).routes()
         return routes

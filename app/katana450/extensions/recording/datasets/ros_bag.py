@@ -16,6 +16,7 @@ from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.cli.version import version
 from katana450.errors import InputError
+from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.new_folder import new_folder
 from katana450.extensions.recording.datasets.recorded_robot import attached_urdf, recorded_robot
 from katana450.extensions.recording.datasets.ros_messages import (
@@ -31,6 +32,7 @@ from katana450.extensions.recording.datasets.ros_messages import (
 from katana450.extensions.recording.files.checking import state_numbers
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.script_runs import FOLDER, scripts_in
+from katana450.extensions.recording.files.table import LEAST
 from katana450.extensions.recording.state_message import NANO, pose_of
 from katana450.extensions.recording.topics import CHECKPOINTS, EVENTS, STATE
 from katana450.maths.geometry.arrays import FloatArray, finite_array
@@ -147,6 +149,7 @@ class _Bag:
                 urdf = attached_urdf(self._file).data.decode(errors="replace")
                 self._add(DESCRIPTION, t, text_message(urdf))
                 self._add(TF_STATIC, t, transforms(t, list(self._fixed())))
+            report((message.t - self._file.start) / max(self._file.end - self._file.start, LEAST))
             if message.topic == EVENTS:
                 self._add(BAG_EVENTS, t, text_message(message.data.decode(errors="replace")))
             else:

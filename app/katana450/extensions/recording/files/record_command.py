@@ -13,6 +13,7 @@ import msgspec
 
 from katana450.assembly.log_lines import printable
 from katana450.errors import InputError, KatanaError
+from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.export_command import check_options, export
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_command import episodes
@@ -147,6 +148,7 @@ class _Progress:
     def __call__(self, t: float, length: float) -> None:
         """Show that ``t`` of ``length`` seconds are simulated."""
         fraction = t / max(length, PROGRESS_STEP)
+        report(min(fraction, 1.0))
         if fraction >= self._shown + PROGRESS_STEP:
             self._shown = fraction
             print(f"\r{100.0 * fraction:3.0f} %", end="\r", file=sys.stderr, flush=True)

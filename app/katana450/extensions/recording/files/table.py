@@ -13,12 +13,16 @@ import numpy as np
 
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
+from katana450.extensions.progress import report
 from katana450.extensions.recording.files.checking import state_numbers
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.topics import CHECKPOINTS, STATE
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 NUMBERS = ("t", "gripper", "gripper_setpoint", "speed", "q", "qd", "setpoint")
+LEAST = 1e-3
+"""[s] Least length of a part of which progress is reported."""
+
 POSITION = "position"
 """Names of the columns of every robot, and of that of a robot with a tool only."""
 
@@ -27,8 +31,10 @@ def rows(
     file: RecordingFile, start: float = -math.inf, end: float = math.inf
 ) -> Iterator[dict[str, Any]]:
     """Yield the states that were written from ``start`` to ``end`` [s]. Raises InputError."""
+    first, last = max(start, file.start), min(end, file.end)
     for message in file.messages(STATE, start=start, end=end):
         row = state_numbers(message)
+        report((message.t - first) / max(last - first, LEAST))
         if not isinstance(row.get("t"), int | float):
             raise InputError(
                 f"{file.path} is damaged: the state at t = {message.t:.3f} s has no time."

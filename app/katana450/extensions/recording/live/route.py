@@ -34,13 +34,12 @@ def recording_routes(context: RouteContext, store: RecordingStore) -> list[Route
     none. ``store`` has the folder of the ring, and the files that people opened.
     """
     working = asyncio.Lock()
-    urdf = getattr(context.options, "urdf", None)
-    described = () if urdf is None else ("--urdf", str(urdf))
+    described = urdf_options(context)
 
     async def made(request: Request, *, script: bool) -> Response:
         if not context.identity(request).role.may_drive:
             raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not record.")
-        command = _command(store, request.query_params)
+        command = part_command(store, request.query_params)
         if working.locked():
             raise HTTPException(
                 HTTPStatus.TOO_MANY_REQUESTS, "Another recording is being made. Wait a moment."
@@ -87,8 +86,17 @@ class _Download(FileResponse):
             await self._remove()
 
 
-def _command(store: RecordingStore, query: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the command that makes the requested recording. Raises HTTPException."""
+def urdf_options(context: RouteContext) -> tuple[str, ...]:
+    """Return the option that names the robot of the server, if it is another than the default."""
+    urdf = getattr(context.options, "urdf", None)
+    return () if urdf is None else ("--urdf", str(urdf))
+
+
+def part_command(store: RecordingStore, query: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the command that makes the recording which ``query`` names, without its path.
+
+    Raises HTTPException.
+    """
     times = {name: _seconds(query, name) for name in ("last", "from", "to") if name in query}
     name = query.get("of", RING)
     try:

@@ -1,0 +1,82 @@
+// Long work of the server on a recording, an export or a verification: its progress, and the result.
+import { html } from "../instruments/shape.js";
+
+const JOBS = "api/v1/recording/jobs";
+const LOOK = 400; // ms between two looks at the progress
+
+async function answered(url, options) {
+  const answer = await fetch(url, options).catch(() => null);
+  if (!answer) throw new Error("The server does not answer.");
+  if (!answer.ok) throw new Error(await answer.text());
+  return answer.status === 204 ? null : answer.json();
+}
+
+export class Work {
+  #box;
+  #begun = null; // promise of the job that is shown
+  #closed = Promise.resolve(); // until the last one that was closed is cancelled
+  #doing = ""; // what it does, in words
+  #words = html("p", { role: "status" });
+  #bar = html("progress", { max: "1" });
+  #end = html("button", { type: "button" });
+
+  constructor(box) {
+    this.#box = box;
+    box.replaceChildren(this.#words, this.#bar, this.#end);
+    this.#end.addEventListener("click", () => this.#close());
+  }
+
+  // Begin the work `what`, a format or "verify", on the part `selection`. `doing` says it in words.
+  async start(what, selection, doing) {
+    this.#close();
+    const query = new URLSearchParams({ ...selection, do: what });
+    const begun = this.#closed.then(() => answered(`${JOBS}?${query}`, { method: "POST" }));
+    [this.#begun, this.#doing] = [begun, doing];
+    this.#show(doing, null);
+    try {
+      await this.#follow(begun, (await begun).job);
+    } catch (error) {
+      if (this.#begun === begun) this.#show(`${doing}: ${error.message}`);
+    }
+  }
+
+  async #follow(begun, job) {
+    while (this.#begun === begun) {
+      const { status, fraction, words } = await answered(`${JOBS}/${job}`);
+      if (this.#begun !== begun) return;
+      if (status !== "working") return this.#finish(job, status, words);
+      this.#show(this.#doing, fraction);
+      await new Promise((next) => setTimeout(next, LOOK));
+    }
+  }
+
+  #finish(job, status, words) {
+    if (status === "done" && this.#doing.startsWith("Export")) {
+      html("a", { href: `${JOBS}/${job}/file`, download: "" }).click();
+      this.#show(`Exported ${words}`);
+    } else this.#show(`${this.#doing}: ${words}`);
+  }
+
+  // Show `words`, and the fraction that is done: null for an unknown one, undefined at the end.
+  #show(words, fraction) {
+    const percent = fraction ? ` ${Math.round(100 * fraction)} %` : "";
+    const text = fraction === undefined ? words : `${words} …${percent}`;
+    if (this.#words.textContent !== text) this.#words.textContent = text;
+    this.#bar.hidden = fraction === undefined;
+    if (fraction) this.#bar.value = fraction;
+    else this.#bar.removeAttribute("value");
+    const label = fraction === undefined ? "Close" : "Cancel";
+    if (this.#end.textContent !== label) this.#end.textContent = label;
+    this.#box.hidden = false;
+  }
+
+  // Hide the row. A job that works is cancelled, and what it has made is removed.
+  #close() {
+    const begun = this.#begun;
+    this.#begun = null;
+    this.#box.hidden = true;
+    if (!begun) return;
+    const cancel = ({ job }) => answered(`${JOBS}/${job}/cancel`, { method: "POST" });
+    this.#closed = begun.then(cancel).catch(() => {});
+  }
+}

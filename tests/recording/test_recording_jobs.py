@@ -1,0 +1,267 @@
+"""A page exports and verifies what a real server has recorded, with progress and cancel."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import os
+import re
+import signal
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+
+import katana450
+from katana450.arm.control.lease import Role
+from katana450.extensions.recording.files.copying import RecordingCopy
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.live.job_routes import JobRoutes
+from katana450.extensions.recording.playback.store import PREFIX, RecordingStore
+from katana450.extensions.recording.topics import COMMANDS, STATE
+from katana450.server.service.identity import Identity
+from katana450.server.web.http_api import RouteContext
+from tests.browser.server import RECORDING_APP, AppServer
+from tests.gateway.client import ask, enter
+from tests.recording.test_recorder import waited_for
+
+POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
+
+
+@pytest.fixture(scope="module")
+def temporary(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder for temporary files of the server."""
+    return tmp_path_factory.mktemp("temporary")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory, temporary: Path) -> Iterator[AppServer]:
+    """Return a server that has recorded two motions."""
+    folder = tmp_path_factory.mktemp("ring")
+    command = (*RECORDING_APP, "--record", str(folder))
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    with AppServer(command, environment=environment) as running:
+        with katana450.connect(running.url, name="Ada") as client:
+            for posture in POSTURES:
+                client.joints(posture)
+        cookie = enter(running.url)
+        waited_for(
+            lambda: ask(f"{running.url}/api/v1/recording", Cookie=cookie)[0] == 200, "a recording"
+        )
+        time.sleep(1.0)
+        yield running
+
+
+class Page:
+    """Requests of one page."""
+
+    def __init__(self, server: AppServer) -> None:
+        self._root, self._cookie = f"{server.url}/api/v1/recording", enter(server.url)
+        self._origin = server.url
+
+    def ask(self, path: str, *, post: bool = False) -> tuple[int, bytes]:
+        data = b"" if post else None
+        answer = ask(f"{self._root}{path}", data=data, Cookie=self._cookie, Origin=self._origin)
+        return answer[0], answer[2]
+
+    def upload(self, path: Path) -> tuple[int, bytes]:
+        """Open the recording at ``path`` for play back."""
+        url = f"{self._origin}/api/v1/playback"
+        answer = ask(url, data=path.read_bytes(), Cookie=self._cookie, Origin=self._origin)
+        return answer[0], answer[2]
+
+    def begun(self, query: str) -> str:
+        """Return the name of the job of ``query``, which begins."""
+        status, answer = self.ask(f"/jobs?{query}", post=True)
+        assert status == 200, answer
+        name: str = json.loads(answer)["job"]
+        return name
+
+    def ended(self, name: str) -> dict[str, Any]:
+        """Return the state of the job ``name`` when it has ended."""
+        deadline = time.monotonic() + 90.0
+        while True:
+            status, answer = self.ask(f"/jobs/{name}")
+            assert status == 200, answer
+            state: dict[str, Any] = json.loads(answer)
+            if state["status"] != "working":
+                return state
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+
+    def made(self, query: str) -> bytes:
+        """Return the file of the job of ``query``."""
+        name = self.begun(query)
+        state = self.ended(name)
+        assert state["status"] == "done", state
+        assert state["fraction"] == 1.0
+        status, content = self.ask(f"/jobs/{name}/file")
+        assert status == 200
+        return content
+
+
+@pytest.fixture
+def page(server: AppServer) -> Page:
+    return Page(server)
+
+
+def test_selection_is_verified(page: Page) -> None:
+    name = page.begun("do=verify")
+    state = page.ended(name)
+    assert state["status"] == "done"
+    assert state["words"].startswith("identical to the bit over ")
+    assert page.ask(f"/jobs/{name}/file")[0] == 409
+
+
+def test_difference_is_stated_with_its_time_and_size(page: Page, tmp_path: Path) -> None:
+    path, changed = tmp_path / "all.mcap", tmp_path / "changed.mcap"
+    path.write_bytes(page.ask("")[1])
+    with RecordingFile.open(path) as file, changed.open("wb") as out:
+        copy, count = RecordingCopy(out, file.metadata, file.attachments()), 0
+        for message in file.messages(*file.counts()):
+            count += message.topic == COMMANDS
+            other = message.data.replace(b'"digest":"', b'"digest":"0')
+            copy.add(message._replace(data=other) if count == 60 else message)
+        copy.close()
+    status, answer = page.upload(changed)
+    assert status == 200, answer
+    name = json.loads(answer)["name"]
+    state = page.ended(page.begun(f"do=verify&of={name}"))
+    assert re.match(r"first difference at t = [0-9.]+ s, 0 rad; 1 of [0-9]+ ticks", state["words"])
+
+
+def test_selection_is_exported(page: Page, server: AppServer, tmp_path: Path) -> None:
+    path = tmp_path / "all.mcap"
+    path.write_bytes(page.ask("")[1])
+    with RecordingFile.open(path) as file:
+        states = file.counts()[STATE]
+    table = page.made("do=csv").decode().splitlines()
+    assert table[0] == "t,theta1,theta2,theta3,theta4,theta5,gripper"
+    assert len(table) - 1 == states
+    bag = zipfile.ZipFile(io.BytesIO(page.made("do=rosbag2")))
+    assert sorted(bag.namelist()) == [
+        "katana450/",
+        "katana450/katana450_0.mcap",
+        "katana450/metadata.yaml",
+    ]
+    del server
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("format", "start"), [("html", b"<!"), ("parquet", b"PAR1"), ("mp4", b"")])
+def test_further_formats_are_exported(page: Page, format: str, start: bytes) -> None:
+    if format == "parquet":
+        pytest.importorskip("pyarrow")
+    content = page.made(f"do={format}&last=0.5")
+    assert content.startswith(start)
+    assert len(content) > 1000
+
+
+def folders(temporary: Path) -> list[Path]:
+    """Return the folders of jobs in ``temporary``."""
+    return [each for each in temporary.glob(f"{PREFIX}*/*") if each.is_dir()]
+
+
+def test_job_that_is_cancelled_leaves_nothing(page: Page, temporary: Path) -> None:
+    others = {each.name for each in temporary.iterdir()}
+    name = page.begun("do=html")
+    waited_for(lambda: len(list(folders(temporary)[-1].iterdir())) > 0, "a file of the job")
+    # One at a time.
+    status, answer = page.ask("/jobs?do=csv", post=True)
+    assert status == 429
+    assert b"Wait, or cancel it" in answer
+    assert page.ask(f"/jobs/{name}/file")[0] == 409
+    before = len(folders(temporary))
+    assert page.ask(f"/jobs/{name}/cancel", post=True)[0] == 204
+    assert len(folders(temporary)) == before - 1
+    assert page.ended(name)["status"] == "cancelled"
+    assert page.ask(f"/jobs/{name}/file")[0] == 409
+    assert page.ask(f"/jobs/{name}/cancel", post=True)[0] == 204
+    assert page.ask("/jobs/none")[0] == 404
+    assert {each.name for each in temporary.iterdir()} == others
+    # The next one begins at once.
+    assert page.made("do=csv")
+
+
+def test_wrong_requests_are_refused(page: Page) -> None:
+    for query, status, words in (
+        ("", 400, "`do` is one of verify, csv"),
+        ("do=exe", 400, "not 'exe'"),
+        ("do=csv&from=x", 400, "`from` is a number"),
+        ("do=csv&of=none", 404, "no longer has that recording"),
+    ):
+        answer = page.ask(f"/jobs?{query}", post=True)
+        assert answer[0] == status, query
+        assert words in answer[1].decode()
+    assert page.ask("/jobs/../../x")[0] == 404
+    state = page.ended(page.begun("do=csv&from=9e9"))
+    assert state["status"] == "failed"
+    assert "There is nothing from" in state["words"]
+
+
+def test_viewers_begin_no_job(tmp_path: Path) -> None:
+    who = Identity("session", "Vera", Role.VIEWER)
+    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
+    request = Request({"type": "http", "query_string": b"do=csv", "headers": [], "path_params": {}})
+    for route in JobRoutes(context, RecordingStore(tmp_path)).routes():
+        with pytest.raises(HTTPException) as caught:
+            asyncio.run(route.endpoint(request))
+        assert caught.value.status_code == 403
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc")
+def test_job_ends_with_a_server_that_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it has made is removed when the next server begins."""
+    folder, temporary = tmp_path / "ring", tmp_path / "temporary"
+    temporary.mkdir()
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    server = AppServer((*RECORDING_APP, "--record", str(folder)), environment=environment)
+    with server:
+        with katana450.connect(server.url, name="Ada") as client:
+            client.joints(POSTURES[0])
+        page = Page(server)
+        waited_for(lambda: page.ask("")[0] == 200, "a recording")
+        others = {each.name for each in temporary.iterdir()}
+        page.begun("do=html")
+
+        def working() -> list[int]:
+            return [
+                int(each.name)
+                for each in Path("/proc").iterdir()
+                if each.name.isdigit()
+                and str(temporary) in _environment(each)
+                and "job_process" in _command(each)
+            ]
+
+        waited_for(working, "the process of the job")
+        assert folders(temporary)
+        os.killpg(server.pid, signal.SIGKILL)
+        waited_for(lambda: not working(), "the end of the process")
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    RecordingStore(None)
+    assert not folders(temporary)
+    assert {each.name for each in temporary.iterdir() if not each.name.startswith(PREFIX)} <= others
+
+
+def _command(process: Path) -> str:
+    try:
+        return (process / "cmdline").read_bytes().decode()
+    except OSError:
+        return ""
+
+
+def _environment(process: Path) -> str:
+    try:
+        return (process / "environ").read_bytes().decode()
+    except OSError:
+        return ""
