@@ -221,7 +221,7 @@ def test_viewers_begin_no_job(tmp_path: Path) -> None:
 def test_job_ends_with_a_server_that_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What it has made is removed when the next server begins."""
+    """Files that it has made are removed when the next server begins."""
     folder, temporary = tmp_path / "ring", tmp_path / "temporary"
     temporary.mkdir()
     environment = {**os.environ, "TMPDIR": str(temporary)}
