@@ -140,7 +140,7 @@ def test_typed_pose_behind_the_wall_is_not_reached(
 ) -> None:
     T = np.array(arm.query(answers.State).T)
     T[:3, 3] = in_shoulder(arm, at(arm) + np.array((0.0, 0.25 * side(arm, wall), 0.0)))
-    rows = tuple(map(tuple, T.tolist()))
+    rows: Any = tuple(map(tuple, T.tolist()))
     meets_wall(arm.ask(requests.Pose(T=rows, wait=60)))
     assert gap(session, wall, arm.query(answers.State).q) > STOP - 1e-6
 
