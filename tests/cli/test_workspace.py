@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 from katana450.cli.main import main
+from katana450.errors import InputError
 from katana450.extensions.reachability.reachability_file import load_map
+from tests.general_arms.links_of_arms import ur5e
 
 ROOT = Path(__file__).resolve().parents[2]
 COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4", "--samples", "30")
@@ -34,6 +36,39 @@ def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFi
     assert sorted(tmp_path.iterdir()) == [out, ply]
     assert (stored.robot, stored.tool) == ("katana450", "grasp")
     assert stored.voxel == pytest.approx(0.17)
+
+
+def test_map_of_six_axes_tells_where_the_tool_can_be_as_at_home(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf, out, ply = (tmp_path / name for name in ("ur5e.urdf", "map.npz", "map.ply"))
+    urdf.write_text(ur5e())
+    coarse = ("--voxel", "350", "--pitches", "3", "--rolls", "1")
+    assert (
+        main(["workspace", "--urdf", str(urdf), *coarse, "--out", str(out), "--ply", str(ply)]) == 0
+    )
+    printed, stored = capsys.readouterr().out, load_map(out)
+    assert stored.at_home is not None
+    assert 0 < stored.at_home.sum() < len(stored.points)
+    share = (
+        f"In {stored.at_home.mean():.1%} of them it can have the orientation that it has at Home."
+    )
+    assert share in printed
+    assert "Of 4 orientations" in printed
+    with np.load(out) as arrays:
+        wrong = {**arrays, "at_home": arrays["fraction"]}
+    np.savez_compressed(out, allow_pickle=False, **wrong)
+    with pytest.raises(InputError, match="must have a truth value for each point"):
+        load_map(out)
+
+
+def test_map_that_takes_too_long_is_refused_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf = tmp_path / "ur5e.urdf"
+    urdf.write_text(ur5e())
+    assert main(["workspace", "--urdf", str(urdf), "--voxel", "2"]) == 1
+    assert "Choose larger voxels than 2 mm" in capsys.readouterr().err
 
 
 def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.described_arm import DescribedArm, described_arm
 from katana450.extensions.general_arms.nearest import BestPosture, nearest_posture
 from katana450.extensions.importers.initial_scene import load_initial_scene
+from katana450.extensions.reachability.survey_of import MapOptions, survey_of
 from katana450.library.arm import Arm, Priority
 from katana450.library.motion_plan import MotionPlan
 from katana450.library.pose_frame import PoseFrame, dimensions
@@ -43,8 +44,8 @@ class GeneralArm(Arm):
     """An arm of any number of turning axes, made by `katana450.load`.
 
     Its functions are those of an `Arm`, with n axes in place of five, and with the branches that
-    `method` names. Plans need three or more axes, and no other joints than those of fingers. A map
-    of reachability needs the five-axis family. Without that, RobotDescriptionError is raised.
+    `method` names. Plans and maps of reachability need three or more axes, and no other joints than
+    those of fingers. Without that, RobotDescriptionError is raised.
 
     Attributes:
         described: the arm in its file.
@@ -122,19 +123,27 @@ class GeneralArm(Arm):
 
     def reachability(
         self,
-        voxel: float = 0.05,
+        voxel: float | None = None,
         *,
         table: float = 0.0,
-        pitches: int = 36,
-        rolls: int = 24,
+        pitches: int | None = None,
+        rolls: int | None = None,
         samples: int = 0,
         seed: int = 0,
     ) -> ReachabilityMap:
-        """Raise RobotDescriptionError: maps count pitches and rolls of five axes."""
-        raise self._refusal(
-            "a map of reachability",
-            "it needs a five-axis arm with a pan axis, three parallel axes and a roll axis",
-        )
+        """Map where the tool can be, and which fraction of orientations it can have there.
+
+        The orientations are spread evenly from six axes on: ``pitches`` directions, each with
+        ``rolls`` turns. With four axes they are directions in the plane of the arm, and other arms
+        choose none. What is None suits the arm: its map then takes seconds to minutes. ``at_home``
+        of the map tells where the tool can have the orientation that it has in ``ready``. Other
+        arguments and errors are those of `Arm.reachability`. An InputError also refuses a map that
+        would take too long.
+        """
+        home, T = self._mounted.ready(Settings.ready), self.described.T_base_shoulder
+        options = MapOptions(table, voxel, pitches, rolls, samples, seed)
+        survey = survey_of(self.chain, T, home, options)
+        return survey.map(survey.count(chunk) for chunk in survey.chunks())
 
     def circle(  # type: ignore[override]  # rpy in place of the pitch and roll of five axes
         self,
@@ -162,12 +171,12 @@ class GeneralArm(Arm):
     @property
     def _mounted(self) -> MountedArm:
         if self.robot.arm is None:
-            raise self._refusal("a plan")
+            raise self._refusal("a plan or a map")
         return self.robot.arm
 
-    def _refusal(self, what: str, why: str = NEEDED) -> RobotDescriptionError:
+    def _refusal(self, what: str) -> RobotDescriptionError:
         return RobotDescriptionError(
-            f"For {self.name}, {what} is not possible: {why}. This arm has {self.n} axes "
+            f"For {self.name}, {what} is not possible: {NEEDED}. This arm has {self.n} axes "
             f"({self.method}). `fk`, `ik`, `nearest` and `jacobian` work; `katana450 serve` drives "
             "it."
         )

@@ -27,7 +27,7 @@ def load(
     """Load an arm from a URDF file.
 
     Five-axis arms with a pan axis, three parallel axes and a roll axis can do everything that an
-    `Arm` can. Other arms can do all but a map of reachability, with the kinematics that suit them:
+    `Arm` can. Other arms can do so too, with the kinematics that suit them:
     in closed form for the arms listed in docs/library.md, else numerically. ``notes`` of the arm
     says which.
 

@@ -140,8 +140,11 @@ class ClosedForm:
 
         As `solve` for each. Raises InputError for the first invalid pose.
         """
-        poses = validated_poses(T)
-        seen = _inverses(poses) if self.is_reversed else poses
+        return self.solve_batch(validated_poses(T))
+
+    def solve_batch(self, poses: FloatArray) -> FloatArray:
+        """Return `inverse_batch` of poses (N, 4, 4), without checks."""
+        seen = inverses(poses) if self.is_reversed else poses
         shift = self.form.links.shift
         with np.errstate(all="ignore"):
             found = self._solve_arrays(self.form.columns(seen), shift)
@@ -193,7 +196,8 @@ def errors_of(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[FloatArray, F
     return distance, np.arctan2(sine, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0))
 
 
-def _inverses(T: FloatArray) -> FloatArray:
+def inverses(T: FloatArray) -> FloatArray:
+    """Return the inverse poses of `T` (N, 4, 4)."""
     result = np.zeros_like(T)
     result[:, :3, :3] = T[:, :3, :3].swapaxes(1, 2)
     result[:, :3, 3] = -(result[:, :3, :3] @ T[:, :3, 3:])[:, :, 0]

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.extensions.general_arms.branch_words import BranchWords
-from katana450.extensions.general_arms.closed_form import errors_of, in_limits_turns
+from katana450.extensions.general_arms.closed_form import errors_of, in_limits_turns, inverses
 from katana450.extensions.general_arms.functions import ARRAYS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import Numerical
@@ -134,17 +134,22 @@ class SevenAxes:
         return words.in_order(lambda T, q: self.at_swivels(T, q[[self.swivel]])[0])
 
     def at_swivels(self, T: FloatArray, swivels: FloatArray) -> FloatArray:
-        """Return the joint angles (N, 8, 7) [rad] for the pose `T` (4, 4) at `swivels` (N,)."""
+        """Return the joint angles (N, 8, 7) [rad] at `swivels` (N,).
+
+        They are for the pose `T` (4, 4), or for one pose at each swivel (N, 4, 4).
+        """
         links = self.links
         alpha = swivels + links.shift[self.locked]
-        rows = np.array(links.rows(se3.inverse(T) if self.is_reversed else T))
+        if self.is_reversed:
+            T = se3.inverse(T) if T.ndim == 2 else inverses(T)
+        rows = links.T_1_S @ T @ links.T_tool_n
         zeros = np.zeros_like(swivels)
         with np.errstate(all="ignore"):
             if self.locked == 2:
                 six = _six_of(links)
                 solve = crossing_shoulder(six, ARRAYS, swivel_link(links, alpha))
                 places = (0, 1, 3, 4, 5, 6)
-                columns = [[rows[i, j] + zeros for j in range(4)] for i in range(4)]
+                columns = [[rows[..., i, j] + zeros for j in range(4)] for i in range(4)]
             else:
                 six = links.from_axis(1)
                 form = parallel_shoulder if is_parallel_shoulder(six) else crossing_shoulder
@@ -224,13 +229,17 @@ class SevenAxes:
 
 
 def _after_first(links: DHLinks, rows: FloatArray, alpha: FloatArray) -> list[list[FloatArray]]:
-    """Return the pose `rows` in the frame of axis 2, after axis 1 turned by `alpha` (N,) [rad]."""
+    """Return the pose `rows` in the frame of axis 2, after axis 1 turned by `alpha` (N,) [rad].
+
+    `rows` are (4, 4), or (N, 4, 4).
+    """
     c, s = np.cos(alpha), np.sin(alpha)
+    first, second, *others = ([rows[..., i, j] for j in range(4)] for i in range(4))
     turned = [
-        [c * x + s * y for x, y in zip(rows[0], rows[1], strict=True)],
-        [c * y - s * x for x, y in zip(rows[0], rows[1], strict=True)],
+        [c * x + s * y for x, y in zip(first, second, strict=True)],
+        [c * y - s * x for x, y in zip(first, second, strict=True)],
     ]
-    whole = [*turned, *([value + 0.0 * c for value in row] for row in rows[2:])]
+    whole = [*turned, *([value + 0.0 * c for value in row] for row in others)]
     inverse = se3.inverse(links.link(0))
     return [
         [sum(inverse[i, k] * whole[k][j] for k in range(4)) for j in range(4)] for i in range(4)

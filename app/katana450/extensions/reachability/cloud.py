@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from katana450.extensions.reachability import postures
+from katana450.extensions.reachability.pose_reachability import PoseReachability
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.maths.geometry.arrays import FloatArray
 
 
-def tool_cloud(reachability: Reachability, count: int, seed: int) -> FloatArray:
+def tool_cloud(reachability: Reachability | PoseReachability, count: int, seed: int) -> FloatArray:
     """Return up to ``count`` tool points (K, 3) in the base frame [m], those not below the table.
 
     The joint angles are uniform inside the limits and follow from ``seed``. Elbow and wrist must be

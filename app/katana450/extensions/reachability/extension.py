@@ -25,23 +25,22 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--voxel",
         type=float,
-        default=20.0,
         metavar="MM",
-        help="edge of a voxel, mm (default: %(default)g)",
+        help="edge of a voxel, mm (default: 20, or what suits an arm outside the family)",
     )
     parser.add_argument(
         "--pitches",
         type=int,
-        default=36,
         metavar="N",
-        help="pitches of the tool tried in each voxel, all round (default: %(default)s)",
+        help="pitches of the tool tried in each voxel, all round (default: 36); from six axes on, "
+        "directions all over the sphere (default: 8, 12 or 24)",
     )
     parser.add_argument(
         "--rolls",
         type=int,
-        default=24,
         metavar="N",
-        help="rolls of the tool tried for each pitch, all round (default: %(default)s)",
+        help="rolls of the tool tried for each pitch or direction, all round (default: 24; from "
+        "six axes on 2, 4 or 6)",
     )
     parser.add_argument(
         "--samples",

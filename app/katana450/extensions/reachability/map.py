@@ -11,7 +11,8 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.reachability.cloud import tool_cloud
 from katana450.extensions.reachability.grid import IntArray, VoxelGrid
-from katana450.extensions.reachability.reachability import Reachability
+from katana450.extensions.reachability.pose_reachability import PoseReachability
+from katana450.extensions.reachability.reachability import BoolArray, Reachability
 from katana450.maths.geometry.arrays import FloatArray
 
 POSES = 65536
@@ -33,11 +34,14 @@ class ReachabilityMap:
             grid.
         fraction: (N,) fraction of orientations in each voxel, above 0 and up to 1.
         cloud: (K, 3) tool points at random joint angles.
+        at_home: (N,) whether the orientation of the tool at Home is possible there; None for an arm
+            whose map does not tell.
     """
 
     points: FloatArray
     fraction: FloatArray
     cloud: FloatArray
+    at_home: BoolArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,7 @@ class Survey:
     Raises InputError for an invalid voxel or table, and for samples or seed out of range.
     """
 
-    reachability: Reachability
+    reachability: Reachability | PoseReachability
     voxel: float
     samples: int
     seed: int
@@ -75,18 +79,23 @@ class Survey:
 
     def chunks(self) -> list[range]:
         """Return the chunks, the arguments of ``count``."""
-        return self.grid.chunks(max(1, POSES // self.reachability.pitches))
+        return self.grid.chunks(max(1, POSES // self.reachability.poses_at_once))
 
     def count(self, chunk: range) -> IntArray:
-        """Return the number of possible orientations in each voxel of ``chunk``."""
+        """Return what is possible in each voxel of ``chunk``, see ``count`` of the reachability."""
         return self.reachability.count(self.grid.centers(chunk))
 
     def map(self, counts: Iterable[IntArray]) -> ReachabilityMap:
         """Return the map from the counts of all chunks in their order."""
         found = np.concatenate(list(counts))
+        at_home = None
+        if found.ndim == 2:
+            found, home = found.T
+            at_home = home[found > 0] > 0
         reached = np.flatnonzero(found)
         return ReachabilityMap(
             points=self.grid.centers(reached),
             fraction=found[reached] / self.reachability.orientations,
             cloud=tool_cloud(self.reachability, self.samples, self.seed),
+            at_home=at_home,
         )

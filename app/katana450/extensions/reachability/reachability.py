@@ -58,11 +58,7 @@ class Reachability:
     rolls: int
 
     def __post_init__(self) -> None:
-        for name, steps in (("pitches", self.pitches), ("rolls", self.rolls)):
-            if not 1 <= steps <= MAX_STEPS:
-                raise InputError(
-                    f"The number of {name} is {steps}; it must be from 1 to {MAX_STEPS}."
-                )
+        check_steps(self.pitches, self.rolls)
         lean = float(np.linalg.norm(self.T_base_canonical[:3, 2] - (0.0, 0.0, 1.0)))
         if lean > tolerances.MAPPED_ARM:
             raise RobotDescriptionError(
@@ -83,6 +79,11 @@ class Reachability:
     def orientations(self) -> int:
         """The number of pairs of pitch and roll that are tried at a point."""
         return self.pitches * self.rolls
+
+    @property
+    def poses_at_once(self) -> int:
+        """The number of poses of each point that are solved at once."""
+        return self.pitches
 
     @property
     def reach(self) -> float:
@@ -175,6 +176,13 @@ class Reachability:
     def in_base(self, p: FloatArray) -> FloatArray:
         """Return points ``p`` (N, 3) of {S} in the base frame, (N, 3) [m]."""
         return p @ self.T_base_shoulder[:3, :3].T + self.T_base_shoulder[:3, 3]
+
+
+def check_steps(pitches: int, rolls: int) -> None:
+    """Raise InputError for a number of steps outside 1 to MAX_STEPS."""
+    for name, steps in (("pitches", pitches), ("rolls", rolls)):
+        if not 1 <= steps <= MAX_STEPS:
+            raise InputError(f"The number of {name} is {steps}; it must be from 1 to {MAX_STEPS}.")
 
 
 def _roll_frames(p: FloatArray, c: FloatArray, s: FloatArray, phi: FloatArray) -> FloatArray:

@@ -6,8 +6,10 @@ Keys of the .npz, lengths in m, angles in rad, points in the base frame:
     points (N, 3)    centres of the voxels that the tool reaches
     fraction (N,)    fraction of orientations there, above 0 and up to 1
     cloud (K, 3)     tool points at random joint angles
+    at_home (N,)     whether the orientation of the tool at Home is possible there; only outside the
+                     five-axis family
     voxel, table     edge of a voxel; height of the table
-    pitches, rolls   number of steps in a turn
+    pitches, rolls   number of steps in a turn; from six axes on of directions, and of turns of each
     robot, tool      name of the arm and of its tool frame
     seed             seed of the cloud
 """
@@ -26,6 +28,7 @@ import numpy.typing as npt
 from katana450.errors import InputError
 from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
+from katana450.extensions.reachability.reachability import BoolArray
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 FORMAT = "katana450 reachability 2"
@@ -46,6 +49,7 @@ class StoredMap:
         voxel: edge of a voxel [m].
         robot: name of the arm.
         tool: name of the tool frame.
+        at_home: (N,) whether the orientation at Home is possible; None if the map does not tell.
     """
 
     points: FloatArray
@@ -53,6 +57,7 @@ class StoredMap:
     voxel: float
     robot: str
     tool: str
+    at_home: BoolArray | None = None
 
 
 def write_npz(
@@ -63,6 +68,7 @@ def write_npz(
     np.savez_compressed(
         file,
         allow_pickle=False,
+        **({} if found.at_home is None else {"at_home": found.at_home}),
         format=np.array(FORMAT),
         points=found.points,
         fraction=found.fraction,
@@ -99,6 +105,7 @@ def load_map(path: str | os.PathLike[str]) -> StoredMap:
             if version != FORMAT:
                 raise ValueError(f"its format is {version}, not {FORMAT}")
             points, fraction = arrays["points"], arrays["fraction"]
+            at_home = arrays.get("at_home")
             voxel, robot, tool = (arrays[key].item() for key in ("voxel", "robot", "tool"))
     except InputError:
         raise
@@ -112,7 +119,9 @@ def load_map(path: str | os.PathLike[str]) -> StoredMap:
         )
     if not 0.0 < voxel < math.inf:
         raise InputError(f"In {name}, 'voxel' is {voxel} m; it must be above 0 and finite.")
-    return StoredMap(*_checked(name, points, fraction), voxel, robot, tool)
+    if at_home is not None and (at_home.dtype != np.bool or at_home.shape != fraction.shape):
+        raise InputError(f"The array 'at_home' of {name} must have a truth value for each point.")
+    return StoredMap(*_checked(name, points, fraction), voxel, robot, tool, at_home)
 
 
 def _checked(

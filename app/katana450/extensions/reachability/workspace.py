@@ -11,32 +11,39 @@ from pathlib import Path
 import numpy as np
 
 from katana450.assembly.robot_files import read_robot
+from katana450.assembly.robot_session import find_arm
 from katana450.atomic import Writer, check_writable, write_files
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
 from katana450.extensions.reachability.cluster import connect_cluster
 from katana450.extensions.reachability.grid import IntArray
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
-from katana450.extensions.reachability.reachability import Reachability
 from katana450.extensions.reachability.reachability_file import write_npz, write_ply
+from katana450.extensions.reachability.survey_of import MapOptions, survey_of
+from katana450.settings import Settings
 
 
 def workspace(options: argparse.Namespace) -> int:
     """Map the workspace, write the requested files, print a summary. Raises InputError."""
     _check_files(options.out, options.ply)
-    robot = read_robot(options.urdf, options.tool)
+    robot = read_robot(options.urdf, options.tool, find_arm)
     arm = robot.require_arm()
     for note in (*arm.notes, *robot.notes):
         print(f"katana450: {note}", file=sys.stderr)
     tool = arm.default_tool
-    reachability = Reachability(
-        chain=arm.chain_to(tool),
-        T_base_shoulder=arm.T_base_shoulder,
-        table=1e-3 * options.table,
-        pitches=options.pitches,
-        rolls=options.rolls,
+    survey = survey_of(
+        arm.chain_to(tool),
+        arm.T_base_shoulder,
+        arm.ready(Settings.ready),
+        MapOptions(
+            1e-3 * options.table,
+            None if options.voxel is None else 1e-3 * options.voxel,
+            options.pitches,
+            options.rolls,
+            options.samples,
+            options.seed,
+        ),
     )
-    survey = Survey(reachability, 1e-3 * options.voxel, options.samples, options.seed)
     found = survey.map(_counts(survey, options.scheduler))
     files: dict[Path, Writer] = {}
     if options.out:
@@ -82,10 +89,18 @@ def _summary(survey: Survey, found: ReachabilityMap, tool: str) -> str:
     )
     best = found.points[int(np.argmax(found.fraction))]
     where = ", ".join(f"{1e3 * value:.0f}" for value in best)
-    return (
+    reached = (
         f"The tool {tool} reaches {len(found.points)} voxels of {1e3 * survey.voxel:g} mm, "
         f"{litres:.1f} litres above the table at {1e3 * reachability.table:g} mm:\n"
-        f"{extent} mm in the base frame.\n"
+        f"{extent} mm in the base frame."
+    )
+    if reachability.orientations == 1:
+        return f"{reached}\nThe arm cannot choose its orientation there, so it is not mapped."
+    if found.at_home is not None:
+        fraction = found.at_home.mean()
+        reached += f"\nIn {fraction:.1%} of them it can have the orientation that it has at Home."
+    return (
+        f"{reached}\n"
         f"Of {reachability.orientations} orientations {found.fraction.mean():.1%} on average, "
         f"up to {found.fraction.max():.1%} at {where} mm."
     )
