@@ -157,7 +157,7 @@
   });
 
   window.katanaScene = { ...Viser, ...Fit };
-  Viser.start();
+  Viser.start(outer?.entry?.entered);
   Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

@@ -50,13 +50,14 @@ const Viser = (() => {
     );
   }
 
-  // Start viser's program as soon as the decoder of its messages, which it expects, is compiled, and
-  // the document is there.
-  async function start() {
+  // Start viser's program as soon as the decoder of its messages, which it expects, is compiled, the
+  // document is there, and `entered` allows it.
+  async function start(entered = null) {
     const decoder = WebAssembly.compileStreaming(fetch("zstd.wasm"));
     if (document.readyState === "loading")
       await new Promise((done) => document.addEventListener("DOMContentLoaded", done));
     window.__viserZstdWasm = await decoder;
+    if (entered && !(await entered).ok) return;
     // By a name that the check of types does not look up: the server makes this file.
     const program = "../viser/program.js";
     await import(program);
@@ -99,7 +100,7 @@ const Viser = (() => {
   function isWhole() {
     if (since === null) return false;
     if (performance.now() - since > HOLD) return true;
-    const { firstMessageBatch, messageQueue, nodeRefFromName: nodes, scene } = viewer();
+    const { firstMessageBatch, messageQueue, nodeRefFromName: nodes } = viewer();
     if (firstMessageBatch || messageQueue.length) return false;
     const hidden = [...shown].filter(([, visible]) => !visible).map(([name]) => name);
     const isHidden = (name) => hidden.some((each) => name === each || name.startsWith(`${each}/`));
