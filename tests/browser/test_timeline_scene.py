@@ -195,10 +195,10 @@ def test_handles_of_the_selection_are_dragged_by_the_mouse(
     page = open_page(server.url, nodes=("/arm",))
     opened(page)
     for name, fraction in (
-        ("Begin of the selection", 0.25),
+        ("Start of the selection", 0.25),
         ("End of the selection", 0.75),
         ("Moment that is shown", 0.5),
-        ("Begin of the selection", 0.4),
+        ("Start of the selection", 0.4),
     ):
         slider = page.page.get_by_label(name, exact=True)
         box = slider.bounding_box()
