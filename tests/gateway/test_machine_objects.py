@@ -23,8 +23,8 @@ pytestmark = pytest.mark.long
 STOP = 0.005
 """[m] Distance that stays to every obstacle."""
 
-SHORT = 4e-3
-"""[m] Maximum length by which a brake ends earlier."""
+SHORT = 0.03
+"""[m] Maximum length by which a brake ends earlier: late ticks begin it sooner."""
 
 
 @pytest.fixture(scope="module")
