@@ -21,6 +21,7 @@ from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.server.step_list import steps_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from tests.programs.conftest import TICK, Stage
@@ -150,7 +151,10 @@ def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Pro
     stood = state.setpoint
     state = given(stage, state, cmd.SetJoints(stood + np.array([0.3, 0.1, -0.1, 0.2, 0.4])))
     rest = continued(interruption, stage.plan_context, state)
-    assert [task.name for task in rest.tasks[rest.first : rest.first + 2]] == ["speed", RETURN]
+    added = rest.tasks[rest.first : rest.first + 2]
+    assert [task.name for task in added] == ["move: speed", RETURN]
+    # The list of steps keeps their names.
+    assert [each.name for each in steps_of(rest)] == [each.name for each in steps_of(program)]
     assert rest.tasks[rest.first].number == interruption.task.number
     states = played(stage, rest, state)
     assert off_path(program, states[:1]) > 0.3

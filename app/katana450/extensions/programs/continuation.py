@@ -90,7 +90,9 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
             tau = _nearest(action.plan, run.tau, state.setpoint)
         q = action.plan.q(tau)
         action = replace(action, tau=tau)
-    added = [replace(task, name="speed", action=run.speed, after=None)]
+    # The list of steps takes the name of a step from its first task.
+    step = [each.name for each in program.tasks if each.number == task.number][-1].partition(":")[0]
+    added = [replace(task, name=f"{step}: speed", action=run.speed, after=None)]
     if float(np.abs(state.setpoint - q).max()) > START_TOLERANCE:
         way = _way(plan_context, state, q)
         added.append(replace(task, name=RETURN, action=way, after=None))
