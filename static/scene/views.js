@@ -43,6 +43,7 @@ export class Views {
   #shown = ""; // transform of the cube
   #placed = "";
   #canvas = null;
+  #sheet = null;
   #until = 0; // ms, when the camera counts as still again
   #sized = new ResizeObserver(() => this.turned());
 
@@ -117,9 +118,13 @@ export class Views {
     const world = viewer?.cameraControl && this.#inner.node("");
     if (!world) return;
     const { camera, canvas } = viewer;
-    if (canvas !== this.#canvas) {
+    // The panel of a phone, whose upper half lies over the picture at full height.
+    const { NARROW, PANEL } = this.#inner;
+    const sheet = this.#scene.contentWindow.matchMedia(NARROW).matches && canvas.ownerDocument.querySelector(PANEL);
+    if (canvas !== this.#canvas || sheet !== this.#sheet) {
       this.#sized.disconnect();
       this.#sized.observe((this.#canvas = canvas));
+      if ((this.#sheet = sheet)) this.#sized.observe(sheet);
     }
     const { elements: m } = camera.matrixWorldInverse.clone().multiply(world.matrixWorld);
     // From the box of the cube to the base frame, to the camera, and to the screen, whose y points down.
@@ -129,7 +134,8 @@ export class Views {
     });
     const shown = matrix(x, y, z, [0, 0, 0, 1]);
     if (shown !== this.#shown) this.#cube.style.transform = this.#shown = shown;
-    const { left, bottom } = canvas.getBoundingClientRect();
+    const { left, bottom: end } = canvas.getBoundingClientRect();
+    const bottom = Math.min(end, sheet ? sheet.getBoundingClientRect().top : end);
     const { offsetLeft, offsetTop } = this.#scene;
     const placed = `${offsetLeft + left + EDGE}px ${offsetTop + bottom - EDGE}px`;
     if (placed === this.#placed) return;

@@ -37,6 +37,10 @@ class Grip(ABC):
     def _point_at(self, value: float) -> Array:
         """Return the point (3,) of three.js's world to which the mouse must point for the value."""
 
+    def pixels(self, value: float) -> tuple[Pixel, Pixel]:
+        """Return where a finger is put down for a drag to ``value``, and where it is lifted."""
+        return self._pixel, self._page.project_three(self._point_at(value))
+
     def to(self, value: float) -> None:
         """Move the handle to a value relative to the start of the grip."""
         self._mouse.move(*self._page.project_three(self._point_at(value)))
