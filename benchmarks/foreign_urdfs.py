@@ -46,7 +46,7 @@ FREE_RANGE = 2.0
 
 @dataclass
 class Result:
-    """What became of one file.
+    """The result of one file.
 
     Attributes:
         name: of the robot.
