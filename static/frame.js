@@ -157,7 +157,7 @@
   });
 
   window.katanaScene = { ...Viser, ...Fit };
-  Viser.start(outer?.entry?.entered);
+  Viser.start();
   Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

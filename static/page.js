@@ -6,7 +6,6 @@
   const QUIET = 300; // ms without a message after which the state is unknown
   const ANSWER = 500; // ms without an answer after which a STOP is repeated by HTTP
   const TOAST = 4000; // ms
-  const LATE = 5000; // ms without a drawing after which it is checked whether this browser can draw
   const SIGN_IN = 4401; // close code: the page has to sign in again
   const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
@@ -23,7 +22,7 @@
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
-  const { page, randomName } = window.entry;
+  const page = name();
   const worker = new Worker("static/link.js");
   const say = (message) => {
     worker.postMessage({ say: message });
@@ -42,6 +41,26 @@
   let people = null;
   let timeline = null;
   let past = null; // what to do with the timeline when the scene is drawn
+
+  // A reloaded page keeps its name; a second tab gets another. A browser may refuse to store it.
+  function name() {
+    /** @type {any[]} */
+    const [entry] = performance.getEntriesByType("navigation");
+    const again = entry?.type === "reload";
+    const fresh = randomName();
+    try {
+      const old = again && sessionStorage.getItem("page");
+      sessionStorage.setItem("page", old || fresh);
+      return old || fresh;
+    } catch {
+      return fresh;
+    }
+  }
+
+  function randomName() {
+    const bytes = crypto.getRandomValues(new Uint8Array(16));
+    return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  }
 
   // STOP
 
@@ -134,23 +153,19 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  // Where nothing is drawn for a while, drawing may be impossible. Trying takes time, so it comes late.
-  let isDrawn = null;
-  const drawing = new Promise((done) => (isDrawn = done));
+  const canDraw = document.createElement("canvas").getContext("webgl2") !== null;
   const drawn = () => {
-    isDrawn();
+    if (!canDraw) return;
     byId("poster").classList.add("done");
     takeHold();
     if (past) showTimeline(true, past);
     past = null;
   };
-  setTimeout(() => {
-    const canDraw = byId("poster").classList.contains("done") || document.createElement("canvas").getContext("webgl2");
-    if (canDraw) return;
+  if (!canDraw) {
     byId("poster").classList.add("failed");
     byId("poster").querySelector("p").textContent =
       "This browser cannot draw the scene: WebGL 2 is off or missing. Turn on hardware acceleration in its settings, or use another browser. STOP and Jog work without it.";
-  }, LATE);
+  }
   const SHEETS = ["jog", "objects", "teach", "episodes"];
   const closeSheets = () => SHEETS.forEach((id) => byId(id)?.hidden === false && show(id, false));
   window.katana = { key, blur, toast, drawn, closeSheets, view: null, live: () => timeline?.live() };
@@ -340,7 +355,7 @@
       unknown();
       Jog.quiet();
       stage?.drop();
-      if (data.code === SIGN_IN) window.entry.enter().then(sign).catch(() => {});
+      if (data.code === SIGN_IN) enter().catch(() => {});
     } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
@@ -515,16 +530,24 @@
 
   // Sign-in
 
-  function sign({ ok, out, why, stopPort: port }) {
-    stopPort = port ?? stopPort;
-    byId("gate").hidden = ok;
-    byId("gate").classList.toggle("out", out);
-    if (why) byId("gate-why").textContent = why;
-    return ok;
+  // An access link has its token behind the #, which browsers do not send. It is sent once, by POST.
+  async function enter() {
+    const token = location.hash.slice(1);
+    if (token) history.replaceState(null, "", location.pathname + location.search);
+    const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
+    stopPort = answer.headers.get("X-Stop-Port") ?? stopPort;
+    byId("gate").hidden = answer.ok;
+    // 403: an admin has disconnected this person, whose STOP still works.
+    byId("gate").classList.toggle("out", answer.status === 403);
+    if (answer.status === 403 || (token && !answer.ok)) byId("gate-why").textContent = await answer.text();
+    return answer.ok;
   }
 
-  window.entry.entered.then((answer) => {
-    if (!sign(answer)) return;
+  enter().then((mayEnter) => {
+    if (!mayEnter) return;
+    // Pass on no other parameters: some parameters of viser's page could harm the server.
+    const query = [...new URLSearchParams(location.search)].filter(([key]) => Viser.PARAMETER.test(key));
+    scene.src = `viser/?${new URLSearchParams([["page", page], ...query])}`;
     const { protocol, host } = location;
     worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });
     if (kept?.getItem(OPEN) === "yes") showInstruments(true);
@@ -532,7 +555,7 @@
     const moment = new URLSearchParams(location.search).get("moment");
     if (moment || kept?.getItem(PAST) === "yes") past = (there) => moment && there.goTo(moment);
     window.addEventListener("status", ({ detail }) => {
-      if (detail.role !== "viewer" && !kept?.getItem(WELCOMED)) drawing.then(showWelcome);
+      if (canDraw && detail.role !== "viewer" && !kept?.getItem(WELCOMED)) showWelcome();
     }, { once: true });
   });
 })();

@@ -50,14 +50,13 @@ const Viser = (() => {
     );
   }
 
-  // Start viser's program as soon as the decoder of its messages, which it expects, is compiled, the
-  // document is there, and `entered` allows it.
-  async function start(entered = null) {
+  // Start viser's program as soon as the decoder of its messages, which it expects, is compiled, and
+  // the document is there.
+  async function start() {
     const decoder = WebAssembly.compileStreaming(fetch("zstd.wasm"));
     if (document.readyState === "loading")
       await new Promise((done) => document.addEventListener("DOMContentLoaded", done));
     window.__viserZstdWasm = await decoder;
-    if (entered && !(await entered).ok) return;
     // By a name that the check of types does not look up: the server makes this file.
     const program = "../viser/program.js";
     await import(program);

@@ -2,8 +2,6 @@
 interface Window {
   /** Set by page.js for the frame that viser's page is in. */
   katana?: { key(event: Event): void; blur(): void; toast(words: string): void; drawn(): void; closeSheets(): void; live(): void; turned?(): void; view: any };
-  /** Set by enter.js. */
-  entry?: { page: string; randomName(): string; enter(): Promise<Entered>; entered: Promise<Entered> };
   /** Set by frame.js in viser's page. */
   katanaScene?: { pixelOf(place: string | number[]): number[] | null; fold?(): void };
   /** The state of viser's own client. */
@@ -11,8 +9,6 @@ interface Window {
   /** The decoder of zstd that its program expects. */
   __viserZstdWasm?: WebAssembly.Module;
 }
-/** The answer to a sign-in: whether the person may enter, or is kept out; why not; the port of STOP. */
-interface Entered { ok: boolean; out: boolean; why: string; stopPort: string | null }
 interface Navigator {
   /** WebHID, which only some browsers have. */
   hid?: any;

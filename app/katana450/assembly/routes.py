@@ -112,7 +112,7 @@ def application(
     routes = [
         Route("/", page),
         Route("/static/{name:path}", file),
-        *_viser_routes(address),
+        *_viser_routes(authenticator, address),
         Route("/enter", enter, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),
         _leave_route(hub, authenticator),
@@ -133,10 +133,11 @@ async def _muted(_request: Request, error: Exception) -> Response:
     return PlainTextResponse(str(error), TOO_MANY, retry)
 
 
-def _viser_routes(address: Address) -> list[Route]:
+def _viser_routes(authenticator: Authenticator, address: Address) -> list[Route]:
     viser, policy = viser_page.load(), viser_page.policy()
 
     async def page(request: Request) -> Response:
+        _signed_in(authenticator, request)
         scheme = "wss" if address.cookies_are_secure else "ws"
         origin = f"{scheme}://{request.headers['host']}"
         why = viser_page.objection(request.query_params, origin)
