@@ -22,7 +22,9 @@ const Viser = (() => {
   const STEADY = `canvas { opacity: 1 !important }
     html[data-theme=dark]:not([data-mantine-color-scheme=dark]) #root { opacity: 0 }
     html[data-loading] .mantine-Stack-root:has(> .mantine-TextInput-root) { visibility: hidden }`;
-  const [CONNECTED, BATCH, SEND, SERVER] = ["connected", "message_batch", "send", "set_server"];
+  const [CONNECTED, CLOSED, BATCH, SEND, SERVER, RETRY] = ["connected", "closed", "message_batch", "send", "set_server", "retry"];
+  // The worker gives up an attempt to connect after 5 s, and reports it as closed. [ms]
+  const ATTEMPT = 6000;
 
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const groups = new Map(); // labels of the rows of buttons, by id
@@ -112,6 +114,7 @@ const Viser = (() => {
   function tap({ server, sends, connected, hears }) {
     const Plain = window.Worker;
     window.Worker = class extends Plain {
+      #tried = -Infinity; // time of an attempt to connect that has not ended
       #line = {
         say: (message) => super.postMessage({ type: SEND, message }),
         show: (messages) =>
@@ -123,6 +126,7 @@ const Viser = (() => {
         page = this;
         // This listener runs before viser's own, which is set later.
         this.addEventListener("message", ({ data }) => {
+          if (data?.type === CLOSED || data?.type === CONNECTED) this.#tried = -Infinity;
           if (data?.type === CONNECTED) {
             groups.clear();
             connected();
@@ -141,6 +145,10 @@ const Viser = (() => {
       }
 
       postMessage(data, ...rest) {
+        // viser tries again each second, and each attempt ends the one before. A server that takes longer to answer,
+        // because it or the line is slow, would never be reached.
+        if (data?.type === RETRY && performance.now() - this.#tried < ATTEMPT) return;
+        if (data?.type === RETRY || data?.type === SERVER) this.#tried = performance.now();
         if (data?.type === SERVER) data = { ...data, server: server(data.server, this.#line) };
         if (data?.type === SEND && !sends(data.message, this.#line)) return;
         super.postMessage(data, ...rest);

@@ -103,6 +103,19 @@ def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
         assert not np.allclose(camera(page), looked, atol=0.02)
 
 
+def test_page_reconnects_to_a_server_that_answers_slowly(open_page: OpenPage) -> None:
+    with AppServer() as server, SlowLink(server.port, 1e9) as line:
+        page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
+        server.kill()
+        page.wait_lost()
+        # An answer takes longer than the second after which viser tries again.
+        line.delay = 0.7
+        server.restart()
+        page.wait_until(lambda: page.connected, "viser to come back", seconds=20.0)
+        line.delay = 0.0
+        page.wait_ready(("/arm", MOVE))
+
+
 def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) -> None:
     with AppServer(ATTENTIVE_APP) as server, SlowLink(server.port, 1e9) as line:
         truth = Truth(server)

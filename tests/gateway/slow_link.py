@@ -20,13 +20,13 @@ class SlowLink:
     """Context manager that relays connections from ``port`` to ``to_port`` on this machine.
 
     ``rate``: bytes per second in each direction for all connections together. ``delay``: one-way
-    delay [s]. ``cut`` silences the line without closing it.
+    delay [s], which can be changed. ``cut`` silences the line without closing it.
     """
 
     def __init__(self, to_port: int, rate: float, delay: float = 0.0) -> None:
         self.rate = rate
         self.cut = False
-        self._delay = delay
+        self.delay = delay
         self._to_port = to_port
         self._loop = asyncio.new_event_loop()
         self._listening = socket.create_server(("127.0.0.1", 0))
@@ -73,7 +73,13 @@ class SlowLink:
         line = socket.socket()
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW)
         line.setblocking(False)
-        await self._loop.sock_connect(line, ("127.0.0.1", self._to_port))
+        try:
+            await self._loop.sock_connect(line, ("127.0.0.1", self._to_port))
+        except OSError:
+            # The server is down.
+            line.close()
+            back.transport.abort()
+            return
         far, forth = await asyncio.open_connection(sock=line, limit=WINDOW)
         tasks = [
             asyncio.create_task(self._carry(near, forth, 0)),
@@ -96,7 +102,7 @@ class SlowLink:
         while data := await source.read(max(int(self.rate * SLICE), 64)):
             now = self._loop.time()
             self._free_at[way] = max(self._free_at[way], now) + len(data) / self.rate
-            await asyncio.sleep(self._free_at[way] - now + self._delay)
+            await asyncio.sleep(self._free_at[way] - now + self.delay)
             while self.cut:
                 await asyncio.sleep(SLICE)
             to.write(data)
