@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import OrderedDict
 from contextlib import suppress
 from pathlib import PurePath
+from typing import Any
 
 import pytest
 from xdist.scheduler.loadscope import LoadScopeScheduling
@@ -33,6 +35,7 @@ KINDS = {
     "tests/docs": SERVERS[0],
     "tests/examples": SERVERS[1],
     "tests/leader/test_leader_on_a_server.py": SERVERS[1],
+    "tests/leader/test_leader_run.py": BROWSER,
     "tests/library/test_run.py": SERVERS[1],
     "tests/real_arm/test_arm_commands.py": SERVERS[0],
     "tests/real_arm/test_driver.py": SERVERS[1],
@@ -40,8 +43,17 @@ KINDS = {
     "tests/real_arm/test_session_with_driver.py": SERVERS[1],
     "tests/real_arm/test_emulator_process.py": SERVERS[0],
     "tests/real_arm/test_faults.py": SERVERS[0],
+    "tests/general_arms/test_branches_on_a_server.py": SERVERS[1],
+    "tests/general_arms/test_driven_on_a_server.py": SERVERS[1],
+    "tests/general_arms/test_map_on_a_server.py": SERVERS[1],
+    "tests/general_arms/test_obstacles_on_a_server.py": SERVERS[0],
+    "tests/general_arms/test_scripts_on_a_server.py": SERVERS[1],
+    "tests/recording/test_attached_scripts.py": SERVERS[1],
+    "tests/recording/test_default_folder.py": BROWSER,
     "tests/recording/test_episodes_on_a_server.py": SERVERS[1],
+    "tests/recording/test_recording_jobs.py": BROWSER,
     "tests/recording/test_recorder.py": SERVERS[0],
+    "tests/recording/test_recorder_in_trouble.py": BROWSER,
     "tests/recording/test_run_again_on_a_server.py": SERVERS[0],
     "tests/robot/test_other_arms.py": SERVERS[1],
     "tests/api/test_descriptions.py": SERVERS[1],
@@ -68,8 +80,23 @@ def kind_of(nodeid: str) -> str:
     return path.as_posix()
 
 
+class Queue(OrderedDict[str, Any]):
+    """Kinds of tests that wait for a process: those that mostly wait come first."""
+
+    def popitem(self, last: bool = True) -> tuple[str, Any]:
+        """Remove the kind that is given out next, and return it with its tests."""
+        for kind in (*SERVERS, BROWSER, EARLY):
+            if kind in self:
+                return kind, self.pop(kind)
+        return super().popitem(last)
+
+
 class Schedule(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
-    """The tests of one kind run in one process, the kinds with the most tests first."""
+    """The tests of one kind run in one process; after browser and servers those with the most."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.workqueue: OrderedDict[str, Any] = Queue()
 
     def _split_scope(self, nodeid: str) -> str:
         return kind_of(nodeid)
