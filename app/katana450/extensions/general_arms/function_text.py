@@ -90,8 +90,8 @@ def _uses(values: Iterable[Number], *, rarely: bool) -> dict[int, int]:
             continue
         for k, each in enumerate(term.arguments):
             waiting += [each] * term.text.count(f"{{{k}}}")
-        if term.fork is not None:
-            fork, place = term.fork
+        if term.forked is not None:
+            fork, place = term.forked
             waiting += [
                 values[place] for k, values in enumerate(fork.values) if rarely or k != fork.rare
             ]

@@ -95,7 +95,7 @@ class TermList:
         if not isinstance(angle, Term):
             return wrapped(angle)
         sign, base, offset = _parts(angle)
-        if base.fork is not None and sign > 0.0:
+        if base.forked is not None and sign > 0.0:
             return self._joined(base, offset)
         quarters = round(offset / QUARTER)
         if base.text == ATAN2 and abs(offset - quarters * QUARTER) < ROUNDED:
@@ -122,8 +122,8 @@ class TermList:
         """Return the angle ``base`` + ``offset`` [rad] in a turn, on both ways of its fork."""
         key = (base.number, offset)
         if key not in self._turned:
-            assert base.fork is not None
-            fork, place = base.fork
+            assert base.forked is not None
+            fork, place = base.forked
             outside, values = self._blocks, []
             for block, way in zip(fork.blocks, fork.values, strict=True):
                 self._blocks = [*fork.path, block]
@@ -246,7 +246,7 @@ class TermList:
         """Return the term that is ``a`` on one way of ``fork``, and ``b`` on the other."""
         (low, high), (lower, upper) = span_of(a), span_of(b)
         made = self._made("", (), (min(low, lower), max(high, upper)))
-        made.text, made.fork = f"t{made.number}", (fork, len(fork.terms))
+        made.text, made.forked = f"t{made.number}", (fork, len(fork.terms))
         fork.terms.append(made)
         for values, each in zip(fork.values, (a, b), strict=True):
             values.append(each)

@@ -31,12 +31,12 @@ class Term:
         arguments: terms and numbers.
         number: counts the terms.
         span: between which numbers it lies.
-        fork: the fork that computes it, and its place among the values there; None for others.
+        forked: the fork that computes it, and its place among the values there; None for others.
     """
 
     # numpy leaves products with its numbers to this class.
     __array_ufunc__ = None
-    __slots__ = ("arguments", "fork", "number", "owner", "span", "text")
+    __slots__ = ("arguments", "forked", "number", "owner", "span", "text")
 
     def __init__(
         self, owner: TermList, text: str, arguments: tuple[Number, ...], number: int, span: Span
@@ -46,7 +46,7 @@ class Term:
         self.arguments = arguments
         self.number = number
         self.span = span
-        self.fork: tuple[Fork, int] | None = None
+        self.forked: tuple[Fork, int] | None = None
 
     def __add__(self, other: Number) -> Number:
         if _is(other, 0.0):
