@@ -19,7 +19,7 @@ def test_both_sessions_of_a_robot_are_measured(
     path.write_text(rail())
     joint_contacts.measure(path)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("rail: 2 joints, 3 bodies, 2 pairs")
+    assert lines[0].startswith("rail: 2 joints, 4 bodies, 5 pairs")
     assert [line.split("p50")[0].strip() for line in lines[1:]] == [
         "without contacts",
         "with contacts",
