@@ -24,7 +24,7 @@ from tests.gateway.lines import post
 THERE = [0.4, -1.1, 1.3, 0.3, 0.2]
 FAR = [2.5, -1.1, 1.3, 0.3, 0.2]
 # Without programs, the recording is left out with its options.
-STRICT_APP = (*RECORDING_APP, "--strict-silence")
+STRICT_APP = (*RECORDING_APP, "--strict-silence", "--silence", "2.0")
 
 STATION = """
 from katana450.arm.control import commands as cmd
@@ -101,7 +101,7 @@ def test_server_starts_and_drives(server: AppServer, arm: Client) -> None:
     state = arm.joints(THERE)
     assert state.why == ""
     assert np.abs(np.array(state.q) - THERE).max() < 1e-6
-    assert state.holder == "Driver"
+    assert state.holder == arm.welcome.name
     assert state.program is None
     assert arm.go(requests.Position(p=(0.4, 0.1, 0.05))).why == ""
     # No message reports a missing feature, because the extension was removed on purpose.
@@ -182,7 +182,7 @@ def test_another_distribution_provides_the_runner(tmp_path: Path) -> None:
     distribution(tmp_path, "station:EXTENSION", STATION)
     with (
         without(tmp_path, "programs"),
-        AppServer((*STRICT_APP, "--silence", "2.0")) as server,
+        AppServer(STRICT_APP) as server,
         connect(server.url, "Watcher") as watcher,
     ):
         start = watcher.query(answers.State)

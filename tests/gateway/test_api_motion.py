@@ -28,7 +28,9 @@ def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: 
     assert there.why == ""
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
     np.testing.assert_allclose(np.array(there.T), forward(arm.chain, THERE), rtol=0, atol=1e-12)
-    assert there.holder == program.welcome.name == "Test"
+    # The client of the test before may not have left yet; then this one has a number too.
+    assert there.holder == program.welcome.name
+    assert program.welcome.name.startswith("Test")
     described = program.query(answers.Arm)
     assert described.joints == list(arm.chain.names)
     np.testing.assert_array_equal(described.ready, READY)
