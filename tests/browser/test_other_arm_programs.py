@@ -117,6 +117,7 @@ def test_script_is_previewed_paused_stopped_by_a_phone_and_continued(
     assert phone.errors == []
 
 
+@pytest.mark.long
 def test_drag_is_undone_and_a_server_lost_in_a_drag_is_found_again(
     server: AppServer, open_page: OpenPage
 ) -> None:

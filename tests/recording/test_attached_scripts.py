@@ -182,6 +182,7 @@ def _started(client: Client) -> bool:
     return True
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 def test_script_that_runs_is_attached_again_after_a_crash(server: AppServer, folder: Path) -> None:
     """Both files have it: the one that is repaired, and that of the next process."""
@@ -242,6 +243,7 @@ def recorded_ring(folder: Path, notes: Path, times: tuple[tuple[float, float | N
     kept.close()
 
 
+@pytest.mark.long
 def test_each_file_of_a_ring_has_the_scripts_that_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -217,6 +217,7 @@ def test_viewers_begin_no_job(tmp_path: Path) -> None:
         assert caught.value.status_code == 403
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc")
 def test_job_ends_with_a_server_that_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
