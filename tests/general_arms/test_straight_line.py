@@ -35,7 +35,8 @@ def both(solver: ClosedForm, q: FloatArray, *, checks: bool = False) -> tuple[An
     T, form, chain = forward(solver.chain, q), solver.form, solver.chain
     angles = q[::-1] if solver.is_reversed else q
     alpha = (angles + form.links.shift).tolist()
-    rows = form.rows(se3.inverse(T) if solver.is_reversed else T)
+    columns = form.columns((se3.inverse(T) if solver.is_reversed else T)[None])
+    rows = [[float(each[0]) for each in row] for row in columns]
     found = np.array(form.build(form.links, FLOATS)(rows, alpha)) - form.links.shift
     written = one_pose(chain, form, is_reversed=solver.is_reversed, checks=checks)
     return written(T.ravel().tolist(), alpha), found[:, ::-1] if solver.is_reversed else found

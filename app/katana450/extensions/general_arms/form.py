@@ -22,7 +22,6 @@ from katana450.extensions.general_arms.spherical_wrist import (
     why_not_spherical,
 )
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.se3 import Rows
 
 
 class Form(NamedTuple):
@@ -40,17 +39,11 @@ class Form(NamedTuple):
     build: Callable[[DHLinks, Operations], Solve]
     keeps_tool_point: bool = False
 
-    def rows(self, T: FloatArray) -> Rows:
-        """Return the rows that the formulas read, for `T` (4, 4) = T_S_tool."""
-        if not self.keeps_tool_point:
-            return self.links.rows(T)
-        here: FloatArray = self.links.T_1_S @ T
-        here[:3, :3] = here[:3, :3] @ self.links.T_n_tool[:3, :3].T
-        rows: Rows = here.tolist()
-        return rows
-
     def columns(self, T: FloatArray) -> list[list[FloatArray]]:
-        """Return the same rows of many poses `T` (N, 4, 4): an array (N,) in place of a number."""
+        """Return the rows that the formulas read, for many poses `T` (N, 4, 4) = T_S_tool.
+
+        An array (N,) is in place of a number.
+        """
         here = self.links.T_1_S @ T
         if self.keeps_tool_point:
             here[:, :3, :3] = here[:, :3, :3] @ self.links.T_n_tool[:3, :3].T

@@ -23,7 +23,6 @@ import numpy as np
 from katana450 import tolerances
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.geometry.se3 import Rows
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.turns import wrapped
 
@@ -71,11 +70,6 @@ class DHLinks:
         """An upper bound [m] on the distance of the tool point from axis 1's frame."""
         tool = float(np.linalg.norm(self.T_n_tool[:3, 3]))
         return sum(self.a) + sum(map(abs, self.d)) + tool
-
-    def rows(self, T: FloatArray) -> Rows:
-        """Return the pose (4, 4) of the last frame in the first, for `T` = T_S_tool, as lists."""
-        rows: Rows = (self.T_1_S @ T @ self.T_tool_n).tolist()
-        return rows
 
     def is_parallel(self, i: int) -> bool:
         """Return whether axes i and i + 1 (from 1) are parallel or opposite."""

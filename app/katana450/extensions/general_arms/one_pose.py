@@ -69,7 +69,7 @@ def _is_clean(terms: TermList, rows: Matrix) -> list[Number]:
 
 
 def _inner(form: Form, rows: Matrix) -> Matrix:
-    """Return the rows (3, 4) that the formulas read, as `Form.rows`."""
+    """Return the rows (3, 4) that the formulas read, as `Form.columns`."""
     before, after = _exact(form.links.T_1_S), _exact(form.links.T_tool_n)
     here = _product(before, rows)
     turned = _product(here, after)
