@@ -9,6 +9,8 @@ import pytest
 
 WIDE, WIDER, PORTRAIT, LANDSCAPE = (1440, 900), (1920, 1080), (390, 844), (844, 390)
 
+SIZES = {"wide": WIDE, "wider": WIDER, "portrait": PORTRAIT, "landscape": LANDSCAPE}
+
 PHONE: dict[str, Any] = {"has_touch": True, "is_mobile": True}
 """Playwright's options of a phone."""
 

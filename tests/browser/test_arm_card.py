@@ -13,12 +13,10 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
 from tests.browser.session import MOVE, READY, Truth, clear_stop
-from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, WIDER, in_sizes_and_schemes
+from tests.browser.sizes import PHONE, SIZES, WIDE, in_sizes_and_schemes
 from tests.browser.test_accessibility import AXE, VIOLATIONS
 from tests.gateway.client import enter
 from tests.real_arm.emulated import emulator
-
-SIZES = {"wide": WIDE, "wider": WIDER, "portrait": PORTRAIT, "landscape": LANDSCAPE}
 
 
 @pytest.fixture

@@ -23,11 +23,10 @@ from tests.browser.page import FIRST_VISIT, Pixel, ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import AXES, MOVE, Truth, bar, clear_stop
 from tests.browser.shared_server import SharedServer
-from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, WIDER, in_sizes_and_schemes
+from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, SIZES, in_sizes_and_schemes
 
 pytestmark = pytest.mark.long
 
-SIZES = {"wide": WIDE, "wider": WIDER, "portrait": PORTRAIT, "landscape": LANDSCAPE}
 PHONES = (PORTRAIT, LANDSCAPE)
 PLANNED = 60.0
 """Timeout [s] of a plan on a busy machine."""

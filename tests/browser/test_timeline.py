@@ -22,7 +22,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.session import Truth, prepare
 from tests.browser.sight import overlap
-from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, in_sizes_and_schemes
+from tests.browser.sizes import PHONE, SIZES, WIDE, in_sizes_and_schemes
 
 GHOST = "/playback/0/arm"
 LINK = "/arm/base_link/arm_base_link/pan_link"
@@ -47,7 +47,7 @@ CUT = """(all) => all.filter((each) => {
 }).map((each) => each.selectedOptions[0].text)""".replace("ARROW", "14")
 """Script that returns the words of lists that are cut off before the arrow."""
 
-EXEMPT = {("header", "phone"), ("header", "landscape"), ("nav", "landscape")}
+EXEMPT = {("header", "portrait"), ("header", "landscape"), ("nav", "landscape")}
 """Parts that may overlap the timeline's box: the header's box includes the buttons of the page."""
 
 
@@ -282,13 +282,14 @@ def test_link_opens_the_page_at_its_moment(
 
 
 @pytest.mark.long
-@in_sizes_and_schemes(("wide", "phone", "landscape"))
+@in_sizes_and_schemes(("wide", "portrait", "landscape"))
 def test_timeline_covers_nothing(
     server: AppServer, open_page: OpenPage, artefacts: Path, size: str, scheme: str
 ) -> None:
-    window = {"wide": WIDE, "phone": PORTRAIT, "landscape": LANDSCAPE}[size]
     options = {} if size == "wide" else PHONE
-    page = open_page(server.url, nodes=("/arm",), window=window, color_scheme=scheme, **options)
+    page = open_page(
+        server.url, nodes=("/arm",), window=SIZES[size], color_scheme=scheme, **options
+    )
     opened(page)
     scene = page.page.locator("#scene").bounding_box()
     place(page, 1.0)
@@ -303,7 +304,7 @@ def test_timeline_covers_nothing(
         box = page.page.locator(name).bounding_box()
         assert box is not None
         assert not overlap(timeline, **box) or (name, size) in EXEMPT, name
-    assert timeline["y"] + timeline["height"] <= window[1] + 0.5
+    assert timeline["y"] + timeline["height"] <= SIZES[size][1] + 0.5
     small = page.page.locator("#timeline :is(button, select):visible").evaluate_all(
         "(all) => all.map((each) => each.getBoundingClientRect().height)"
     )

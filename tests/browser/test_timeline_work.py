@@ -14,7 +14,7 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.sight import overlap
-from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, in_sizes_and_schemes
+from tests.browser.sizes import PHONE, SIZES, WIDE, in_sizes_and_schemes
 
 MAX_SECONDS = 60_000
 """[ms] Timeout of a short job on a busy machine."""
@@ -76,13 +76,14 @@ def test_selection_is_verified_exported_and_cancelled(
 
 
 @pytest.mark.long
-@in_sizes_and_schemes(("wide", "phone", "landscape"))
+@in_sizes_and_schemes(("wide", "portrait", "landscape"))
 def test_progress_covers_nothing(
     server: AppServer, open_page: OpenPage, artefacts: Path, size: str, scheme: str
 ) -> None:
-    window = {"wide": WIDE, "phone": PORTRAIT, "landscape": LANDSCAPE}[size]
     options = {} if size == "wide" else PHONE
-    page = open_page(server.url, nodes=("/arm",), window=window, color_scheme=scheme, **options)
+    page = open_page(
+        server.url, nodes=("/arm",), window=SIZES[size], color_scheme=scheme, **options
+    )
     opened(page)
     page.page.get_by_role("button", name=re.compile("^Verify the selection")).click()
     row = page.page.locator("#timeline .work")
