@@ -149,6 +149,7 @@ class AsyncClient:
         to clear it, or if it cannot be cleared within ``seconds``.
         """
         end = time.monotonic() + seconds
+        current = time.monotonic() + 1.0  # After this time a state that showed no stop is not late.
         while True:
             state = await self.query(answers.State)
             if state.stopped is None or state.clearable or time.monotonic() > end:
@@ -158,7 +159,8 @@ class AsyncClient:
                 except RefusedError:
                     # A stop on another path may be newer than the state.
                     newest = await self.query(answers.State)
-                    if newest.stopped is None or newest.clearable or time.monotonic() > end:
+                    latest = min(end, current) if newest.stopped is None else end
+                    if newest.clearable or time.monotonic() > latest:
                         raise
             await asyncio.sleep(0.02)
 
