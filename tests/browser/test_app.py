@@ -215,6 +215,7 @@ def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot) -> None:
     assert steps.max() < 0.25 * whole
 
 
+@pytest.mark.long
 def test_the_gripper_slider_moves_both_fingers(robot: Robot) -> None:
     robot.page.drag_slider("Gripper", 0.0)
     closed = [finger_turn(robot, name) for name in ("finger_right_link", "finger_left_link")]

@@ -153,6 +153,7 @@ def test_value_typed_before_a_stop_is_not_sent_after_it(page: ViserPage, truth: 
     assert np.allclose(truth.status()["q"], READY, atol=1e-9)
 
 
+@pytest.mark.long
 def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
     box = page.number_box("1 base turn")
     watch = Watch(page)

@@ -151,7 +151,7 @@ def test_knob_of_a_spectator_springs_back_with_the_reason(
         other.ask(requests.ReleaseLease())
 
 
-@pytest.mark.parametrize("key", ["Space", "Escape"])
+@pytest.mark.parametrize("key", ["Space", pytest.param("Escape", marks=pytest.mark.long)])
 def test_stop_keys_work_on_a_knob(page: ViserPage, truth: Truth, key: str) -> None:
     pause = page.page.locator("#instruments .toolbar").get_by_role("button", name="Pause")
     with slowly(page, truth):

@@ -268,6 +268,7 @@ def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage
     truth.wait(moving=False)
 
 
+@pytest.mark.long
 def test_page_follows_a_leader_until_stop_and_unplugging(
     page: ViserPage, truth: Truth, artefacts: Path, tmp_path: Path
 ) -> None:

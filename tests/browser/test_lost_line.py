@@ -103,6 +103,7 @@ def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
         assert not np.allclose(camera(page), looked, atol=0.02)
 
 
+@pytest.mark.long
 def test_page_reconnects_to_a_server_that_answers_slowly(open_page: OpenPage) -> None:
     with AppServer() as server, SlowLink(server.port, 1e9) as line:
         page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))

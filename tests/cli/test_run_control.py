@@ -104,6 +104,7 @@ def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.long
 def test_saved_file_is_planned_again_and_run_by_enter(
     server: AppServer, watcher: Client, script: Path
 ) -> None:

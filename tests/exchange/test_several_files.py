@@ -207,6 +207,7 @@ def test_serve_places_objects_of_several_files_and_with_a_scale(
     assert "36 triangles" in notes[0]
 
 
+@pytest.mark.long
 def test_a_scene_keeps_all_files_of_an_object(tmp_path: Path) -> None:
     text = (
         "scene: 1\nobjects:\n- name: robot\n  shape: mesh\n  mesh: {file: meshes/robot.wrl}\n"

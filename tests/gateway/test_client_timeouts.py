@@ -105,6 +105,7 @@ def test_missing_states_raise_an_error() -> None:
     _talk(_silent_watch, "states")
 
 
+@pytest.mark.long
 def test_server_that_reads_nothing_raises_an_error() -> None:
     _talk(_deaf, "send")
 

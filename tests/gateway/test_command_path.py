@@ -9,6 +9,8 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+import pytest
+
 from katana450.client import aconnect
 from katana450.client.asynchronous import AsyncClient
 from katana450.server.api import answers
@@ -116,6 +118,7 @@ def test_handle_moved_by_a_spectator_springs_back(
     asyncio.run(drag())
 
 
+@pytest.mark.long
 def test_take_over_ends_the_drag_of_the_former_driver(server: AppServer) -> None:
     async def drag() -> None:
         async with (

@@ -58,6 +58,7 @@ def test_offered_detour_is_taken_by_go(program: Client) -> None:
     assert arrived.detour is None
 
 
+@pytest.mark.long
 def test_go_is_refused_without_an_offer_and_after_a_change(program: Client) -> None:
     program.go(requests.Home())
     with pytest.raises(RefusedError, match="No detour is offered"):

@@ -47,6 +47,7 @@ def state_of(server: AppServer) -> dict[str, object]:
     return state
 
 
+@pytest.mark.long
 def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> None:
     async def act(server: AppServer) -> None:
         async with controlling(server.url) as control:

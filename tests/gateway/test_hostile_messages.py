@@ -226,6 +226,7 @@ def test_invalid_request_changes_nothing(server: AppServer, text: str | bytes) -
     asyncio.run(attack())
 
 
+@pytest.mark.long
 def test_browser_with_false_acknowledgements_is_closed(server: AppServer) -> None:
     async def lie(count: Any) -> int | None:
         async with opened(server.url) as (bad, _):

@@ -86,6 +86,7 @@ def test_silent_connections_do_not_delay_stop(guarded: AppServer, tokens: dict[s
     assert "Traceback" not in guarded.output
 
 
+@pytest.mark.long
 def test_new_clients_are_served_among_silent_ones(
     guarded: AppServer, tokens: dict[str, str]
 ) -> None:
@@ -120,6 +121,7 @@ def test_half_requests_are_closed_and_slow_bodies_refused(server: AppServer) -> 
         assert closed(everybody, 3.0 * WAITING_TIMEOUT) == len(everybody)
 
 
+@pytest.mark.long
 def test_slow_body_is_refused(server: AppServer) -> None:
     head = f"POST /enter HTTP/1.1\r\nHost: x\r\nOrigin: {server.url}\r\nContent-Length: 20\r\n\r\n"
     request = head.replace("Host: x", f"Host: 127.0.0.1:{server.port}").encode()

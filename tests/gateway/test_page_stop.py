@@ -5,11 +5,14 @@ from __future__ import annotations
 import asyncio
 import time
 
+import pytest
+
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import ask, controlling, enter, opened
 
 
+@pytest.mark.long
 def test_stop_press_over_two_channels_counts_once() -> None:
     async def act() -> None:
         with AppServer() as server:

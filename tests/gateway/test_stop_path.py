@@ -308,6 +308,7 @@ def test_stop_of_a_muted_viewer_counts_once_per_interval(tmp_path: Path) -> None
             assert stop(server.stop_url, Authorization=f"Bearer {operator}")[0] == 200
 
 
+@pytest.mark.long
 def test_press_of_a_muted_viewer_uses_up_the_interval_of_both_ports(tmp_path: Path) -> None:
     path = tmp_path / "access.json"
     links, expires = AccessFile.create(path), time.time() + HOUR

@@ -190,6 +190,7 @@ def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServe
         arm.ask(requests.ReleaseLease())
 
 
+@pytest.mark.long
 def test_uploaded_mesh_outlasts_the_front_end(server: AppServer, tmp_path: Path) -> None:
     (tmp_path / "post.wrl").write_text(POST, encoding="utf-8")
     killed = server.front

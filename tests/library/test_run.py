@@ -35,7 +35,9 @@ def test_plan_is_followed_to_its_end(shoulder_arm: katana450.Arm, client: katana
     assert not state.moving
 
 
-@pytest.mark.parametrize("where", ["on the way to the start", "on the plan"])
+@pytest.mark.parametrize(
+    "where", [pytest.param("on the way to the start", marks=pytest.mark.long), "on the plan"]
+)
 def test_stop_that_is_cleared_at_once_ends_the_run(
     shoulder_arm: katana450.Arm, client: katana450.Client, server: AppServer, where: str
 ) -> None:

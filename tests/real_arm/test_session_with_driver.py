@@ -66,7 +66,7 @@ class Operator:
         assert self.state.stopped is None
 
 
-@pytest.fixture(params=["fast", "slow"])
+@pytest.fixture(params=["fast", pytest.param("slow", marks=pytest.mark.long)])
 def operator(request: pytest.FixtureRequest) -> Iterator[Operator]:
     slow = (Delay(seconds=0.03), Jitter(seconds=0.02)) if request.param == "slow" else ()
     arm = EmulatedArm(calibration_scale=60.0)

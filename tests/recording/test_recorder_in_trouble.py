@@ -86,6 +86,7 @@ def whole_times(path: Path, copy: Path) -> list[float]:
     return []
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 def test_recorder_killed_in_motion_loses_a_second(folder: Path, tmp_path: Path) -> None:
     """The next tick that is recorded follows the last one by 1.1 s at most."""
