@@ -47,9 +47,9 @@ def pytest_report_header() -> str:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Deselect long tests unless all tests are requested."""
-    left_out = [] if LONG else [item for item in items if item.get_closest_marker("long")]
+    left_out = set() if LONG else {item for item in items if item.get_closest_marker("long")}
     if left_out:
-        config.hook.pytest_deselected(items=left_out)
+        config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
 
 
