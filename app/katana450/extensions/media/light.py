@@ -36,6 +36,9 @@ PLANE_TOLERANCE = 2e-3
 SAME_NORMAL_COSINE = 0.9
 """Minimum cosine between normals of two pixels of one surface."""
 
+GOLDEN = 0.618034
+"""The golden section [1]."""
+
 
 class Light(NamedTuple):
     """Fractions (n,) of key light and sky light that reach each point, from 0 to 1."""
@@ -123,10 +126,6 @@ def _spots(rays: int) -> Floats:
     first = (ray + (place + 0.5) / 16.0) / rays
     second = (mirrored + 0.5 / 16.0 + ray * GOLDEN) % 1.0
     return np.stack((first, second), axis=2).reshape(-1, 2).astype(np.float32)
-
-
-GOLDEN = 0.618034
-"""The golden section."""
 
 
 def _disc(rays: int) -> Floats:

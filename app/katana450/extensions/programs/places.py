@@ -29,8 +29,8 @@ def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
     """
     if value.kind == "text":
         if value.held not in setting.poses:
-            known = ", ".join(setting.poses) or "none; give it under `poses:`"
-            raise value.wrong(f"There is no pose {value}; there are {known}.")
+            known = ", ".join(setting.poses) or "none"
+            raise value.wrong(f"There is no pose {value}. Under `poses:` are: {known}.")
         return setting.poses[str(value.held)]
     fields = Fields(value, "a place")
     if fields.has("joints"):

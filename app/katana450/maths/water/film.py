@@ -13,8 +13,8 @@ from katana450.maths.water.liquid import Liquid
 from katana450.maths.water.units import REST_FLOW
 
 LANDAU_LEVICH = 0.944
-"""Factor [1] of the law of Landau and Levich; times the sixth root of the capillary number it is
-their thickness over Derjaguin's.
+"""Factor [1] of the law of Landau and Levich. Their thickness divided by that of Derjaguin is this
+factor times the sixth root of the capillary number.
 """
 
 

@@ -39,6 +39,8 @@ KICKED = "An admin has disconnected you."
 
 TOKEN_REQUIRED = "A token is required. `katana450 access give` makes one."
 
+UNKNOWN_HOST = "The server is not known by this host name. `serve --public-url` sets it."
+
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 

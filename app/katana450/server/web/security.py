@@ -8,7 +8,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from katana450.server.web.authenticator import Address
+from katana450.server.web.authenticator import UNKNOWN_HOST, Address
 
 SAFE_METHODS = ("GET", "HEAD")
 
@@ -18,7 +18,7 @@ USED = "gamepad=(self), hid=(self), camera=(), geolocation=(), microphone=(), pa
 """Features that documents may use, except serial ports, which only our own page may ask for."""
 
 EVERYWHERE = {
-    # Static files say otherwise.
+    # Static files set another value.
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
@@ -86,7 +86,7 @@ class SecurityMiddleware:
         headers = Headers(scope=scope)
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self._address.is_ours(host):
-            return "This server does not serve that host name."
+            return UNKNOWN_HOST
         safe = scope["type"] == "http" and scope["method"] in SAFE_METHODS
         program = scope["path"].startswith(FOR_PROGRAMS)
         # Every browser sends Origin when a page opens a websocket or sends data.

@@ -33,7 +33,7 @@ from katana450.server.api.stop_requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.mutes import MutedError, Mutes
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.authenticator import TOKEN_REQUIRED, Address, Authenticator
+from katana450.server.web.authenticator import TOKEN_REQUIRED, UNKNOWN_HOST, Address, Authenticator
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -164,7 +164,7 @@ class StopServer:
 
     def _refusal(self, method: bytes, path: str, host: str, origin: str | None) -> Reply | None:
         if not self._address.is_ours(host):
-            return Reply(HTTPStatus.FORBIDDEN, b"This server does not serve that host name.")
+            return Reply(HTTPStatus.FORBIDDEN, UNKNOWN_HOST.encode())
         if path not in (*STOP_PATHS, "/health"):
             return Reply(HTTPStatus.NOT_FOUND, b"This port serves STOP alone.")
         allowed = "POST" if path in STOP_PATHS else "GET"
