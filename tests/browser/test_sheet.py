@@ -254,6 +254,17 @@ def test_second_finger_presses_stop_while_the_first_is_in_the_scene(
     clear_stop(phone, truth)
 
 
+def test_help_of_a_touch_screen_tells_gestures_instead_of_keys(phone: ViserPage) -> None:
+    phone.page.tap("#help-button")
+    help_text = phone.page.get_by_role("dialog", name="Help")
+    help_text.wait_for()
+    assert phone.page.locator("#help kbd:visible").count() == 0
+    words = help_text.inner_text()
+    assert "Hold a pad or a button" in words
+    assert "two fingers shift and zoom" in words
+    assert "wheel" not in words
+
+
 @pytest.mark.long
 def test_jog_fits_beside_the_scene_in_landscape(
     server: AppServer, open_page: OpenPage, artefacts: Path
