@@ -23,6 +23,7 @@ from tests.general_arms.published_arms import FOUR, KR_6, PINCHERX_100, PUMA_560
 LONG = "KATANA450_LONG" in os.environ
 RANDOM = 10_000 if LONG else 200
 SINGULAR = 10_000 if LONG else 90
+BOTH = 1_000
 
 POSITION = 1e-12
 """[m] The error that is allowed: 1e-9 mm."""
@@ -46,6 +47,14 @@ WRISTS = {
     "Puma 560": (PUMA_560, 4, (0.0,)),
     "KR 6": (KR_6, 4, (0.0,)),
 }
+
+DOUBLE = {
+    "UR5e stretched": (UR5E, 0.0, (0.0, math.pi)),
+    "UR5e folded": (UR5E, math.pi, (0.0, math.pi)),
+    "Puma 560": (PUMA_560, -math.atan2(-0.4331, -0.0203), (0.0,)),
+    "KR 6": (KR_6, math.atan2(0.035, 0.42), (0.0,)),
+}
+"""Arms with the angle of axis 3 that stretches or folds them, and those of a wrist in line."""
 
 
 def closed_form(chain: Chain) -> ClosedForm:
@@ -164,12 +173,16 @@ def test_many_poses_with_a_wrist_in_line_are_solved_as_one() -> None:
         assert ((distance <= POSITION) & (angle <= ROTATION)).any(axis=1).all()
 
 
-def test_stretched_arm_with_a_wrist_in_line_is_found_again() -> None:
+@pytest.mark.parametrize("name", DOUBLE)
+def test_stretched_or_folded_arm_with_a_wrist_in_line_is_found_again(name: str) -> None:
+    """Where both are singular, no solution that counts as exact is off by more than 1e-9 mm."""
+    chain, elbow, wrists = DOUBLE[name]
     rng = np.random.default_rng(10)
-    q = rng.uniform(-3.0, 3.0, (60, 6))
-    q[:, 2] = 10.0 ** rng.uniform(-12.0, -3.0, 60) * rng.choice((0.0, 1.0), 60)
-    q[:, 4] = 10.0 ** rng.uniform(-12.0, -3.0, 60) * rng.choice((0.0, 1.0), 60)
-    check(UR5E, q)
+    q = rng.uniform(chain.lower, chain.upper, (BOTH, chain.n))
+    off = 10.0 ** rng.uniform(-12.0, -1.5, (2, BOTH)) * rng.choice((-1.0, 0.0, 1.0), (2, BOTH))
+    q[:, 2] = elbow + off[0]
+    q[:, 4] = rng.choice(wrists, BOTH) + off[1]
+    check(chain, q)
 
 
 @pytest.mark.parametrize("name", ARMS)

@@ -111,6 +111,11 @@ def test_products_with_zero_and_one_vanish_and_equal_terms_are_computed_once() -
     assert a + -b is a - b
     assert np.float64(1.0) * a is a
     assert a * b is a * b
+    assert (a + 2.0) + 0.5 is a + 2.5
+    assert (a + 2.0) - 0.5 is a + 1.5
+    assert (2.0 - a) - 0.5 is 1.5 - a
+    assert -(a + 2.0) is -2.0 - a
+    assert (a - 2.0) + 2.0 is a
     outputs = [[a * b + a * b, -2.0 * (-a)]]
     assert terms.text("a, b = pose", outputs).count("a * b") == 1
     assert terms.compiled("a, b = pose", outputs)((3.0, 5.0), ()) == [(30.0, 6.0)]
@@ -212,6 +217,20 @@ def test_only_the_value_that_a_condition_selects_is_computed() -> None:
     assert operations.hypot(3.0, 4.0) == 5.0
 
 
+def test_comparison_of_a_named_term_is_written_where_it_decides() -> None:
+    terms = TermList()
+    f = terms.operations()
+    a, b = terms.term("a"), terms.term("b")
+    size = a * b
+    outputs = [[f.select(size <= 1.0, a, b), f.select(size <= 1.0, b, size), abs(size)]]
+    text = terms.text("a, b = pose", outputs)
+    assert text.count("a * b") == 1
+    assert text.count("<= 1.0") == 2
+    solve = terms.compiled("a, b = pose", outputs)
+    assert solve((-2.0, 3.0), ()) == [(-2.0, 3.0, 6.0)]
+    assert solve((2.0, 3.0), ()) == [(3.0, 6.0, 6.0)]
+
+
 @pytest.mark.parametrize(
     ("span", "angles", "expected"),
     [
@@ -250,3 +269,21 @@ def test_angle_is_brought_into_the_turn_inside_its_limits(
     a = terms.term("a", span=(-math.pi, math.pi))
     solve = terms.compiled("a, = pose", [[terms.turned(a, *limits)]])
     assert solve((angle,), ())[0][0] == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize("limits", [(-3.4, 1.0), (-1.0, 3.4), (-4.0, 2.0), (-2.0, 4.5)])
+@pytest.mark.parametrize("span", [(-4.0, 4.0), (-6.2, math.pi), (-math.pi, 6.2)])
+def test_sum_of_angles_is_brought_inside_the_limits_in_one_step(
+    limits: tuple[float, float], span: tuple[float, float]
+) -> None:
+    terms = TermList()
+    a = terms.term("a", span=span)
+    solve = terms.compiled("a, = pose", [[terms.turned(a, *limits)]])
+    for angle in np.linspace(*span, 401).tolist():
+        found = solve((angle,), ())[0][0]
+        assert math.remainder(found - angle, math.tau) == pytest.approx(0.0, abs=1e-14)
+        turns = [angle + k * math.tau for k in (-2, -1, 0, 1, 2)]
+        if any(limits[0] - 1e-9 <= each <= limits[1] + 1e-9 for each in turns):
+            assert limits[0] - 1e-9 <= found <= limits[1] + 1e-9
+        else:
+            assert abs(found) <= math.pi + 1e-9

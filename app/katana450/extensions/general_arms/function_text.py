@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from katana450.extensions.general_arms.functions import Number
-from katana450.extensions.general_arms.term import Fork, Need, Term, TermBlock
+from katana450.extensions.general_arms.term import COMPARISONS, Fork, Need, Term, TermBlock
 
 
 class FunctionText:
@@ -44,10 +44,18 @@ class FunctionText:
                 yield from self._named_line(item)
 
     def _named_line(self, term: Term) -> Iterator[str]:
-        if self._uses.get(term.number, 0) > 1 and not _is_short(term):
+        if self._is_named(term):
             name = self._values.get(term.number, term.number)
             yield f"t{name} = {self.of(term)}"
             self._named[term.number] = name
+
+    def _is_named(self, term: Term) -> bool:
+        if self._uses.get(term.number, 0) < 2 or _is_short(term):
+            return False
+        # A comparison of what has a name costs no more than its result.
+        return term.text not in COMPARISONS or not all(
+            self._uses[each.number] > 1 for each in term.arguments if isinstance(each, Term)
+        )
 
     def _forked(self, fork: Fork) -> Iterator[str]:
         used = [k for k, term in enumerate(fork.terms) if term.number in self._uses]

@@ -125,20 +125,19 @@ def two_links(
     """Return a function for two links [m] that bring their end to (u, v) in a plane.
 
     It returns (towards, beside, bend) [rad]: the first link is at towards - beside with the second
-    turned by +bend, or at towards + beside with -bend. Subproblems 3 and 1 by the law of cosines;
-    its differences of squares are factored, so that no digits are lost where the links are
-    stretched or folded. Out of reach the links point at (u, v), or away from it. The last number
-    is then negative, and 0 where the links are stretched or folded.
+    turned by +bend, or at towards + beside with -bend. Subproblems 3 and 1 by the law of cosines.
+    Its product of differences is that of the squares, so that no more digits are lost where the
+    links are stretched or folded than (u, v) has. Out of reach the links point at (u, v), or away
+    from it. The last number is then negative, and 0 where the links are stretched or folded.
     """
-    far, near = l1 + l2, abs(l1 - l2)
-    less, squares = (l1 - l2) * far, l1 * l1 + l2 * l2
-    atan2, root, hypot = f.atan2, f.root, f.hypot
+    far, near = (l1 + l2) ** 2, (l1 - l2) ** 2
+    less, squares = (l1 - l2) * (l1 + l2), l1 * l1 + l2 * l2
+    atan2, root = f.atan2, f.root
 
     def bent(u: Number, v: Number) -> tuple[Number, Number, Number, Number]:
-        rho = hypot(u, v)
-        stretched, folded = (far - rho) * (far + rho), (rho - near) * (rho + near)
-        square = stretched * folded
-        sine, size = root(square), rho * rho
+        size = u * u + v * v
+        square = (far - size) * (size - near)
+        sine = root(square)
         return atan2(v, u), atan2(sine, size + less), atan2(sine, size - squares), square
 
     return bent

@@ -46,9 +46,9 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import frozen
 from katana450.maths.kinematics.turns import wrapped
 
-LOOSE = 1e-5
-"""[1] Sine of the angle between axes 4 and 6 below which rounding may put axis 4 out of reach.
-psi is then turned back, as far as that turns the tool by less than HELD."""
+LOOSE = 1e-3
+"""[1] Sine of the angle between axes 4 and 6 below which rounding may put axis 4 out of reach by
+more than 1e-12 m. psi is then turned back, as far as that turns the tool by less than HELD."""
 
 HELD = 9e-13
 """[rad] Turn of the tool that counts as rounding where two singularities are near."""
@@ -92,7 +92,7 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
                 towards, opening, bend, square = bent(wx, wy)
                 moved = radius * f.sin(0.5 * (six - free[5]))
                 # Up to FREE alpha6 has the wanted angle already.
-                is_held = (radius > FREE) & (moved * moved <= 0.25 * HELD * HELD)
+                is_held = (radius > FREE) & (abs(moved) <= 0.5 * HELD)
                 psi, six, towards, opening, bend = f.rarely(  # noqa: PLW2901
                     (radius <= LOOSE) & ((square <= 0.0) | is_held),
                     loosened,

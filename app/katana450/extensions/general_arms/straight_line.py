@@ -45,6 +45,10 @@ ATAN2: Final = "atan2({0}, {1})"
 PI, TAU = repr(math.pi), repr(math.tau)
 THREE_HALVES: Final = 3.0 * math.pi + 1e-14
 NEXT: Final = f"({{0}} - {TAU} if {{0}} > {PI} else {{0}} + {TAU} if {{0}} < -{PI} else {{0}})"
+ONE_LESS: Final = f"({{0}} if {{0}} <= {PI} else {{0}} - {TAU})"
+ONE_MORE: Final = f"({{0}} if {{0}} >= -{PI} else {{0}} + {TAU})"
+WRAPPED: Final = (NEXT, ONE_LESS, ONE_MORE)
+WITHIN: Final = f"({{0}} - {TAU} if {{0}} > {{2}} else {{0}} + {TAU} if {{0}} < {{1}} else {{0}})"
 NEAREST: Final = (
     f"({{0}} if -{PI} <= {{0}} <= {PI} else {{0}} - {TAU} if 0.0 < {{0}} <= {3.0 * math.pi!r} "
     f"else {{0}} + {TAU} if -{3.0 * math.pi!r} <= {{0}} < 0.0 else remainder({{0}}, {TAU}))"
@@ -111,9 +115,9 @@ class TermList:
         low, high = angle.span
         end, farthest = math.pi + ROUNDED, math.pi + math.tau + ROUNDED
         if -end <= low and end < high <= farthest:
-            return self.term(f"({{0}} if {{0}} <= {PI} else {{0}} - {TAU})", angle)
+            return self.term(ONE_LESS, angle)
         if high <= end and -farthest <= low < -end:
-            return self.term(f"({{0}} if {{0}} >= -{PI} else {{0}} + {TAU})", angle)
+            return self.term(ONE_MORE, angle)
         if low < -end or high > end:
             return self.term(NEXT if max(-low, high) <= THREE_HALVES else NEAREST, angle)
         return angle
@@ -136,14 +140,23 @@ class TermList:
         if not another_turn_helps(lower, upper):
             return angle
         slack = tolerances.LIMIT_SLACK
-        # One comparison decides if the only other turn that can be inside is the next one.
+        # The only other turn that can be inside is the next one if an end is beyond a half turn.
         is_low = lower <= slack - math.pi
-        if is_low and upper >= -math.pi:
-            end = max(upper + slack, lower - slack + math.tau)
-            return self.term(f"({{0}} if {{0}} <= {{1}} else {{0}} - {TAU})", angle, end)
-        if not is_low and lower <= math.pi:
-            end = min(lower - slack, upper + slack - math.tau)
-            return self.term(f"({{0}} if {{0}} >= {{1}} else {{0}} + {TAU})", angle, end)
+        if (is_low and upper >= -math.pi) or (not is_low and lower <= math.pi):
+            if is_low:
+                end = max(upper + slack, lower - slack + math.tau)
+                start = end - math.tau
+            else:
+                start = min(lower - slack, upper + slack - math.tau)
+                end = start + math.tau
+            if angle.text in WRAPPED:
+                # One step instead of two, if it is a turn at most.
+                whole = angle.arguments[0]
+                if start - math.tau < whole.span[0] and whole.span[1] < end + math.tau:
+                    return self.term(WITHIN, whole, start, end)
+            if is_low:
+                return self.term(f"({{0}} if {{0}} <= {{1}} else {{0}} - {TAU})", angle, end)
+            return self.term(f"({{0}} if {{0}} >= {{1}} else {{0}} + {TAU})", angle, start)
         text = "({0} if {1} <= {0} <= {2} else in_turn({0}, {1}, {2}))"
         return self.term(text, angle, lower, upper)
 

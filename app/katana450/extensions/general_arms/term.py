@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from katana450.extensions.general_arms.straight_line import TermList
 
 PLUS, LESS, MINUS, TIMES = "({0} + {1})", "({0} - {1})", "(-{0})", "({0} * {1})"
+LESS_EQUAL, BELOW, ABOVE = "({0} <= {1})", "({0} < {1})", "({0} > {1})"
+COMPARISONS: Final = (LESS_EQUAL, BELOW, ABOVE)
 
 Span = tuple[float, float]
 
@@ -55,6 +57,13 @@ class Term:
             return self - other.arguments[0]
         if self.text == MINUS:
             return other - self.arguments[0]
+        if not isinstance(other, Term) and self.text in (PLUS, LESS):
+            # Two numbers become one.
+            first, second = self.arguments
+            if not isinstance(second, Term):
+                return first + (other + second if self.text == PLUS else other - second)
+            if not isinstance(first, Term):
+                return (first + other) - second
         (a, b), (c, d) = self.span, span_of(other)
         return self.owner.term(PLUS, *_ordered(self, other), span=(a + c, b + d))
 
@@ -68,6 +77,8 @@ class Term:
             return self + other.arguments[0]
         if self.text == MINUS:
             return -(self.arguments[0] + other)
+        if not isinstance(other, Term) and self.text in (PLUS, LESS):
+            return self + -other
         (a, b), (c, d) = self.span, span_of(other)
         return self.owner.term(LESS, self, other, span=(a - d, b - c))
 
@@ -121,16 +132,21 @@ class Term:
         if self.text == LESS:
             first, second = self.arguments
             return second - first
+        if self.text == PLUS and not isinstance(self.arguments[1], Term):
+            return -self.arguments[1] - self.arguments[0]
         return self.owner.term(MINUS, self, span=(-self.span[1], -self.span[0]))
 
+    def __abs__(self) -> Number:
+        return self.owner.term("abs({0})", self, span=(0.0, math.inf))
+
     def __le__(self, other: Number) -> Number:
-        return self.owner.term("({0} <= {1})", self, other)
+        return self.owner.term(LESS_EQUAL, self, other)
 
     def __lt__(self, other: Number) -> Number:
-        return self.owner.term("({0} < {1})", self, other)
+        return self.owner.term(BELOW, self, other)
 
     def __gt__(self, other: Number) -> Number:
-        return self.owner.term("({0} > {1})", self, other)
+        return self.owner.term(ABOVE, self, other)
 
     def __or__(self, other: Number) -> Number:
         return self.owner.term("({0} or {1})", self, other)
