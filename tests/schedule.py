@@ -45,6 +45,7 @@ KINDS = {
     "tests/real_arm/test_faults.py": SERVERS[0],
     "tests/general_arms/test_branches_on_a_server.py": SERVERS[1],
     "tests/general_arms/test_driven_on_a_server.py": SERVERS[1],
+    "tests/general_arms/test_grasping_on_a_server.py": SERVERS[0],
     "tests/general_arms/test_map_on_a_server.py": SERVERS[1],
     "tests/general_arms/test_obstacles_on_a_server.py": SERVERS[0],
     "tests/general_arms/test_scripts_on_a_server.py": SERVERS[1],

@@ -16,7 +16,9 @@ from katana450.arm.control.messages import part
 from katana450.arm.control.state import State
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.approach import Approach
 from katana450.extensions.programs.conditions import Condition, Held, ProgramTime
+from katana450.extensions.programs.hand_planning import difference
 from katana450.extensions.programs.located_step import (
     Conditional,
     LocatedStep,
@@ -26,7 +28,6 @@ from katana450.extensions.programs.located_step import (
 )
 from katana450.extensions.programs.plan_builder import (
     EXACT,
-    Approach,
     GraspInfo,
     PlanBuilder,
     UntimedPath,
@@ -381,9 +382,4 @@ def _same(one: _Place, other: _Place) -> bool:
         return False
     if one.taken is None or other.taken is None:
         return one.taken is other.taken
-    here, there = one.taken.at, other.taken.at
-    return (
-        float(np.abs(here.position - there.position).max()) <= EXACT
-        and abs(here.pitch - there.pitch) <= EXACT
-        and abs(here.roll - there.roll) <= EXACT
-    )
+    return difference(one.taken.at, other.taken.at) <= EXACT

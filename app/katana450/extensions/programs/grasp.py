@@ -12,60 +12,36 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import part
 from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, UseTool
-from katana450.extensions.programs.carry import APPROACHES, before
+from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, LOW, Approach
+from katana450.extensions.programs.carry import APPROACHES
 from katana450.extensions.programs.conditions import Held
-from katana450.extensions.programs.curve import ToolLine
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.located_step import Conditional
-from katana450.extensions.programs.plan_builder import Approach, GraspInfo, PlanBuilder
-from katana450.extensions.programs.reaching import reaching
+from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.turns import wrapped
-from katana450.maths.planning.plan import JOIN_TOLERANCE, MARGIN
-
-PITCHES = tuple(np.radians((30.0, 35.0, 25.0, 40.0, 20.0, 45.0)).tolist())
-"""[rad] Pitches of the tool for a grasp from the front, tried in this order. The arm pours better
-with a smaller pitch, but the limit of the shoulder joint keeps a level tool (pitch 0) above 110 mm.
-"""
-
-STEEP_PITCHES = tuple(np.radians((55.0, 65.0, 75.0)).tolist())
-"""[rad] Further pitches for objects that are not poured, as near the arm only these are reached."""
-
-DOWN = 0.5 * math.pi
-"""[rad] Pitch of the tool for a grasp from above."""
-
-FRONT, ABOVE = "front", "above"
-"""The sides from which an object is grasped."""
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.planning.clearance import SweptClearance
+from katana450.maths.planning.plan import JOIN_TOLERANCE, MARGIN, apart
 
 HEIGHT_FRACTIONS = {FRONT: (0.78, 0.95), ABOVE: (0.5, 0.7, 0.9, 1.05, 1.2)}
 """[1] Heights of the grasp as fractions of the object's height, tried in this order. From the front
 the palm has room over the table only above the middle of the object.
 """
 
-LOW = 0.045
-"""[m] Height below which an object is also grasped by the fingertips."""
-
 MIN_HEIGHT = 0.012
 """[m] Minimum height of an object: the tips stay MARGIN over what it stands on, at most a step of
-TIP_DISTANCES more, and cover at least 4 mm of it.
+``tip_distances`` more, and cover at least 4 mm of it.
 """
-
-TIP_DISTANCES = tuple(np.arange(0.014, 0.056, 0.002).tolist())
-"""[m] Distances between the tool frame and the middle of an object that is grasped by the tips,
-tried from the smallest. The tips move down as the fingers close.
-"""
-
-MAX_SKEW = math.radians(15.0)
-"""[rad] Maximum angle between the fingers and the sides of a box: the pads yield by as much."""
 
 MAX_DISTANCE, DISTANCE_STEP = 0.03, 0.002
 """[m] How far the tool moves away from an object, at most and by which steps, until the palm has
@@ -89,6 +65,14 @@ class Grip(NamedTuple):
 
     height: float
     distance: float = 0.0
+
+
+@dataclass
+class _Room:
+    """The distance to the joint limits that is kept [rad], and whether one was nearer."""
+
+    minimum: float
+    is_missed: bool = False
 
 
 @dataclass(frozen=True)
@@ -138,9 +122,12 @@ class Grasp:
                 f"{1e3 * MIN_HEIGHT:.0f} mm: the fingertips stay {1e3 * MARGIN:.0f} mm over what "
                 "an object stands on."
             )
-        if builder.state.tool != "grasp":
-            builder.plan_context.arm.chain_to("grasp")
-            builder.note("tool grasp", UseTool("grasp"), replace(builder.state, tool="grasp"))
+        hand = builder.hand
+        if hand.tool and builder.state.tool != hand.tool:
+            builder.plan_context.arm.chain_to(hand.tool)
+            builder.note(
+                f"tool {hand.tool}", UseTool(hand.tool), replace(builder.state, tool=hand.tool)
+            )
         opened = builder.plan_context.arm.gripper.upper
         builder.note("open", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
         branch_of, ready = builder.plan_context.arm.kinematics.branch_of, builder.plan_context.ready
@@ -160,17 +147,22 @@ class Grasp:
 
     def _approach(self, builder: PlanBuilder, scene_object: SceneObject) -> None:
         """Plan the grasp with the first approach that works. Raises InputError without one."""
-        chosen = self._approaches(builder, scene_object)
+        chosen, room = self._approaches(builder, scene_object), _Room(JOINT_ROOM)
         try:
-            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, JOINT_ROOM))
+            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, room))
         except InputError:
-            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, 0.0))
+            if not room.is_missed:
+                raise
+            room = _Room(0.0)
+            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, room))
 
-    def _approaches(self, builder: PlanBuilder, scene_object: SceneObject) -> list[Approach]:
+    def _approaches(self, builder: PlanBuilder, scene_object: SceneObject) -> Sequence[Approach]:
         """Return the approaches to try, in their order, without those that were given up."""
+        at = _point(builder, scene_object, 0.0)
+        turned = builder.direction(scene_object.T[:3, 0], in_base=True)
         if self.pitch is not None:
-            return [Approach(self.pitch)]
-        found = approaches(builder, scene_object)
+            return builder.hand.with_pitch(self.pitch, scene_object, at, turned)
+        found = builder.hand.approaches(scene_object, at, turned)
         sides = [self.side] if self.side else list(found)
         chosen = [each for side in sides for each in found.get(side, ())]
         if not chosen:
@@ -184,38 +176,42 @@ class Grasp:
         self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach
     ) -> bool:
         """Return whether the tool can be at one of the heights of a grasp."""
+        hand = builder.hand
         return any(
-            reaching(
-                builder.chain,
+            hand.branches_to(
                 builder.q,
-                before(_point(builder, scene_object, each.height), approach, each.distance),
-                None,
+                hand.before(_point(builder, scene_object, each.height), approach, each.distance),
             )
-            is not None
-            for each in self._grips(scene_object, approach)
+            for each in self._grips(builder, scene_object, approach)
         )
 
-    def _grips(self, scene_object: SceneObject, approach: Approach) -> list[Grip]:
+    def _grips(
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach
+    ) -> list[Grip]:
         """Return the places of the grasp on the object, the best first."""
         if self.height is not None:
             return [Grip(self.height)]
         fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
         found = [Grip(fraction * scene_object.height) for fraction in fractions]
         if scene_object.height < LOW:
-            found += [Grip(0.5 * scene_object.height, each) for each in TIP_DISTANCES]
+            middle = 0.5 * scene_object.height
+            found += [Grip(middle, each) for each in builder.hand.tip_distances]
         return found
 
     def _plan(
-        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, room: float
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, room: _Room
     ) -> None:
-        """Plan approach and closing, ``room`` [rad] from the joint limits.
+        """Plan approach and closing. Raises InputError if it is not possible."""
 
-        Raises InputError if it is not possible.
-        """
-        builder.first(
-            self._grips(scene_object, approach),
-            lambda grip: self._plan_at(builder, scene_object, approach, grip, room),
-        )
+        def plan_at(grip: Grip) -> None:
+            point = _point(builder, scene_object, grip.height)
+            target = builder.hand.before(point, approach, grip.distance)
+            builder.first(
+                builder.hand.branches_to(builder.q, target) or (None,),
+                lambda branch: self._plan_at(builder, scene_object, approach, grip, branch, room),
+            )
+
+        builder.first(self._grips(builder, scene_object, approach), plan_at)
 
     def _plan_at(
         self,
@@ -223,35 +219,39 @@ class Grasp:
         scene_object: SceneObject,
         approach: Approach,
         grip: Grip,
-        room: float,
+        branch: AnyBranch | None,
+        room: _Room,
     ) -> None:
-        """Plan the grasp at ``grip``. Raises InputError if it is not possible."""
-        point = _point(builder, scene_object, grip.height)
-        distance, q = _smallest_distance(builder, point, approach, grip.distance)
+        """Plan the grasp at ``grip`` on ``branch``. Raises InputError if it is not possible."""
+        hand, point = builder.hand, _point(builder, scene_object, grip.height)
+        distance, q = _smallest_distance(builder, point, approach, grip.distance, branch)
         # Before the path there, whose planning takes longer.
         self._closed(builder, q)
 
         def start_at(away: float) -> FloatArray:
-            start = builder.joints_of(before(point, approach, distance + away))
+            before = hand.before(point, approach, distance + away)
+            start = builder.joints_of(before, hand.branch_at(q))
             left = min(_joint_room(builder, start), _joint_room(builder, q))
-            if left < room:
+            if left < room.minimum:
+                room.is_missed = True
                 raise InputError(f"a joint would come within {math.degrees(left):.1f} deg.")
             return start
 
         start = builder.first(APPROACHES, start_at)
         builder.move_to(start, f"grasp {self.name}: approach")
-        goal = before(point, approach, distance)
-        builder.lead([ToolLine(builder.at, goal)], f"grasp {self.name}")
-        if float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
+        goal = hand.before(point, approach, distance)
+        builder.lead([builder.planning.line(builder.target, goal)], f"grasp {self.name}")
+        # With more than six axes, the pose alone is given.
+        if not hand.is_redundant and float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
             raise InputError("the straight path to it ends in another posture than planned.")
         closed, held = builder.plan_context.arm.gripper.lower, self._closed(builder, builder.q)
         holding = "" if self._checked_later(builder.ahead) else self.name
         builder.note(f"grasp {self.name}: close", MoveFingers(closed, holding), held)
         chosen = approach if self.pitch is None else None
-        builder.taken = GraspInfo(builder.at, chosen, scene_object)
+        builder.taken = GraspInfo(builder.target, chosen, scene_object)
 
     def _closed(self, builder: PlanBuilder, q: FloatArray) -> State:
-        """Return the state at ``q`` (5,) [rad] in which the closed fingers hold the object.
+        """Return the state at ``q`` (n,) [rad] in which the closed fingers hold the object.
 
         Raises InputError if they do not, or are so near to something that they could not leave.
         """
@@ -263,8 +263,8 @@ class Grasp:
             raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
         others = tuple(each for each in held.objects if each.name != self.name)
         world = builder.plan_context.session.world_at(replace(held, objects=others))
-        nearest = None if world is None else world.nearest(held.x_setpoint)
-        if nearest is not None and nearest.distance < MARGIN:
+        nearest = None if world is None else _nearer(builder, world, held.x_setpoint, MARGIN)
+        if nearest is not None:
             raise InputError(_too_near(nearest, MARGIN))
         return held
 
@@ -276,28 +276,6 @@ class Grasp:
             if isinstance(step, Grasp):
                 return False
         return False
-
-
-def approaches(builder: PlanBuilder, scene_object: SceneObject) -> dict[str, tuple[Approach, ...]]:
-    """Return the approaches that suit the shape of an object, by side, the preferred side first.
-
-    The fingers close on two opposite sides of a box, or of the box round a mesh. The cup is only
-    grasped from the front: from above the wrist could not pour it. Raises InputError if the object
-    does not stand upright.
-    """
-    if scene_object.name == CUP:
-        return {FRONT: tuple(map(Approach, PITCHES))}
-    # Only steep fingertips come near what a low object stands on.
-    low = scene_object.height < LOW
-    front = tuple(map(Approach, STEEP_PITCHES[::-1] if low else (*PITCHES, *STEEP_PITCHES)))
-    if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
-        return {FRONT: front, ABOVE: (Approach(DOWN),)}
-    x, y, _ = builder.point(scene_object.T[:3, 3], in_base=True)
-    side = builder.direction(scene_object.T[:3, 0], in_base=True)
-    skew = math.atan2(y, x) - math.atan2(side[1], side[0])
-    rolls = sorted((wrapped(skew + quarter * DOWN) for quarter in range(4)), key=abs)
-    found = {ABOVE: tuple(Approach(DOWN, roll) for roll in rolls)}
-    return found | ({FRONT: front} if abs(rolls[0]) <= MAX_SKEW else {})
 
 
 def _point(builder: PlanBuilder, scene_object: SceneObject, height: float) -> FloatArray:
@@ -324,10 +302,8 @@ def _why_not_held(state: State) -> str:
 def _too_near(nearest: Contact, minimum: float) -> str:
     """Return that two bodies would be nearer than ``minimum`` [m]."""
     one, other = map(part, nearest.parts)
-    return (
-        f"{one} and {other} would be {1e3 * nearest.distance:.1f} mm apart; the minimum is "
-        f"{1e3 * minimum:.1f} mm."
-    )
+    away = apart(nearest.distance)
+    return f"{one} and {other} would {away}; the minimum is {1e3 * minimum:.1f} mm."
 
 
 def _no_approach(scene_object: SceneObject, side: str) -> str:
@@ -340,22 +316,42 @@ def _no_approach(scene_object: SceneObject, side: str) -> str:
     )
 
 
+def _nearer(
+    builder: PlanBuilder, world: CollisionWorld, x: FloatArray, minimum: float
+) -> Contact | None:
+    """Return the nearest contact at `x` (k,) of a pair that is nearer than ``minimum`` [m].
+
+    Pairs that are nearer at Home may be as near as there. None if all are far enough.
+    """
+    home = np.append(builder.plan_context.ready, x[-1])
+    placed, kept = world.at(x), SweptClearance.about(world, minimum, home).minimum
+    pairs = placed.nearer_than(kept)[0].tolist()
+    found = {pair: placed.distance(pair) for pair in pairs}
+    near = [pair for pair, distance in found.items() if distance < kept[pair]]
+    return placed.contact(min(near, key=found.__getitem__)) if near else None
+
+
 def _smallest_distance(
-    builder: PlanBuilder, point: FloatArray, approach: Approach, least: float
+    builder: PlanBuilder,
+    point: FloatArray,
+    approach: Approach,
+    least: float,
+    branch: AnyBranch | None,
 ) -> tuple[float, FloatArray]:
     """Return the smallest distance [m] of the tool before ``point`` at which the palm has room.
 
-    It is at least ``least`` [m]. The second value is the joints (5,) [rad] at that distance.
+    It is at least ``least`` [m]. The second value is the joints (n,) [rad] at that distance.
     """
 
     def joints_with_room(distance: float) -> tuple[float, FloatArray]:
-        q = builder.joints_of(before(point, approach, distance))
-        nearest = None if world is None else world.nearest(np.append(q, fingers))
-        if nearest is not None and nearest.distance < PALM_CLEARANCE:
+        q = builder.joints_of(hand.before(point, approach, distance), branch)
+        x = np.append(q, fingers)
+        nearest = None if world is None else _nearer(builder, world, x, PALM_CLEARANCE)
+        if nearest is not None:
             raise InputError(_too_near(nearest, PALM_CLEARANCE))
         return distance, q
 
-    world, fingers = builder.world, builder.state.gripper_setpoint
+    hand, world, fingers = builder.hand, builder.world, builder.state.gripper_setpoint
     distances = (least + np.arange(0.0, MAX_DISTANCE + DISTANCE_STEP, DISTANCE_STEP)).tolist()
     return builder.first(distances, joints_with_room)
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.carry import UP
-from katana450.extensions.programs.curve import ToolLine
+from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.grasp import Grasp
 from katana450.extensions.programs.place import PlaceHeld
@@ -27,11 +26,11 @@ class Pick(Grasp):
     def build(self, builder: PlanBuilder) -> None:
         """Plan grasp and lifting. Raises InputError if it is not possible."""
         super().build(builder)
-        at = builder.at
+        at = builder.target
 
         def lift(height: float) -> None:
-            raised = replace(at, position=at.position + height * UP)
-            builder.lead([ToolLine(at, raised)], f"lift {self.name}")
+            raised = at.moved(at.position + height * UP)
+            builder.lead([builder.planning.line(at, raised)], f"lift {self.name}")
 
         try:
             builder.first(LIFTS, lift)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -10,26 +11,22 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject, Shape
+from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.arm.control.support import check_carried, surface_below
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers
-from katana450.extensions.programs.carry import APPROACHES, UP, before, carry
-from katana450.extensions.programs.curve import ToolLine
+from katana450.extensions.programs.approach import UP
+from katana450.extensions.programs.carry import APPROACHES, carry
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.grasp import DOWN
 from katana450.extensions.programs.places import point
-from katana450.extensions.programs.plan_builder import Approach, PlanBuilder
+from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step, nothing
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import branch_of
-from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.turns import wrapped
+from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.planning.plan import MARGIN
 
 RELEASE_HEIGHT = MARGIN + 2e-4
@@ -40,15 +37,6 @@ MAX_FALL = 0.01
 
 CARRY_HEIGHTS = (0.1, 0.07, 0.05, 0.03, 0.015)
 """[m] Heights over its new place at which an object is brought there, tried from the highest."""
-
-YAW_TOLERANCE = math.radians(0.5)
-"""[rad] Difference up to which an object is turned as requested."""
-
-PLACED = 1e-12
-"""[m] Error up to which the tool is over the place."""
-
-ROUNDS = 50
-"""Maximum number of corrections of the tool's place; each leaves less than a third of the error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +75,7 @@ class PlaceHeld:
         spot = self._spot(builder, held)
         try:
             builder.first(
-                _turns(builder, held, spot, self.yaw),
+                _over(builder, held, spot, self.yaw),
                 lambda low: _bring(builder, held, low),
             )
         except InputError as error:
@@ -133,10 +121,10 @@ class SetDown:
         if builder.state.grip is None or taken is None:
             raise InputError("The hand holds no object that this program grasped.")
         at = taken.at
-        above = replace(at, position=at.position * (1, 1, 0) + builder.at.position * UP)
+        above = at.moved(at.position * (1, 1, 0) + builder.target.position * UP)
         carry(builder, above, "back")
-        low = replace(at, position=at.position + RELEASE_HEIGHT * UP)
-        builder.lead([ToolLine(above, low)], "set down")
+        low = at.moved(at.position + RELEASE_HEIGHT * UP)
+        builder.lead([builder.planning.line(above, low)], "set down")
         let_go(builder)
 
 
@@ -181,13 +169,13 @@ def held_object(builder: PlanBuilder, step: str) -> SceneObject:
 
 def let_go(builder: PlanBuilder) -> None:
     """Append the opening of the fingers and the retreat. Raises InputError without room."""
-    at = builder.at
+    at, q, hand = builder.target, builder.q, builder.hand
     opened = builder.plan_context.arm.gripper.upper
     builder.note("let go", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
 
     def draw_back(away: float) -> None:
-        end = before(at.position, Approach(at.pitch, at.roll), away)
-        builder.lead([ToolLine(at, end)], "draw back")
+        end = hand.drawn_back(q, away)
+        builder.lead([builder.planning.line(at, end)], "draw back")
 
     try:
         builder.first(APPROACHES, draw_back)
@@ -213,17 +201,17 @@ def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
     return replace(held, T=se3.from_rotation_translation(np.eye(3), at), held=False)
 
 
-def _bring(builder: PlanBuilder, held: SceneObject, low: ToolTarget) -> None:
+def _bring(builder: PlanBuilder, held: SceneObject, low: DragTarget) -> None:
     """Plan the way to ``low``, from above, and the release there. Raises InputError."""
     name = f"place {held.name}"
 
     def down_from(height: float, *, straight: bool) -> None:
-        above = replace(low, position=low.position + height * UP)
+        above = low.moved(low.position + height * UP)
         if straight:
             carry(builder, above, f"{name}: carry")
         else:
             builder.move_to(builder.joints_of(above), f"{name}: carry")
-        builder.lead([ToolLine(builder.at, low)], f"{name}: lower")
+        builder.lead([builder.planning.line(builder.target, low)], f"{name}: lower")
         let_go(builder)
 
     try:
@@ -235,66 +223,13 @@ def _bring(builder: PlanBuilder, held: SceneObject, low: ToolTarget) -> None:
         builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=False))
 
 
-def _turns(
+def _over(
     builder: PlanBuilder, held: SceneObject, spot: FloatArray, yaw: float | None
-) -> list[ToolTarget]:
-    """Return the tool poses that hold the object over ``spot`` with this ``yaw``.
-
-    Only an object that is held from above can be turned. Raises InputError for another.
-    """
-    at = builder.at
-    natural, low = _tool_over(builder, held, spot, at)
-    symmetry = _symmetry(held)
-    if yaw is None or symmetry == 0.0:
-        return [low]
-    turn = math.remainder(yaw - natural, symmetry)
-    if abs(turn) <= YAW_TOLERANCE:
-        return [low]
-    if abs(at.pitch - DOWN) > YAW_TOLERANCE:
-        raise InputError(
-            f"it turns with the arm, and its yaw would be {math.degrees(natural):.1f} deg there "
-            f"instead of {math.degrees(yaw):g}. Pick it with `side: above`, or leave out the yaw."
-        )
-    count = round(math.tau / symmetry)
-    rolls = sorted((wrapped(at.roll - turn + each * symmetry) for each in range(count)), key=abs)
-    return [_tool_over(builder, held, spot, replace(at, roll=roll))[1] for roll in rolls]
-
-
-def _tool_over(
-    builder: PlanBuilder, held: SceneObject, spot: FloatArray, at: ToolTarget
-) -> tuple[float, ToolTarget]:
-    """Return the yaw [rad] of the object over ``spot``, and the tool there.
-
-    The tool has the pitch and roll of ``at``, and holds the object as it does now.
-    """
-    chain, T_base_shoulder = builder.chain, builder.plan_context.T_base_shoulder
-    environment = builder.plan_context.session.environment
-    T_base_object = environment.pose(held, builder.state.x_setpoint)
-    T_base_tool = T_base_shoulder @ forward(chain, builder.q)
-    T_tool_object = se3.inverse(T_base_tool) @ T_base_object
+) -> Sequence[DragTarget]:
+    """Return the tools that hold the object over ``spot`` with this ``yaw``; see `HandPlanning`."""
+    T_base_object = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
     goal = builder.point(spot + RELEASE_HEIGHT * UP, in_base=True)
-    branch = branch_of(chain, builder.q)
-    position = goal
-    for _ in range(ROUNDS):
-        tool = replace(at, position=position)
-        T = tool.pose(chain, tool.facing(chain, branch, float(builder.q[0]))) @ T_tool_object
-        error = goal - T[:3, 3]
-        if float(np.abs(error).max()) <= PLACED:
-            break
-        position = position + error
-    R = T_base_shoulder[:3, :3] @ T[:3, :3]
-    return math.atan2(R[1, 0], R[0, 0]), tool
-
-
-def _symmetry(held: SceneObject) -> float:
-    """Return the angle [rad] by which the object may turn and look the same; 0 for any."""
-    match held.shape:
-        case Shape.CYLINDER | Shape.SPHERE:
-            return 0.0
-        case Shape.BOX:
-            along_x, along_y, _ = held.extent
-            return 0.5 * math.pi if math.isclose(along_x, along_y) else math.pi
-    return math.tau
+    return builder.hand.over(held, T_base_object, builder.q, goal, yaw)
 
 
 STEPS: dict[str, type[Step]] = {"place": PlaceHeld, "set_down": SetDown, "release": Release}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.approach import Approach
+from katana450.extensions.programs.hand_choice import hand_of
+from katana450.extensions.programs.hand_planning import HandPlanning
 from katana450.extensions.programs.planning_choice import OF_FIVE_AXES, planning_of
 from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.step_target import StepTarget
@@ -77,13 +80,6 @@ class PlanContext:
         return self.session.ready
 
 
-class Approach(NamedTuple):
-    """The pitch and roll [rad] at which the tool grasps an object."""
-
-    pitch: float
-    roll: float = 0.0
-
-
 @dataclass(frozen=True)
 class GraspInfo:
     """A grasp.
@@ -94,7 +90,7 @@ class GraspInfo:
         before: the object as it stood before.
     """
 
-    at: ToolTarget
+    at: DragTarget
     chosen: Approach | None
     before: SceneObject
 
@@ -168,6 +164,9 @@ class PlanBuilder:
         """Approaches of the grasp with which a later step failed."""
         self.ahead: Sequence[object] = ()
         """The steps after the present one."""
+        self._hands: dict[str, HandPlanning] = {}
+        # Whether a refusal is not shown, so that its details need not be found.
+        self._brief = False
 
     @property
     def world(self) -> CollisionWorld | None:
@@ -196,6 +195,14 @@ class PlanBuilder:
     def planning(self) -> ToolPlanning:
         """The planning of the present tool."""
         return planning_of(self.plan_context.arm.kinematics_to(self.state.tool))
+
+    @property
+    def hand(self) -> HandPlanning:
+        """The hand with the present tool. Raises InputError, with the reason, without one."""
+        tool, context = self.state.tool, self.plan_context
+        if tool not in self._hands:
+            self._hands[tool] = hand_of(context.session, context.T_base_shoulder, tool)
+        return self._hands[tool]
 
     @property
     def target(self) -> DragTarget:
@@ -281,12 +288,15 @@ class PlanBuilder:
         state, actions = self.state, tuple(self.actions)
         for number, option in enumerate(options):
             checkpoint()
+            brief, self._brief = self._brief, self._brief or number > 0
             try:
                 return build(option)
             except InputError as error:
                 self.state, self.actions = state, list(actions)
                 if number == 0:
                     refused = error
+            finally:
+                self._brief = brief
         raise refused
 
     def after(self, command: Command, ticks: int = MAX_CLOSING_TICKS) -> State:
@@ -373,7 +383,7 @@ class PlanBuilder:
         branch = None if branch is None else self.planning.branch(branch)
         found = self.planning.joints(self.state, self.q, target, branch)
         if found is None:
-            raise InputError(self.unreached(target, branch))
+            raise InputError("" if self._brief else self.unreached(target, branch))
         return found
 
     def unreached(self, target: DragTarget, branch: AnyBranch | None) -> str:

@@ -12,7 +12,7 @@ from katana450.extensions.programs.tool_planning import ToolPlanning
 
 OF_FIVE_AXES: Final = (
     "This needs a five-axis arm, whose tool has a pitch and a roll. Scripts of other arms can have "
-    "all steps that move the arm or its fingers, but none that grasp, place or pour an object."
+    "all steps that move the arm or its fingers, and grasp and place objects, but none that pour."
 )
 """Refusal of a step that needs a pitch and a roll."""
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from katana450.arm.control.commands import MIN_SPEED
+from katana450.extensions.programs.approach import ABOVE, FRONT
 from katana450.extensions.programs.attached_files import MAX_FILES
 from katana450.extensions.programs.blocks import MAX_REPETITIONS, MAX_STEPS
 from katana450.extensions.programs.fields import XYZ
-from katana450.extensions.programs.grasp import ABOVE, FRONT
 from katana450.extensions.programs.grip_until import MAX_FORCE, MIN_FORCE
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.moves import MAX_VIAS

@@ -1,0 +1,224 @@
+"""The hand of any arm outside the five-axis family that takes whole poses: six or more axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Final, cast
+
+import numpy as np
+
+from katana450.arm.control.pouring import CUP
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.errors import InputError
+from katana450.extensions.general_arms.driven_tool import DrivenTool
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.programs.approach import (
+    ABOVE,
+    DOWN,
+    FRONT,
+    YAW_TOLERANCE,
+    Approach,
+    symmetry,
+)
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.turns import wrapped
+from katana450.maths.planning.plan import MARGIN
+
+PITCHES: Final = tuple(np.radians((45.0, 25.0, 65.0)).tolist())
+"""[rad] Pitches of the hand for a grasp from the front, tried in this order."""
+
+TIP_DISTANCES: Final = tuple(np.arange(0.0, 0.056, 0.002).tolist())
+"""[m] Distances of the hand before the middle of a low object, tried from the smallest."""
+
+MAX_ASIDE: Final = math.radians(100.0)
+"""[rad] Maximum angle between the hand and the direction away from axis 1, seen from above."""
+
+ASIDE: Final = tuple(np.radians((0.0, 40.0, -40.0)).tolist())
+"""[rad] Those of an object that is round, tried in this order."""
+
+ROUND_ROLLS: Final = tuple(np.radians((0.0, 60.0, -60.0)).tolist())
+"""[rad] Turns of the hand over an object that is round, tried in this order."""
+
+SWINGS: Final = tuple(np.radians((-30.0, 30.0, -60.0, 60.0)).tolist())
+"""[rad] Turns of the swivel of seven axes with which a pose is tried."""
+
+MAX_BRANCHES: Final = 4
+"""Maximum number of branches on which a grasp is tried."""
+
+TURNS: Final = tuple(np.radians((45.0, -45.0, 90.0, -90.0, 180.0)).tolist())
+"""[rad] Further turns of an object over its new place, beside those with the arm and without."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseHand:
+    """The hand of one arm as `HandPlanning`.
+
+    Attributes:
+        kinematics: the arm with its tool.
+        T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
+        T_tool_grasp: (4, 4) pose of the grasp frame in that of the tool [m].
+        opening: distance between the open fingers [m].
+    """
+
+    kinematics: DrivenTool
+    T_base_shoulder: FloatArray
+    T_tool_grasp: FloatArray
+    opening: float
+
+    tool: ClassVar[str] = ""
+    tip_distances: ClassVar[Sequence[float]] = TIP_DISTANCES
+
+    @property
+    def is_redundant(self) -> bool:
+        """True if it has more than six axes."""
+        return self.kinematics.chain.n > 6
+
+    def approaches(
+        self, scene_object: SceneObject, at: FloatArray, side: FloatArray
+    ) -> Mapping[str, Sequence[Approach]]:
+        """Return the approaches with the fingers on two opposite sides of a box or mesh."""
+        return self._fitting(PITCHES, scene_object, at, side)
+
+    def with_pitch(
+        self, pitch: float, scene_object: SceneObject, at: FloatArray, side: FloatArray
+    ) -> Sequence[Approach]:
+        """Return the approaches with ``pitch``."""
+        found = self._fitting((pitch,), scene_object, at, side)
+        return found[ABOVE if abs(pitch - DOWN) <= YAW_TOLERANCE else FRONT]
+
+    def _fitting(
+        self,
+        pitches: Sequence[float],
+        scene_object: SceneObject,
+        at: FloatArray,
+        side: FloatArray,
+    ) -> Mapping[str, Sequence[Approach]]:
+        """Return all approaches between whose fingers the object fits, or raise InputError."""
+        most = self.opening - 2.0 * MARGIN
+        options = self._options(pitches, scene_object, at, side)
+        found = {
+            name: tuple(approach for approach, width in each if width <= most)
+            for name, each in options.items()
+        }
+        if not any(found.values()):
+            width = min((width for each in options.values() for _, width in each), default=0.0)
+            raise InputError(
+                f"it is {1e3 * width:.0f} mm wide, which is too wide: the open fingers are "
+                f"{1e3 * self.opening:.0f} mm apart and need {1e3 * MARGIN:.0f} mm of room on "
+                f"either side, so an object may have {1e3 * most:.0f} mm."
+            )
+        return found
+
+    def _options(
+        self,
+        pitches: Sequence[float],
+        scene_object: SceneObject,
+        at: FloatArray,
+        side: FloatArray,
+    ) -> dict[str, list[tuple[Approach, float]]]:
+        """Return approaches by side, each with the width [m] of the object between the fingers."""
+        if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
+            width = 2.0 * scene_object.extent[0]
+            front = [(Approach(p, 0.0, aside), width) for aside in ASIDE for p in pitches]
+            above = [(Approach(DOWN, roll), width) for roll in ROUND_ROLLS]
+            return {FRONT: front} if scene_object.name == CUP else {FRONT: front, ABOVE: above}
+        widths = scene_object.extent[1], scene_object.extent[0]
+        skew = math.atan2(at[1], at[0]) - math.atan2(side[1], side[0])
+        rolls = [(wrapped(skew + k * DOWN), widths[k % 2]) for k in range(4)]
+        asides = [(wrapped(k * DOWN - skew), widths[k % 2]) for k in range(4)]
+        near = sorted(asides, key=lambda each: abs(each[0]))
+        return {
+            ABOVE: [
+                (Approach(DOWN, roll), width)
+                for roll, width in sorted(rolls, key=lambda each: abs(each[0]))
+            ],
+            FRONT: [
+                (Approach(p, 0.0, aside), width)
+                for aside, width in near
+                if abs(aside) <= MAX_ASIDE
+                for p in pitches
+            ],
+        }
+
+    def before(self, middle: FloatArray, approach: Approach, back: float) -> DragTarget:
+        """Return the tool with the grasp frame before ``middle``, on its own x axis."""
+        yaw = math.atan2(middle[1], middle[0]) + approach.aside
+        R = so3.from_rpy(approach.roll, approach.pitch, yaw)
+        return self._tool(R, middle - back * R[:, 0])
+
+    def _tool(self, R: FloatArray, p: FloatArray) -> ToolPose:
+        """Return the tool that brings the grasp frame to rotation `R` (3, 3) and point `p` (3,)."""
+        T = se3.from_rotation_translation(R, p) @ se3.inverse(self.T_tool_grasp)
+        return ToolPose.of(T)
+
+    def drawn_back(self, q: FloatArray, away: float) -> DragTarget:
+        """Return the tool, drawn back along the x axis of the grasp frame."""
+        at = self.kinematics.target_at(q)
+        x = forward(self.kinematics.chain, q)[:3, :3] @ self.T_tool_grasp[:3, 0]
+        return at.moved(frozen(at.position - away * x))
+
+    def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
+        """Return those with a posture inside the limits that takes the pose."""
+        return self._branches_to(q, cast(ToolPose, target).T)
+
+    def _branches_to(self, q: FloatArray, T: FloatArray) -> Sequence[AnyBranch | None]:
+        """Return the branches with a posture for the tool at `T` (4, 4)."""
+        here, hints = self.kinematics.branch_of(q), [q]
+        for axis in self.kinematics.equations(q).locked[:1]:
+            # The swivel of the posture there may be another one.
+            chain, unit = self.kinematics.chain, np.eye(len(q))[axis]
+            hints += [chain.clamp(q + swing * unit) for swing in SWINGS]
+        for hint in hints:
+            postures = [p for p in self.kinematics.inverse(T, hint) if p.exact and p.within_limits]
+            if postures:
+                names = sorted((str(p.branch) for p in postures), key=lambda each: each != here)
+                return [*dict.fromkeys(names)][:MAX_BRANCHES]
+        return []
+
+    def branch_at(self, q: FloatArray) -> AnyBranch | None:
+        """Return the branch of `q`: the line to it keeps to its branch."""
+        return self.kinematics.branch_of(q)
+
+    def way_round(self, here: float, there: float) -> float:
+        """Return the shorter way."""
+        return wrapped(there - here)
+
+    def turned(self, target: DragTarget, position: FloatArray, angle: float) -> DragTarget:
+        """Return the pose, turned as one rigid body."""
+        return ToolPose(frozen(position), frozen(so3.rotation_z(angle) @ cast(ToolPose, target).R))
+
+    def over(
+        self,
+        held: SceneObject,
+        T_base_object: FloatArray,
+        q: FloatArray,
+        goal: FloatArray,
+        yaw: float | None,
+    ) -> Sequence[DragTarget]:
+        """Return the tools: the object turns with the arm, or as requested."""
+        T = se3.inverse(self.T_base_shoulder) @ T_base_object
+        here, there = (math.atan2(p[1], p[0]) for p in (T[:3, 3], goal))
+        natural = self.way_round(here, there)
+        now = math.atan2(T_base_object[1, 0], T_base_object[0, 0])
+        alike = symmetry(held)
+        if yaw is None or alike == 0.0:
+            turns = [natural, 0.0, *(wrapped(natural + each) for each in TURNS)]
+        else:
+            first = natural + math.remainder(yaw - now - natural, alike)
+            turns = sorted(
+                (wrapped(first + k * alike) for k in range(round(math.tau / alike))),
+                key=lambda turn: abs(wrapped(turn - natural)),
+            )
+        tools = [self._carried(q, T[:3, 3], goal, turn) for turn in turns]
+        return [tool for tool in tools if self.branches_to(q, tool)] or tools[:1]
+
+    def _carried(self, q: FloatArray, p: FloatArray, goal: FloatArray, turn: float) -> ToolPose:
+        """Return the tool at `q`, turned with an object at `p` (3,) so that it is at ``goal``."""
+        at, R = self.kinematics.target_at(q), so3.rotation_z(turn)
+        return ToolPose(frozen(goal + R @ (at.position - p)), frozen(R @ at.R))

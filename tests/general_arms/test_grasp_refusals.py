@@ -1,0 +1,111 @@
+"""Refusals of arms outside the five-axis family that cannot grasp or place an object."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from katana450.extensions.programs.source import ScriptError
+from tests.general_arms.chain_urdf import chain_urdf
+from tests.general_arms.gripping_arms import HANDS, gripping_urdf
+from tests.general_arms.published_arms import SKEWED_6
+from tests.general_arms.test_grasping import item, planned
+
+PART = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
+WIDE = item("part", "box", (90.0, 95.0, 60.0), (500.0, 100.0))
+THIN = item("part", "box", (40.0, 50.0, 8.0), (500.0, 100.0))
+LOW = item("part", "box", (40.0, 40.0, 20.0), (500.0, 100.0))
+FIXED = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0), can_be_held=False)
+FAR = item("part", "box", (25.0, 25.0, 50.0), (600.0, 0.0))
+FLAT = item("part", "box", (25.0, 25.0, 15.0), (280.0, 0.0))
+SKEW = item("part", "box", (25.0, 25.0, 50.0), (200.0, 0.0), 40.0)
+STRAIGHT = item("part", "box", (25.0, 20.0, 50.0), (200.0, 0.0))
+CUP = item("cup", "cylinder", (33.0, 95.0), (500.0, 100.0))
+
+
+@pytest.mark.parametrize(
+    ("steps", "thing", "why"),
+    [
+        (["pick: part"], WIDE, r"90 mm wide, .* fingers are 85 mm apart .* may have 73 mm"),
+        (["pick: part"], THIN, "8.0 mm high, and the minimum is 12 mm"),
+        (["pick: part"], FIXED, "cannot be held by the fingers"),
+        pytest.param(
+            *(["grasp: {object: part, pitch: 5}"], LOW, "at its place: .* and table would"),
+            marks=pytest.mark.long,
+        ),
+        (["pick: part", "pick: part"], PART, "already holds an object"),
+        (["place: {at: {x: 400, y: 0}}"], PART, "holds nothing to place"),
+        (["set_down:"], PART, "holds no object that this program grasped"),
+        (["pick: part", "release"], PART, "part would fall 60 mm"),
+        (["pick: part", "place: {at: {x: 1700, y: 0}}"], PART, "nothing carries it there"),
+        (["pick: part", "place: {at: {x: 400, y: 0, z: 30}}"], PART, "put it 30.0 mm lower"),
+        (["grip: {until: 5}"], PART, "pads of this gripper are not known"),
+        (["fill: 100", "grasp: cup", "pour: cup"], CUP, "but none that pour"),
+    ],
+)
+def test_six_axes_give_the_reason(steps: list[str], thing: str, why: str, tmp_path: Path) -> None:
+    with pytest.raises(ScriptError, match=why):
+        planned(tmp_path, gripping_urdf("UR5e"), steps, thing)
+
+
+@pytest.mark.parametrize(
+    ("steps", "thing", "why"),
+    [
+        (["pick: part"], FAR, r"cannot be grasped at its place: .* mm out of reach"),
+        (["pick: part", "place: {at: {x: 600, y: 0}}"], STRAIGHT, "cannot be placed .* reach"),
+        (["grasp: {object: part, pitch: 5}"], FLAT, "at its place: .* and table would"),
+        (["pick: part"], SKEW, "turned too far, .* four axes cannot turn the hand"),
+        (
+            ["pick: part", "place: {at: {x: 160, y: -100, yaw: 20}}"],
+            STRAIGHT,
+            r"yaw would be -3\d\.\d deg there instead of 20. Leave out the yaw",
+        ),
+    ],
+)
+def test_four_axes_give_the_reason(steps: list[str], thing: str, why: str, tmp_path: Path) -> None:
+    with pytest.raises(ScriptError, match=why):
+        planned(tmp_path, gripping_urdf("OpenMANIPULATOR-X"), steps, thing)
+
+
+def without_bodies(text: str) -> str:
+    """Return the description without collision shapes of its fingers."""
+    for finger in ("left", "right"):
+        start = text.index(f'<link name="{finger}">')
+        end = text.index("</link>", start)
+        link = text[start:end]
+        text = text.replace(link, link[: link.index("<collision>")])
+    return text
+
+
+def with_one_finger(text: str) -> str:
+    """Return the description with the right finger fixed to the palm."""
+    start = text.index('<joint name="finger_right"')
+    joint = text[start : text.index("</joint>", start)]
+    return text.replace(joint, joint.replace('"prismatic"', '"fixed"').split("<axis")[0])
+
+
+UR5E = gripping_urdf("UR5e")
+HANDS_THAT_CANNOT = {
+    "no gripper": (chain_urdf("arm", HANDS["UR5e"][0]), "has no gripper"),
+    "no bodies": (without_bodies(UR5E), "contacts of the fingers cannot be computed"),
+    "one finger": (with_one_finger(UR5E), "has one finger with a body that moves, left"),
+    "other end": (gripping_urdf("UR5e", upside_down=True), "close towards the upper end"),
+    "five axes": (
+        chain_urdf("arm", HANDS["UR5e"][0]).replace("revolute", "fixed", 1),
+        "5 axes outside the five-axis family cannot keep an object upright",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HANDS_THAT_CANNOT)
+def test_hand_that_cannot_grasp_is_named(name: str, tmp_path: Path) -> None:
+    urdf, why = HANDS_THAT_CANNOT[name]
+    with pytest.raises(ScriptError, match=why):
+        planned(tmp_path, urdf, ["pick: part"], PART)
+
+
+def test_skewed_arm_without_a_closed_form_is_refused_in_time(tmp_path: Path) -> None:
+    """It has no gripper either, and no posture is searched before that is reported."""
+    with pytest.raises(ScriptError, match="has no gripper"):
+        planned(tmp_path, chain_urdf("arm", SKEWED_6), ["pick: part"], PART)

@@ -1,0 +1,209 @@
+"""Objects are grasped, carried and placed by arms of four, six and seven axes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import State
+from katana450.extensions.programs.clocked_run import Planned, plan_script, run_by_clock
+from katana450.extensions.programs.script import parse
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.geometry.arrays import FloatArray
+from tests.general_arms.gripping_arms import gripping_urdf
+
+TICK = 0.01
+
+
+class Bench(NamedTuple):
+    """Places on the table that an arm reaches [mm], and a box that its fingers take."""
+
+    near: tuple[float, float]
+    to: tuple[float, float]
+    box: tuple[float, float, float]
+
+
+BENCHES = {
+    "Panda": Bench((500.0, 100.0), (400.0, -200.0), (40.0, 50.0, 60.0)),
+    "UR5e": Bench((500.0, 100.0), (400.0, -200.0), (40.0, 50.0, 60.0)),
+    "OpenMANIPULATOR-X": Bench((200.0, 60.0), (160.0, -120.0), (25.0, 25.0, 50.0)),
+    "KR 6": Bench((600.0, 150.0), (550.0, -250.0), (40.0, 50.0, 60.0)),
+}
+EVERY = [pytest.param(name, marks=pytest.mark.long if name == "KR 6" else ()) for name in BENCHES]
+OF_FREE_AXES = ["UR5e", pytest.param("Panda", marks=pytest.mark.long)]
+
+
+def item(
+    name: str,
+    shape: str,
+    size: tuple[float, ...],
+    at: tuple[float, float],
+    yaw: float = 0.0,
+    *,
+    can_be_held: bool = True,
+) -> str:
+    """Return an object of a scene in a script; lengths in mm, the yaw in deg."""
+    held = str(can_be_held).lower()
+    return (
+        f"{{name: {name}, shape: {shape}, size: {list(size)}, "
+        f"pose: [{at[0]}, {at[1]}, 0, 0, 0, {yaw}], can_be_held: {held}}}"
+    )
+
+
+def planned(tmp_path: Path, urdf: str, steps: list[str], *items: str) -> Planned:
+    """Return the steps, planned in a scene of the objects."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf, encoding="utf-8")
+    scene = "".join(f"  - {each}\n" for each in items)
+    text = f"frame: base\nscene:\n{scene}steps:\n" + "".join(f"  - {each}\n" for each in steps)
+    return plan_script(parse(text), path)
+
+
+def played(plan: Planned) -> tuple[State, ...]:
+    """Return the states of a run, in which nothing is found wrong."""
+    states = run_by_clock(plan).states
+    assert not any(state.findings for state in states)
+    return states
+
+
+def place(scene_object: SceneObject) -> list[float]:
+    """Return x, y, z [mm] of an object, which must stand upright and free."""
+    assert not scene_object.held
+    assert scene_object.T[2, 2] == pytest.approx(1.0, abs=1e-12)
+    x, y, z = (1e3 * scene_object.T[:3, 3]).tolist()
+    return [x, y, z]
+
+
+def yaw(scene_object: SceneObject) -> float:
+    return float(np.degrees(np.arctan2(scene_object.T[1, 0], scene_object.T[0, 0])))
+
+
+def in_base(plan: Planned, state: State) -> FloatArray:
+    """Return the pose (4, 4) of the object in the hand in the base frame."""
+    assert state.held is not None
+    return plan.session.environment.pose(state.held, state.x_setpoint)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_box_is_picked_carried_upright_and_placed(name: str, tmp_path: Path) -> None:
+    bench = BENCHES[name]
+    box = item("part", "box", bench.box, bench.near, 17.0)
+    to = "place: {{at: {{x: {}, y: {}}}}}".format(*bench.to)
+    plan = planned(tmp_path, gripping_urdf(name), ["pick: part", to, "home"], box)
+    states = played(plan)
+    assert place(states[-1].objects[0]) == pytest.approx([*bench.to, 0.0], abs=1e-6)
+    np.testing.assert_allclose(states[-1].q, plan.session.ready, atol=1e-9)
+    carried = [in_base(plan, state) for state in states if state.held is not None]
+    assert len(carried) > 100
+    assert min(T[2, 2] for T in carried) > 1.0 - 1e-9
+    assert max(T[2, 3] for T in carried) > 0.07
+    q = np.array([state.setpoint for state in states])
+    limits = plan.session.require_arm().limits
+    for order, most in enumerate((limits.speed, limits.acceleration, limits.jerk), start=1):
+        assert (np.abs(np.diff(q, order, axis=0)) / TICK**order / most).max() <= 1.0 + 1e-6
+
+
+@pytest.mark.parametrize("name", OF_FREE_AXES)
+def test_fingers_close_on_the_sides_that_the_grasp_chose(name: str, tmp_path: Path) -> None:
+    box = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0), 17.0)
+    plan = planned(tmp_path, gripping_urdf(name), ["pick: part"], box)
+    held = next(state for state in played(plan) if state.grip is not None)
+    assert held.grip is not None
+    # Each finger moves by half of the width, and the pads yield.
+    assert 2.0 * held.grip == pytest.approx(0.05, abs=1e-3)
+    world, hand = plan.session.world_at(plan.start), plan.session.environment.hand
+    assert world is not None
+    assert hand is not None
+    gaps = [world.gap(held.x_setpoint, finger, "part") for finger in hand.fingers]
+    assert max(gaps) < 1e-3
+    assert max(gaps) - min(gaps) < 1e-4
+
+
+@pytest.mark.parametrize("name", OF_FREE_AXES)
+def test_object_is_turned_as_the_script_says(name: str, tmp_path: Path) -> None:
+    box = item("part", "box", (40.0, 55.0, 60.0), (500.0, 100.0), 50.0)
+    steps = ["pick: part", "place: {at: {x: 400, y: -200, yaw: 25}}"]
+    end = played(planned(tmp_path, gripping_urdf(name), steps, box))[-1].objects[0]
+    assert place(end) == pytest.approx([400.0, -200.0, 0.0], abs=1e-6)
+    # Half a turn looks the same.
+    assert yaw(end) % 180.0 == pytest.approx(25.0, abs=1e-6)
+
+
+def test_cylinder_is_grasped_from_the_front_and_set_down(tmp_path: Path) -> None:
+    can = item("can", "cylinder", (25.0, 110.0), (450.0, -150.0))
+    steps = ["grasp: {object: can, side: front}", "line: {by: {z: 80}}", "set_down:", "home"]
+    plan = planned(tmp_path, gripping_urdf("UR5e"), steps, can)
+    states = played(plan)
+    assert place(states[-1].objects[0]) == pytest.approx([450.0, -150.0, 0.0], abs=1e-6)
+    assert max(in_base(plan, state)[2, 3] for state in states if state.held) > 0.079
+
+
+@pytest.mark.parametrize(
+    "name", ["OpenMANIPULATOR-X", pytest.param("Panda", marks=pytest.mark.long)]
+)
+def test_box_is_stacked_on_another(name: str, tmp_path: Path) -> None:
+    bench, small = BENCHES[name], name == "OpenMANIPULATOR-X"
+    size = (25.0, 25.0, 40.0) if small else (40.0, 40.0, 50.0)
+    yaws = [float(np.degrees(np.arctan2(at[1], at[0]))) for at in (bench.near, bench.to)]
+    boxes = [
+        item("a", "box", size, bench.near, yaws[0]),
+        item("b", "box", size, bench.to, yaws[1]),
+    ]
+    plan = planned(tmp_path, gripping_urdf(name), ["stack: {object: b, on: a}"], *boxes)
+    b = next(each for each in played(plan)[-1].objects if each.name == "b")
+    assert place(b) == pytest.approx([*bench.near, size[2]], abs=1e-6)
+
+
+def test_released_object_stands_on_what_is_below_it(tmp_path: Path) -> None:
+    box = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
+    steps = ["pick: part", "line: {by: {z: -53}}", "release", "home"]
+    states = played(planned(tmp_path, gripping_urdf("UR5e"), steps, box))
+    assert place(states[-1].objects[0]) == pytest.approx([500.0, 100.0, 0.0], abs=1e-6)
+
+
+def test_low_box_is_held_by_the_fingertips(tmp_path: Path) -> None:
+    steps = ["pick: plate", "place: {at: {x: 400, y: -200}}"]
+    plan = planned(
+        tmp_path, gripping_urdf("UR5e"), steps, item("plate", "box", (40, 40, 14), (450, 0))
+    )
+    states = played(plan)
+    assert place(states[-1].objects[0]) == pytest.approx([400.0, -200.0, 0.0], abs=1e-6)
+    held = next(state for state in states if state.grip is not None)
+    world, hand = plan.session.world_at(held), plan.session.environment.hand
+    assert world is not None
+    assert hand is not None
+    for finger in hand.fingers:
+        assert STOP < world.gap(held.x_setpoint, finger, "table") <= 0.010
+
+
+def test_held_object_keeps_clear_of_a_wall_as_the_arm_does(tmp_path: Path) -> None:
+    """The wall is so high that the hand alone would pass over it, but not the tall object."""
+    post = item("post", "box", (40.0, 40.0, 160.0), (480.0, 120.0), 14.0)
+    wall = item("wall", "box", (300.0, 20.0, 150.0), (480.0, 0.0), can_be_held=False)
+    steps = ["pick: {object: post, side: above}", "place: {at: {x: 480, y: -120}}", "home"]
+    plan = planned(tmp_path, gripping_urdf("UR5e"), steps, post, wall)
+    states = played(plan)
+    end = next(each for each in states[-1].objects if each.name == "post")
+    assert place(end) == pytest.approx([480.0, -120.0, 0.0], abs=1e-6)
+    carried = [state for state in states if state.held is not None]
+    gaps = []
+    for state in carried[::5]:
+        world = plan.session.world_at(state)
+        assert world is not None
+        gaps.append(world.gap(state.x_setpoint, "post", "wall"))
+    assert STOP < min(gaps) < 0.05
+    over = [
+        in_base(plan, state)[2, 3] for state in carried if abs(in_base(plan, state)[1, 3]) < 0.01
+    ]
+    assert min(over) > 0.15 + STOP
+
+
+def test_both_fingers_may_be_driven(tmp_path: Path) -> None:
+    box = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
+    steps = ["pick: part", "place: {at: {x: 400, y: -200}}"]
+    states = played(planned(tmp_path, gripping_urdf("UR5e", mimic=False), steps, box))
+    assert place(states[-1].objects[0]) == pytest.approx([400.0, -200.0, 0.0], abs=1e-6)

@@ -1,0 +1,65 @@
+"""The recording of a Panda that picks and places a box is verified and shows the box."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import katana450
+from katana450.arm.control import commands as cmd
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.assembly.robot_session import find_robot
+from katana450.extensions.programs import runner
+from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.script import parse
+from katana450.extensions.recording.files.header import header_of
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.settings import Settings
+from tests.general_arms.gripping_arms import gripping_urdf
+from tests.recording.recorded import ADA, PERIOD, TestClock
+
+SCRIPT = """frame: base
+scene:
+  - {name: box, shape: box, size: [25, 25, 50], pose: [200, 60, 0, 0, 0, 17], can_be_held: true}
+steps:
+  - pick: box
+  - place: {at: {x: 160, y: -120}}
+"""
+
+
+def test_recording_is_verified_and_scored(tmp_path: Path) -> None:
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(gripping_urdf("OpenMANIPULATOR-X"), encoding="utf-8")
+    robot, session, _ = find_robot(Settings(), urdf, None)
+    script = parse(SCRIPT)
+    assert script.scene is not None
+    clock, mailbox = TestClock(100.0), Mailbox(session.check)
+    driver = SimulatedDriver(robot.require_arm(), session.ready, 0.0)
+    loop = ControlLoop(session, driver, mailbox, clock, 1.0 / PERIOD)
+    start = script.scene.begin(session)
+    context = PlanContext(session, robot.require_arm().T_base_shoulder)
+    program, run = compiled(script, context, start), Run(0.0)
+    recorded = tmp_path / "run.mcap"
+    with recorded.open("wb") as file:
+        head = header_of(robot, Settings(), urdf, None, session.environment)
+        writer = RecordingWriter(file, head)
+        loop.record = writer.put
+        mailbox.put(cmd.ReplaceScene(start.objects), ADA)
+        while run.phase is Phase.RUNNING:
+            clock.t += PERIOD
+            loop.tick()
+            state = loop.state_publisher.snapshot.state
+            run, commands = runner.step(program, run, state, clock.t)
+            for command in commands:
+                mailbox.put(command, ADA)
+        writer.close()
+    assert (run.phase, run.why) == (Phase.DONE, "")
+    found = katana450.open(recorded)
+    assert found.verify(urdf).identical
+    score = found.score(targets={"box": np.array((0.16, -0.12, 0.0))}, urdf=urdf)
+    np.testing.assert_allclose(score.places["box"], (0.16, -0.12, 0.0), atol=1e-9)
