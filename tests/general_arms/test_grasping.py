@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import threading
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+import viser
+from PIL import Image
 
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.extensions.programs.clocked_run import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.server.preview import Preview
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from tests.general_arms.gripping_arms import gripping_urdf
+from tests.viser_bridge import internals
 
 TICK = 0.01
 
@@ -207,3 +216,55 @@ def test_both_fingers_may_be_driven(tmp_path: Path) -> None:
     steps = ["pick: part", "place: {at: {x: 400, y: -200}}"]
     states = played(planned(tmp_path, gripping_urdf("UR5e", mimic=False), steps, box))
     assert place(states[-1].objects[0]) == pytest.approx([400.0, -200.0, 0.0], abs=1e-6)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["Panda", "OpenMANIPULATOR-X"])
+def test_report_shows_the_grasp(name: str, tmp_path: Path) -> None:
+    bench, urdf, script = BENCHES[name], tmp_path / "arm.urdf", tmp_path / "pick.yaml"
+    urdf.write_text(gripping_urdf(name), encoding="utf-8")
+    box = item("part", "box", bench.box, bench.near, 17.0)
+    script.write_text(f"frame: base\nscene:\n  - {box}\nsteps:\n  - pick: part\n", encoding="utf-8")
+    command = ("run", str(script), "--urdf", str(urdf), "--report", "out", "--headless")
+    done = subprocess.run(
+        [sys.executable, "-m", "katana450", *command],
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "Grasping the object." in (tmp_path / "out" / "report.html").read_text("utf-8")
+    before, after = (
+        np.asarray(Image.open(tmp_path / "out" / f"{each}.png").convert("RGB"), dtype=int)
+        for each in ("initial", "grasping")
+    )
+    # The same camera sees the arm in both, and it has moved.
+    changed = np.abs(after - before).max(axis=2) > 20
+    assert 0.01 < changed.mean() < 0.6
+
+
+def test_preview_shows_the_object_in_the_hand(tmp_path: Path) -> None:
+    bench = BENCHES["OpenMANIPULATOR-X"]
+    box = item("part", "box", bench.box, bench.near, 17.0)
+    to = "place: {{at: {{x: {}, y: {}}}}}".format(*bench.to)
+    plan = planned(tmp_path, gripping_urdf("OpenMANIPULATOR-X"), ["pick: part", to], box)
+    states = run_by_clock(plan).states
+    held = [state for state in states if state.held is not None]
+    lifted = held[len(held) // 2]
+    with redirect_stdout(StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        preview = Preview(server, plan.robot, lambda: plan.session)
+        assert preview.show(plan.program, plan.start, ghosts=True) > 0.0
+        for thread in [each for each in threading.enumerate() if each.name == "preview"]:
+            thread.join(60.0)
+        preview.look(lifted.t)
+        shown = preview._shown
+        seen = None if shown is None else shown.at(lifted.t)
+        assert seen is not None
+        expected = in_base(plan, seen)[:3, 3]
+        assert expected[2] > 0.02
+        ghost = internals.nodes(server)["/path/objects/0"]
+        assert ghost.visible
+        np.testing.assert_allclose(ghost.position, expected, atol=1e-6)
+    finally:
+        with redirect_stdout(StringIO()):
+            server.stop()

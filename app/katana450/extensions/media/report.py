@@ -221,10 +221,11 @@ class Report:
         return tuple(writers)
 
     def _page(self, images: dict[str, bytes], written: datetime) -> str:
+        captions = CAPTIONS if "emptying.png" in images else CAPTIONS | OF_OTHER_OBJECTS
         shown = "\n".join(
-            f'<figure><img alt="{CAPTIONS[name][0]}" '
+            f'<figure><img alt="{captions[name][0]}" '
             f'src="data:image/png;base64,{base64.b64encode(image).decode()}">'
-            f"<figcaption>{CAPTIONS[name][1]}</figcaption></figure>"
+            f"<figcaption>{captions[name][1]}</figcaption></figure>"
             for name, image in images.items()
         )
         tables = "\n".join(
@@ -259,6 +260,9 @@ class Report:
         )
 
 
+OF_OTHER_OBJECTS = {
+    "grasping.png": ("The fingers closed on the object", "Grasping the object."),
+}
 CAPTIONS = {
     "initial.png": ("The arm before it moves", "Initial configuration."),
     "grasping.png": ("The fingers closed on the cup", "Grasping the cup."),

@@ -6,10 +6,12 @@ they show the arm on it, with the part that it has traced.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from katana450.arm.control.five_axis_tool import FiveAxisTool
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import Props
@@ -49,6 +51,12 @@ CLOSING = ": close"
 
 EMPTYING = 0.45
 """[1] Fraction of the pouring motion at which the cup pours."""
+
+BESIDE = (0.75, -0.6, 0.45)
+"""[1] Place of the camera beside the hand of another arm, in distances of `FROM_HAND`."""
+
+FROM_HAND = 2.2
+"""[1] Distance of the camera from that hand, in distances of the hand from the base."""
 
 DESIRED_RADIUS, TRACED_RADIUS = 1.2e-3, 2e-3
 """[m] Radii of the tubes of the desired and the traced path."""
@@ -93,15 +101,32 @@ def stage_pictures(
     """Return the PNG files by their names."""
     stage = RenderStage(robot, session, props)
     found: dict[str, bytes] = {}
-    for name, tick in moments(program, trace).items():
+    ticks = moments(program, trace)
+    on_object = ON_TABLE if "grasping" not in ticks else _look(robot, states[ticks["grasping"]])
+    for name, tick in ticks.items():
         state, items = states[tick], stage.items(states[tick])
-        look = ON_TABLE
+        look = on_object
         if name == "tracing":
             items += _lines(program, robot, trace, tick)
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
         found[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT, RAYS).png
     return found
+
+
+Look = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Position and target of a camera [m]."""
+
+
+def _look(robot: Robot, state: State) -> Look:
+    """Return the look at an object that the arm grasps in ``state``."""
+    arm = robot.require_arm()
+    if isinstance(arm.kinematics, FiveAxisTool):
+        return ON_TABLE
+    x, y, z = (arm.T_base_shoulder @ forward(arm.chain_to(state.tool), state.q))[:3, 3].tolist()
+    reach = math.hypot(x, y, z)
+    ahead, beside, above = (FROM_HAND * reach * each for each in BESIDE)
+    return (x + ahead, y + beside, z + above), (0.6 * x, 0.6 * y, 0.4 * reach)
 
 
 def _same(program: Program, one: int, other: int) -> bool:
