@@ -175,8 +175,8 @@ class ServeExtension:
         runner: Returns the class that drives the arm over time, with its requests. Called in the
             process of the view, of the first extension that has it.
         handler: Returns a class that answers further requests. Called in the process of the view.
-        folder: Adds controls to a tab of the panel of an arm and returns them, or None. Called in
-            the process of the view. Raises KatanaError.
+        folder: Adds controls to a tab of the panel and returns them, or None. Called in the
+            process of the view, also for a robot without an arm. Raises KatanaError.
         server_log: Returns the event log of the server on a port, or None. Called in the process
             that starts the others, of the first extension that has it.
         send_records: Sends records of the notes of a recorder by a pipe to that event log, and

@@ -18,7 +18,7 @@ export const show = (query) => post(`${API}/show?${new URLSearchParams(query)}`)
 
 export const hide = (page) => post(`${API}/hide?page=${page}`);
 
-// Return {t, joints, tool} of two recordings.
+// Return {t, joints, slides, tool} of two recordings.
 export const difference = (query) => answered(`${API}/difference?${new URLSearchParams(query)}`);
 
 // Send a file and return {name, note} of its recording.

@@ -19,7 +19,7 @@ export class Plot {
     this.#length = found.t.at(-1) || 1;
     const picture = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img" });
     const words = [];
-    for (const [name, unit, label] of [["joints", "°", "largest joint difference"], ["tool", "mm", "tool distance"]]) {
+    for (const [name, unit, label] of [["joints", "°", "largest joint difference"], ["slides", "mm", "largest slide difference"], ["tool", "mm", "tool distance"]]) {
       const values = found[name];
       if (!values.length) continue;
       const high = Math.max(...values, 1e-3);

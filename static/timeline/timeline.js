@@ -52,10 +52,14 @@ export class Timeline {
     this.#plot = new Plot(this.#part.plot);
     this.#work = new Work(this.#part.work);
     let stopped = Boolean(page.status()?.stopped);
-    window.addEventListener("status", ({ detail }) => {
-      if (detail.stopped && !stopped) this.live();
-      stopped = Boolean(detail.stopped);
-    });
+    const follow = (status) => {
+      if (status?.stopped && !stopped) this.live();
+      stopped = Boolean(status?.stopped);
+      // Scripts do not move a robot that has only joints.
+      this.#part.again.hidden = !status?.scripts;
+    };
+    follow(page.status());
+    window.addEventListener("status", ({ detail }) => follow(detail));
   }
 
   get shown() {
@@ -134,6 +138,7 @@ export class Timeline {
       second: html("select", { "aria-label": "Second run" }),
       events: html("select", { "aria-label": "Events" }),
       file: html("input", { type: "file", accept: ".mcap", hidden: "", "aria-label": "File of a recording" }),
+      again: button("Run again the selected motion", () => this.#again(), "Run again"),
       at: html("time", { "aria-live": "off" }),
       past: html("div", { id: "past", hidden: "" }),
     });
@@ -141,17 +146,19 @@ export class Timeline {
     part.past.append(html("p", { role: "status" }, "Playing back ", part.at, ", arm is elsewhere"), button("Back to live", () => this.live()));
     part.past.lastElementChild.className = "main";
     this.#page.stage.append(part.past);
+    const fold = button("Fold the timeline away", () => this.#page.fold(), "×");
+    fold.className = "fold";
     const track = html("div", { class: "track" }, part.marks, part.now, part.begin, part.end);
     this.#box.replaceChildren(
       part.plot,
       part.work,
       html("div", { class: "row" }, part.play, part.clock, track, part.speed, part.events, part.of, part.second,
-        button("Save selection", () => this.#save()),
+        button("Save selection", () => this.#save(), "Save", html("span", {}, " selection")),
         part.exports,
-        button("Run again the selected motion", () => this.#again(), "Run again"),
+        part.again,
         button("Verify the selection: simulate it again and compare every tick", () => this.#start("verify", "Verify"), "Verify"),
         button("Copy link to this moment", () => this.#copy(), "Copy link"),
-        button("Fold the timeline away", () => this.#page.fold(), "×"), part.file),
+        fold, part.file),
     );
     this.#list();
     this.#listen();

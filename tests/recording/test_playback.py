@@ -280,12 +280,27 @@ def test_axis_leaves_out_the_rests() -> None:
 def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
     first = StateRow(0.0, [0.0, 0.1], [0.0, 0.1], position=[0.3, 0.0, 0.1])
     second = replace_row(first, q=[np.radians(3.0), 0.1], position=[0.3, 0.004, 0.103])
-    found = difference([0.0, 1.0, 2.0], [first, first, None], [first, second, second])
+    times, turning = [0.0, 1.0, 2.0], (False, False)
+    found = difference(times, [first, first, None], [first, second, second], turning)
     assert found.t == [0.0, 1.0]
     assert found.joints == pytest.approx([0.0, 3.0])
     assert found.tool == pytest.approx([0.0, 5.0])
+    assert found.slides == []
     with pytest.raises(InputError, match="2 and 1 joints"):
-        difference([0.0], [first], [replace_row(first, q=[0.0])])
+        difference([0.0], [first], [replace_row(first, q=[0.0])], turning)
+    # Two runs of another robot than that of the server.
+    with pytest.raises(InputError, match="2 and 2 joints, the robot 3"):
+        difference([0.0], [first], [second], (False,) * 3)
+
+
+def test_difference_of_joints_that_slide_is_a_length() -> None:
+    first = StateRow(0.0, [0.0, 0.1], [0.0, 0.1])
+    second = replace_row(first, q=[np.radians(3.0), 0.107])
+    found = difference([0.0], [first], [second], (False, True))
+    assert found.joints == pytest.approx([3.0])
+    assert found.slides == pytest.approx([7.0])
+    assert found.tool == []
+    assert difference([0.0], [first], [second], (True, True)).joints == []
 
 
 def replace_row(row: StateRow, **changes: object) -> StateRow:

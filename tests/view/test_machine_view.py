@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,27 +14,33 @@ import viser
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import Appearance, AppearanceTrait
-from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.extension import serve_extensions
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.extensions.joint_view.machine_nodes import MachineNodes
 from katana450.extensions.joint_view.machine_panel import MachinePanel, page
 from katana450.extensions.joint_view.machine_view import MachineView
 from katana450.extensions.programs.server.program_runner import ProgramRunner
+from katana450.extensions.recording.playback.drawing import RunDrawing
+from katana450.extensions.recording.playback.folder import CONTEXTS
+from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.service.hub import Hub
 from katana450.server.view.paint import PaintNodes
+from katana450.server.view.panel_folder import FolderContext, PanelFolder
+from katana450.server.view.panel_tabs import PanelTabs
 from katana450.server.view.tint import Tint
+from katana450.server.view.view import ViewOptions
 from katana450.server.viser_bridge.labels import PERSONAL
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
-from tests.robot.hands import column, rail
+from tests.robot.hands import column, hand, rail
 from tests.robot.on_the_table import block
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
@@ -85,15 +93,14 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
     server: viser.ViserServer, robot: Robot
 ) -> None:
     state = standing(robot)
-    MachinePanel(server, robot, RecordedGestures(), lambda: state, Environment(None, None))
+    MachinePanel(server.gui, robot, RecordedGestures(), state, lambda _: ())
     controls = {
         handle.label: handle for handle in internals.controls(server)
         if isinstance(handle, viser.GuiSliderHandle)
     }  # fmt: skip
     joints = robot.joint_group
     labels = [f"{axis + 1} {name}" for axis, name in enumerate(joints.names)]
-    # The others are those of the chosen object.
-    assert set(controls) == {*labels, "Opacity", "Turn"}
+    assert set(controls) == set(labels)
     for axis, label in enumerate(labels):
         unit = 1e3 if joints.slides[axis] else float(np.degrees(1.0))
         assert controls[label].min == pytest.approx(unit * joints.lower[axis], abs=0.01)
@@ -118,7 +125,7 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
         Snapshot(session.begin(session.ready, 0.0, 0.0), 0), LoopTiming(0.01)
     )
     gestures = RecordedGestures()
-    view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, Meshes())
+    view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, ViewOptions())
     floor: Any = internals.nodes(server)["/floor"]
     assert floor.position[2] == pytest.approx(-0.3, abs=1e-3)
     state = session.step(publisher.snapshot.state, (cmd.PlaceObject(block(-0.3)),), 0.0)
@@ -127,6 +134,68 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
     assert [each.label for each in internals.controls(server)].count("Handles on objects") == 1
     handle: Any = internals.nodes(server)["/handles/block"]
     assert not handle.visible
+
+
+def machine_view(
+    server: viser.ViserServer, robot: Robot, hub: Hub, options: Namespace
+) -> tuple[MachineView, Session]:
+    """Return the view with what the extensions add to it, as in a server."""
+    joints = robot.joint_group
+    session = Session(joints, joints.ready, travel=robot.distance)
+    publisher = StatePublisher(
+        Snapshot(session.begin(session.ready, 0.0, 0.0), 0), LoopTiming(0.01)
+    )
+    gestures = RecordedGestures()
+
+    def folders(tabs: PanelTabs) -> Iterator[PanelFolder]:
+        context = FolderContext(
+            server,
+            robot,
+            gestures,
+            lambda: publisher.snapshot.state,
+            hub,
+            lambda act: act(),
+            options,
+            tabs,
+        )
+        for part in serve_extensions():
+            folder = None if part.folder is None else part.folder(context)
+            if folder is not None:
+                yield folder
+
+    given = ViewOptions(folders=folders)
+    return MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, given), session
+
+
+def test_extensions_add_what_needs_no_tool(server: viser.ViserServer, robot: Robot) -> None:
+    hub = Hub(lambda: 0.0)
+    machine_view(server, robot, hub, Namespace())
+    labels = [each.label for each in internals.controls(server)]
+    assert labels.count("Opacity") == labels.count("Turn") == 1
+    assert not {"Script", "Program"} & set(labels)
+    # Windows of this server can play back.
+    assert CONTEXTS[hub].robot is robot
+
+
+@pytest.mark.parametrize("text", [tree(3, 10), hand(), rail("visual")])
+def test_recorded_joints_are_drawn(server: viser.ViserServer, tmp_path: Path, text: str) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    robot = load(path)
+    _, session = machine_view(server, robot, Hub(lambda: 0.0), Namespace())
+    drawing, names = RunDrawing(server, robot, 0), MachineNodes(server, robot).path
+    joints, random = robot.joint_group, np.random.default_rng(2)
+    for _ in range(3):
+        q = random.uniform(joints.lower, joints.upper)
+        row = StateRow(0.0, q.tolist(), q.tolist())
+        drawing.show(RecordedMoment(row, (), None), session, None)
+        for link, T in robot.frames(robot.joint_values(q, 0.0)).items():
+            drawn = shown(server, names[link].replace("/arm", "/playback/0/arm", 1))
+            np.testing.assert_allclose(drawn, T, rtol=0, atol=1e-9)
+    node: Any = internals.nodes(server)["/playback/0/arm"]
+    assert node.visible
+    drawing.hide()
+    assert not node.visible
 
 
 def test_links_before_a_contact_are_coated_with_what_is_checked(

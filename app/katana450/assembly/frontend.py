@@ -61,15 +61,16 @@ def build_frontend(
     nodes = _nodes(config.options, robot, session.environment)
     front_end.on_stop_change = partial(gateway.soon, gateway.hub.follow_stop)
     front_end.on_command_at_rest = partial(gateway.soon, gateway.watch_closely)
+    folders = partial(_folders, gateway, config.options, robot, front_end)
     if robot.arm is None:
         for layer in added:
             if layer.what:
                 raise ConfigurationError(f"{layer.what} {robot.why}")
         front_end.start()
         gateway.attach(ArmHandle(robot, session, front_end, None, nodes))
-        return front_end, _joint_view(gateway, config, found, front_end, meshes), None
+        joint_options = ViewOptions(meshes=meshes, folders=folders)
+        return front_end, _joint_view(gateway, config, found, front_end, joint_options), None
     planning_worker = PlanningWorker(session, front_end.state_publisher, front_end)
-    folders = partial(_folders, gateway, config.options, robot, front_end)
     options = ViewOptions(added, meshes, folders, find_gizmo(robot.arm.kinematics.freedoms))
     view = _view(gateway, config, found, front_end, options)
     go = partial(gateway.hub.gate.submit, cmd.Go()) if settings.go_on_release else None
@@ -150,7 +151,7 @@ def _joint_view(
     config: FrontendConfig,
     found: DescribedRobot,
     front_end: FrontEnd,
-    meshes: Meshes,
+    view_options: ViewOptions,
 ) -> ViewUpdater:
     """Return the view of a robot without a tool; without an extension, one that shows nothing."""
     publisher, rate = front_end.state_publisher, config.settings.frame_rate
@@ -159,5 +160,5 @@ def _joint_view(
             gestures, last_ticket = gateway.gestures, lambda: front_end.last_ticket
             view, (robot, session, _) = each.joint_view(), found
             shown = gateway.viser, robot, publisher, gestures, last_ticket, session, rate
-            return view(*shown, meshes)
+            return view(*shown, view_options)
     return ViewUpdater(gateway.viser, publisher, rate)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
 
 import viser
@@ -12,14 +12,13 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.messages import signed
-from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.state import State
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.joint_view.event_list import EventList
 from katana450.extensions.objects.handles import HANDLES
-from katana450.extensions.objects.objects_panel import ObjectsPanel
 from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
+from katana450.server.view.panel_folder import PanelFolder
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.view_updater import READOUT_INTERVAL
@@ -39,23 +38,22 @@ class MachinePanel:
 
     def __init__(
         self,
-        server: viser.ViserServer,
+        gui: viser.GuiApi,
         robot: Robot,
         gestures: GestureGate,
-        newest: Callable[[], State],
-        environment: Environment,
+        state: State,
+        folders: Callable[[PanelTabs], Iterable[PanelFolder]],
     ) -> None:
-        """Add the tabs to the panel of ``server``.
+        """Add the tabs to the panel.
 
         Args:
-            server: viser's server.
+            gui: The panel of viser's server.
             robot: The robot.
             gestures: The path of gestures to the arm.
-            newest: Returns the newest state.
-            environment: The supports of objects.
+            state: The state that is shown first.
+            folders: Adds the controls of extensions to the tabs. Raises KatanaError.
         """
-        state, self._gui = newest(), server.gui
-        gui = self._gui
+        self._gui = gui
         self._joints = joints = robot.joint_group
         self._labels = joint_labels(robot)
         self._shown_at = -math.inf
@@ -73,12 +71,11 @@ class MachinePanel:
             listen(drive, lambda: GESTURES[drive.value])
             self._readout = gui.add_html(page(joints, self._labels, state))
             gui.add_html(style())
+        self._folders = tuple(folders(tabs))
         with tabs.tab(SCENE):
-            with gui.add_folder("Objects"):
-                self._objects = ObjectsPanel(server, gestures, newest, lambda: environment)
-                self.handles = gui.add_checkbox(
-                    HANDLES, initial_value=False, hint="Arrows that move objects on the table"
-                )
+            self.handles = gui.add_checkbox(
+                HANDLES, initial_value=False, hint="Arrows that move objects on the table"
+            )
             with gui.add_folder("Why", expand_by_default=False):
                 self._why = EventList(gui, gestures)
 
@@ -86,13 +83,14 @@ class MachinePanel:
         self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool
     ) -> None:
         """Show ``state`` at time ``now`` [s]; see ``Panel.follow``."""
+        for folder in self._folders:
+            folder.follow()
         if now - self._shown_at < READOUT_INTERVAL:
             return
         self._shown_at = now
         if caught_up:
             for axis, slider in enumerate(self._sliders):
                 set_slider(slider, shown(self._joints, axis, float(state.goal[axis])))
-        self._objects.follow(state, caught_up=caught_up)
         text = page(self._joints, self._labels, state)
         if text != self._shown:
             self._shown = self._readout.content = text

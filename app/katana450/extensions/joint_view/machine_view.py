@@ -10,7 +10,6 @@ import viser
 from katana450.arm.control.messages import title
 from katana450.arm.control.session import Session
 from katana450.arm.robot.initial_camera import camera
-from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
@@ -22,6 +21,7 @@ from katana450.server.view.paint import PaintNodes
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.tint import Tint
+from katana450.server.view.view import ViewOptions
 from katana450.server.view.view_updater import ViewUpdater
 
 FLOOR_GAP = 5e-4
@@ -29,7 +29,10 @@ FLOOR_GAP = 5e-4
 
 
 class MachineView(ViewUpdater):
-    """The links of the robot, objects, and a panel with joints and objects. There is no gizmo."""
+    """The links of the robot, objects, and a panel with joints and objects. There is no gizmo.
+
+    Extensions add controls by the same hook as for an arm.
+    """
 
     def __init__(
         self,
@@ -40,7 +43,7 @@ class MachineView(ViewUpdater):
         last_ticket: Callable[[], int],
         session: Session,
         frame_rate: float,
-        meshes: Meshes,
+        view_options: ViewOptions,
     ) -> None:
         """Build the scene and the panel.
 
@@ -52,7 +55,10 @@ class MachineView(ViewUpdater):
             last_ticket: Returns the ticket of the newest command.
             session: The session, which has the environment of objects.
             frame_rate: Maximum number of updates per second [Hz].
-            meshes: The meshes of scene objects.
+            view_options: The meshes of scene objects, and the controls of extensions.
+
+        Raises:
+            KatanaError: The controls of an extension cannot be shown.
         """
         super().__init__(server, state_publisher, frame_rate)
         self._robot = robot
@@ -66,11 +72,10 @@ class MachineView(ViewUpdater):
         self._nodes = MachineNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
         self._tint = Tint(server, robot, self._nodes.path)
-        self._objects = SceneObjectNodes(server, load_props(), environment, meshes)
+        self._objects = SceneObjectNodes(server, load_props(), environment, view_options.meshes)
         self._handles = ObjectHandles(server, environment, gestures)
-        self._panel = MachinePanel(
-            server, robot, gestures, lambda: state_publisher.snapshot.state, environment
-        )
+        state = state_publisher.snapshot.state
+        self._panel = MachinePanel(server.gui, robot, gestures, state, view_options.folders)
         self._panel.handles.on_update(lambda _: self._handles.show(self._panel.handles.value))
         self.show(state_publisher.snapshot)
 

@@ -67,8 +67,8 @@ def _folder(context: FolderContext) -> PanelFolder | None:
     from katana450.extensions.programs.server.program_runner import ProgramRunner
 
     runner = context.hub.runner
-    if not isinstance(runner, ProgramRunner):
-        # Another extension provides the only runner of this server.
+    if context.robot.arm is None or not isinstance(runner, ProgramRunner):
+        # Scripts move tools, and another extension may provide the only runner of this server.
         return None
     with context.tabs.tab(TAB):
         return ProgramsPanel(

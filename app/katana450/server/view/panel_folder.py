@@ -1,4 +1,4 @@
-"""Controls that an extension adds to a tab of the panel of an arm."""
+"""Controls that an extension adds to a tab of the panel."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class FolderContext(NamedTuple):
 
     Attributes:
         server: viser's server, with the panel.
-        robot: The robot, which has an arm.
+        robot: The robot. It has no arm if it is driven joint by joint.
         gestures: The path of gestures to the arm.
         state: Returns the newest state.
         hub: The arm and its driver, with the runner of the server.

@@ -201,6 +201,7 @@ class GhostNodes(FrameTree):
                 *surface(visual),
                 color=colour,
                 opacity=opacity,
+                flat_shading=visual.glb is None,
                 cast_shadow=False,
                 receive_shadow=False,
             )

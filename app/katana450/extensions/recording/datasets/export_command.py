@@ -119,7 +119,6 @@ def _lerobot(options: argparse.Namespace) -> Exported:
     check_filmable(size, asked.fps)
     with RecordingFile.open(files_of(options.files)[0]) as first:
         robot = _robot(first, options.urdf)
-        robot.robot.require_arm()
         pictures = PictureViews(views, size, options.urdf, is_bare(first))
     return export_lerobot(options.files, options.out, asked, robot.session, pictures.pictures)
 

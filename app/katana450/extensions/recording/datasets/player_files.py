@@ -78,7 +78,6 @@ def write_page_of(file: RecordingFile, out: Path, times: FloatArray, robot: Desc
     if out.suffix.lower() not in PAGE_SUFFIXES:
         raise InputError(f"{out} must end in .html.")
     check_writable(out)
-    robot.robot.require_arm()
     reader = RecordedStates(file, robot.session)
     states = progress(reader.at(times), len(times), out.name)
     title = f"{robot.robot.name}: {file.path.stem}"
@@ -105,7 +104,6 @@ def write_film_of(
         raise InputError(f"{out} must end in {FILM_SUFFIX}.")
     check_writable(out)
     check_filmable(size, fps)
-    robot.robot.require_arm()
     times = frame_times(*part, fps)
     reader = RecordedStates(file, robot.session)
     with views.pictures(reader.at(times), len(times)) as taken:

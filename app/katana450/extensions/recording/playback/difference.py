@@ -19,12 +19,14 @@ class RunDifference(NamedTuple):
 
     Attributes:
         t: the times [s].
-        joints: largest difference of a joint [deg].
+        joints: largest difference of a joint that turns [deg]; empty if none does.
+        slides: largest difference of a joint that slides [mm]; empty if none does.
         tool: distance of the tool points [mm]; empty for robots without a tool.
     """
 
     t: list[float]
     joints: list[float]
+    slides: list[float]
     tool: list[float]
 
 
@@ -35,22 +37,31 @@ def times_of(length: float) -> list[float]:
 
 
 def difference(
-    times: Sequence[float], first: Sequence[StateRow | None], second: Sequence[StateRow | None]
+    times: Sequence[float],
+    first: Sequence[StateRow | None],
+    second: Sequence[StateRow | None],
+    slides: Sequence[bool],
 ) -> RunDifference:
     """Return the differences of the states of two runs at ``times`` [s].
 
-    Times at which one of them has no state are left out. Raises InputError for robots with
-    different joints.
+    Times at which one of them has no state are left out. ``slides`` says of each joint whether it
+    slides. Raises InputError for robots with other joints.
     """
-    found = RunDifference([], [], [])
+    found = RunDifference([], [], [], [])
+    sliding = np.array(slides, dtype=bool)
     for t, a, b in zip(times, first, second, strict=True):
         if a is None or b is None:
             continue
-        if len(a.q) != len(b.q):
-            raise InputError(f"The runs have {len(a.q)} and {len(b.q)} joints.")
-        turn = np.abs(np.subtract(a.q, b.q)).max(initial=0.0)
+        if not len(a.q) == len(b.q) == len(sliding):
+            raise InputError(
+                f"The runs have {len(a.q)} and {len(b.q)} joints, the robot {len(sliding)}."
+            )
+        away = np.abs(np.subtract(a.q, b.q))
         found.t.append(t)
-        found.joints.append(float(np.degrees(turn)))
+        if not sliding.all():
+            found.joints.append(float(np.degrees(away[~sliding].max())))
+        if sliding.any():
+            found.slides.append(1e3 * float(away[sliding].max()))
         if a.position is not None and b.position is not None:
             found.tool.append(1e3 * float(np.linalg.norm(np.subtract(a.position, b.position))))
     return found

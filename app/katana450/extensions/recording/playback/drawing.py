@@ -14,7 +14,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.programs.server.ghost_scene import SAME_PLACE, GhostScene
 from katana450.extensions.recording.playback.rows import RecordedMoment, still_flying
-from katana450.server.view.scene import Colour, GhostNodes, node_name
+from katana450.server.view.scene import Colour, GhostNodes, Window, node_name
 from katana450.server.viser_bridge.gestures import Gestures
 
 COLOURS: tuple[Colour, Colour] = ((255, 153, 0), (64, 156, 255))
@@ -27,10 +27,11 @@ ROOT = "/playback"
 """Node above everything that is played back."""
 
 
-class _RunDrawing:
+class RunDrawing:
     """The nodes of one run in one window."""
 
-    def __init__(self, client: viser.ClientHandle, robot: Robot, number: int) -> None:
+    def __init__(self, client: Window, robot: Robot, number: int) -> None:
+        """Draw at ``client``. ``number``: 0, or 1 for the second run."""
         self._robot, self._colour = robot, COLOURS[number]
         root, opacity = f"{ROOT}/{number}", OPACITIES[number]
         self._arm = GhostNodes(client, robot, f"{root}/arm", self._colour, opacity)
@@ -56,6 +57,7 @@ class _RunDrawing:
         self._scene.pour(session, moment.objects, water)
 
     def hide(self) -> None:
+        """Show nothing."""
         self._arm.show(False, self._colour)
         self._scene.hide()
 
@@ -65,7 +67,7 @@ class _Window:
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self.client = client
-        self.runs: dict[int, _RunDrawing] = {}
+        self.runs: dict[int, RunDrawing] = {}
         self.lock = threading.Lock()
 
 
@@ -92,6 +94,13 @@ class PlaybackWindows:
             raise InputError(
                 f"The recording is one of a robot with {len(moment.row.q)} joints, not {joints}."
             )
+
+    @property
+    def slides(self) -> tuple[bool, ...]:
+        """One flag for each joint: whether it slides. Those of an arm turn."""
+        if self._robot.arm is None:
+            return self._robot.joint_group.slides
+        return (False,) * len(self._session().ready)
 
     @property
     def moving(self) -> list[str]:
@@ -122,7 +131,7 @@ class PlaybackWindows:
                 drawing = window.runs.get(number)
                 if moment is not None:
                     if drawing is None:
-                        drawing = _RunDrawing(window.client, self._robot, number)
+                        drawing = RunDrawing(window.client, self._robot, number)
                         window.runs[number] = drawing
                     drawing.show(moment, session, moments[0] if number else None)
                 elif drawing is not None:

@@ -57,6 +57,8 @@ OTHER = (
     "the arm of this server, so links and tool may be elsewhere than they were."
 )
 
+NO_SCENE = "The scene is not ready yet, or shows no robot. Wait a moment."
+
 T = TypeVar("T")
 
 
@@ -130,6 +132,7 @@ class PlaybackRoutes:
         first = self._run(request, query.get("of", RING))
         second = self._run(request, query.get("second", RING))
         begins = [_number(query.get(name)) for name in ("t", "t2")]
+        windows = self._known_windows()
 
         def compare() -> Response:
             places = [
@@ -140,10 +143,10 @@ class PlaybackRoutes:
                 for run, place in zip((first, second), places, strict=True)
             ]
             times = times_of(min(left))
-            rows = [
+            one, other = (
                 _rows(run, place, times) for run, place in zip((first, second), places, strict=True)
-            ]
-            return _json(difference(times, *rows)._asdict())
+            )
+            return _json(difference(times, one, other, windows.slides)._asdict())
 
         return await self._in_thread(compare)
 
@@ -197,15 +200,18 @@ class PlaybackRoutes:
 
     def _window(self, request: Request) -> tuple[PlaybackWindows, str]:
         """Return all windows, and the key of the one that asks. Raises HTTPException."""
-        if self._windows is None:
-            self._windows = windows_of(self._context.hub)
-        windows, page = self._windows, request.query_params.get("page", "")
+        windows, page = self._known_windows(), request.query_params.get("page", "")
         client = client_of(self._context.authenticator, request)
-        if windows is None or client is None or not PAGE.fullmatch(page):
-            raise HTTPException(
-                NOT_NOW, "The scene is not ready yet, or shows no arm. Wait a moment."
-            )
+        if client is None or not PAGE.fullmatch(page):
+            raise HTTPException(NOT_NOW, NO_SCENE)
         return windows, key_of(client, page)
+
+    def _known_windows(self) -> PlaybackWindows:
+        """Return all windows. Raises HTTPException before the scene is there."""
+        self._windows = self._windows or windows_of(self._context.hub)
+        if self._windows is None:
+            raise HTTPException(NOT_NOW, NO_SCENE)
+        return self._windows
 
     async def _in_thread(self, act: Callable[[], T]) -> T:
         """Return the result of ``act``, run in a thread. Raises HTTPException for its errors."""
