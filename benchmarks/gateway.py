@@ -16,7 +16,6 @@ import math
 import statistics
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -24,20 +23,19 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-import uvicorn
 import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 
 from benchmarks.start_and_idle import cpu_seconds
 from katana450.assembly.routes import application
+from katana450.assembly.web_server import WebServer
 from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import SUBPROTOCOL, Proxy
 from katana450.server.viser_bridge.viser_server import KEY_HEADER, open_server
-from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator
 from katana450.server.web.listen import listen
+from katana450.settings import Settings
 from tests.gateway.client import enter, page_name, websocket
 
 KEY = "known to both halves of this benchmark"
@@ -54,21 +52,15 @@ def serve() -> None:
     """Run the server's half: print both ports and turn the links until killed."""
     server = open_server(KEY)
     frames = [server.scene.add_frame(f"/link{i}", show_axes=False) for i in range(LINKS)]
-    address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
     listening = listen("127.0.0.1", 0)
     port = listening.getsockname()[1]
-    hub, authenticator = Hub(time.monotonic), Authenticator(None, port, address)
-    proxy = Proxy(hub, authenticator, Guard(server), server.get_port(), KEY)
+    web = WebServer(Settings(port=port), listening)
+    web.start()
+    hub = Hub(time.monotonic)
+    proxy = Proxy(hub, web.authenticator, Guard(server), server.get_port(), KEY)
     proxy.complete.set()
-    config = uvicorn.Config(
-        application(hub, authenticator, Budgets(hub.clock), proxy, address, Acceptor(listening)),
-        ws="websockets-sansio",
-        ws_per_message_deflate=False,
-        lifespan="off",
-        log_config=None,
-    )
-    serving = uvicorn.Server(config)
-    threading.Thread(target=lambda: serving.run(sockets=[listening]), daemon=True).start()
+    app = application(hub, Budgets(hub.clock), proxy, web)
+    web.loop.call_soon_threadsafe(web.complete, app)
     print(json.dumps({"viser": server.get_port(), "gateway": port}), flush=True)
     due = time.perf_counter()
     while True:

@@ -22,11 +22,12 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from katana450.platform_support import cache_folder, only_this_user_writes
+
+if TYPE_CHECKING:
+    import numpy as np
 
 T = TypeVar("T")
 
@@ -69,10 +70,10 @@ class _DamagedError(Exception):
 def _digest(parts: Iterable[bytes | str | np.ndarray[Any, Any]]) -> bytes:
     total = hashlib.sha256()
     for part in parts:
-        if isinstance(part, np.ndarray):
-            data = f"{part.dtype} {part.shape} ".encode() + part.tobytes()
-        else:
+        if isinstance(part, (str, bytes)):
             data = part.encode() if isinstance(part, str) else part
+        else:
+            data = f"{part.dtype} {part.shape} ".encode() + part.tobytes()
         # With its length, so that no two lists of parts have the same bytes.
         total.update(f"{len(data)} ".encode() + data)
     return total.digest()
@@ -139,6 +140,8 @@ class _Pickler(pickle.Pickler):
     """Keeps arrays read-only, which pickle forgets."""
 
     def reducer_override(self, value: Any) -> Any:
+        import numpy as np
+
         if isinstance(value, np.ndarray) and not value.flags.writeable:
             return _read_only, (value.copy(),)
         return NotImplemented

@@ -14,8 +14,8 @@ import msgspec
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
 from katana450.server.viser_bridge.proxy import MAX_BROWSERS, MAX_BROWSERS_EACH
+from katana450.server.web.security import MAX_MESSAGE_BYTES
 from tests.browser.server import AppServer
 from tests.gateway.client import (
     QUIET,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from katana450.arm.runtime.arm_listener import ArmAddress
 from katana450.assembly.supervised import READY, SupervisorPipe
@@ -19,8 +20,11 @@ from katana450.extension import serve_extensions
 from katana450.platform_support import reset_priority
 from katana450.settings import Settings
 
+if TYPE_CHECKING:
+    from katana450.assembly.web_server import WebServer
+
 OPEN = "open"
-"""Status of the process: pages can be loaded. It is ready when the arm is connected too."""
+"""Status of the process: our page can be loaded. It is ready when the arm is connected too."""
 
 WAKE_INTERVAL = 0.25
 """[s] Interval at which a failure of the view is checked."""
@@ -60,6 +64,27 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
     """
     reset_priority()
 
+    from katana450.assembly.web_server import WebServer
+
+    web = WebServer(config.settings, config.listening)
+    web.start()
+    supervisor.report(OPEN)
+    try:
+        _run(config, web, records, supervisor)
+    except EOFError:
+        # The server ends before this process is ready.
+        return
+    finally:
+        web.stop()
+        config.listening.close()
+        # Let Python collect reference cycles when it ends.
+        gc.unfreeze()
+
+
+def _run(
+    config: FrontendConfig, web: WebServer, records: Connection, supervisor: SupervisorPipe
+) -> None:
+    # These imports take a third of a second. The page loads meanwhile.
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.gateway import Gateway
     from katana450.server.viser_bridge.viser_server import close_server
@@ -75,7 +100,7 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
     runners = [part.runner() for part in parts if part.runner is not None]
     gateway = Gateway(
         config.settings,
-        config.listening,
+        web,
         config.lines,
         meshes,
         routes,
@@ -87,16 +112,15 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
     gateway.hub.supervisor_problem = lambda: supervisor.problem
     supervisor.notify = gateway.announce
     senders = [
-        part.send_records(options, gateway.hub.recorder, records)
+        part.send_records(options, web.recorder, records)
         for part in parts
         if part.send_records is not None and options is not None
     ]
+    # Without a reader, notes would only take memory.
+    web.recorder.enabled = any(senders)
     gateway.start()
     supervisor.prove(lambda: gateway.hub.held_up < HANG_SECONDS)
-    supervisor.report(OPEN)
     try:
-        # Importing the libraries that read the robot takes most of a second. The page loads
-        # meanwhile.
         from katana450.assembly.frontend import build_frontend
 
         front_end, view, detours = build_frontend(gateway, config, meshes, supervisor.ended)
@@ -107,18 +131,13 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
             if view.failed.is_set():
                 raise SystemExit(1)
         front_end.close()
-        gateway.stop()
+        web.stop()
         view.stop()
         if detours is not None:
             detours.stop()
-    except EOFError:
-        # The server ends before this process is ready.
-        return
     finally:
-        gateway.stop()
+        web.stop()
         for close in senders:
             if close is not None:
                 close()
         close_server(gateway.viser)
-        # Let Python collect reference cycles when it ends.
-        gc.unfreeze()

@@ -11,6 +11,13 @@ from katana450.arm.runtime.readiness import SocketChannel, ack_age, data_age, re
 KEEPALIVE = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 2}
 """Keepalive of TCP [s, s, probes]. A host that disappears is detected within 3 s."""
 
+ARRIVAL = "katana450.arrival"
+"""Key of the ``Arrival`` in the scope of a websocket."""
+
+PING = "katana450.ping"
+"""Key of the function in the scope of a websocket that sends a ping of the protocol. The answer of
+the client counts as a heartbeat."""
+
 MAX_ACK_AGE = 3.0
 """[s] Age of the newest acknowledgement from which on an open connection counts as lost. The kernel
 sends no probes while data waits for its acknowledgement, so keepalive does not see such a loss."""

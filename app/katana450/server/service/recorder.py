@@ -8,22 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from queue import SimpleQueue
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import Lease, Person, Role
-from katana450.arm.control.state import Verdict
 from katana450.arm.control.traits import BaseCommand
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.errors import KatanaError
+
+if TYPE_CHECKING:
+    from katana450.arm.control.event_log import LogEntry
+    from katana450.arm.runtime.outcomes import TicketOutcome
 
 MAX_WAITING = 4096
 """Maximum number of notes that wait for their reader; more are counted and dropped, except those
 that are always kept."""
 
-REFUSED, ACCEPTED = Verdict.REFUSED.value, Verdict.ACCEPTED.value
+REFUSED, ACCEPTED = "refused", "accepted"
+"""Values of ``Verdict``."""
 
 
 class Note(NamedTuple):
@@ -113,7 +115,7 @@ class Recorder:
     def outcomes(self, outcomes: Iterable[TicketOutcome]) -> None:
         """Note the outcomes of commands that were limited or refused."""
         for ticket, outcome in outcomes:
-            if outcome.verdict is not Verdict.ACCEPTED:
+            if outcome.verdict.value != ACCEPTED:
                 self.note("outcome", None, outcome, ticket=ticket)
 
     def finding(self, entry: LogEntry) -> None:

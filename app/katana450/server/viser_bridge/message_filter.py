@@ -15,12 +15,10 @@ import msgspec
 from viser import _messages as wire
 
 from katana450.server.viser_bridge.guard import Guard
+from katana450.server.web.security import MAX_MESSAGE_BYTES
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
-
-MAX_MESSAGE_BYTES = 16_384
-"""Maximum size of a message. The longest one contains a typed text of 200 characters."""
 
 RATE, BURST = 150.0, 300.0
 """Maximum messages per second, and at once. viser's page sends each type at most 20 times/s."""

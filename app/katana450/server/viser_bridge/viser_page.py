@@ -13,22 +13,20 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import urlsplit
 
-import numpy as np
-import numpy.typing as npt
-import viser
 import zstandard
 from starlette.datastructures import QueryParams
 
 from katana450.disk_cache import kept
 from katana450.errors import ConfigurationError
-from katana450.server.viser_bridge.themes import THEMES, sky
 from katana450.server.web.security import content_policy
 from katana450.server.web.static_files import File
 
-INDEX = Path(viser.__file__).parent / "client" / "build" / "index.html"
+_VISER = find_spec("viser")
+INDEX = Path((_VISER and _VISER.origin) or "").parent / "client" / "build" / "index.html"
 
 LOADER = re.compile(
     r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL
@@ -67,12 +65,13 @@ def load() -> ViserPage:
     """
     data = INDEX.read_bytes()
 
-    def unpacked() -> tuple[str, str, Mapping[str, File]]:
-        return _unpacked(data.decode())
+    def page() -> ViserPage:
+        head, rest, files = _unpacked(data.decode())
+        html = f"{head}{LOADING}{_our_scripts()}{rest}".encode()
+        return ViserPage(File.of(html, "text/html; charset=utf-8"), files)
 
-    head, rest, files = kept(unpacked, data, zstandard.__version__)
-    html = f"{head}{LOADING}{_our_scripts()}{rest}".encode()
-    return ViserPage(File.of(html, "text/html; charset=utf-8"), files)
+    # Computing it imports numpy and viser.
+    return kept(page, data, zstandard.__version__)
 
 
 def _unpacked(html: str) -> tuple[str, str, Mapping[str, File]]:
@@ -128,6 +127,8 @@ def objection(query: QueryParams, origin: str) -> str | None:
 
 def _our_scripts() -> str:
     """Return the script elements, with the colours of each theme as in viser's messages."""
+    from katana450.server.viser_bridge.themes import THEMES, sky
+
     rooms = {
         name: {
             "cell_color": theme.cell,
@@ -146,9 +147,11 @@ def _our_scripts() -> str:
 
 def _bytes(text: str) -> bytes:
     """Decode base 88: each 5 digits give 4 bytes, and n remaining digits give n - 1 bytes."""
+    import numpy as np
+
     value = np.zeros(128, dtype=np.uint64)
     value[[ord(digit) for digit in DIGITS]] = np.arange(len(DIGITS))
-    digits: npt.NDArray[np.uint64] = value[np.frombuffer(text.encode("ascii"), np.uint8)]
+    digits = value[np.frombuffer(text.encode("ascii"), np.uint8)]
     whole, left = divmod(len(digits), 5)
     powers = np.array([88**power for power in (4, 3, 2, 1, 0)], dtype=np.uint64)
     words = digits[: 5 * whole].reshape(whole, 5) @ powers

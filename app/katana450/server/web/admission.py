@@ -6,6 +6,8 @@ request on a connection, the acceptor keeps it open. All others may be closed to
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -15,13 +17,15 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import Role
 from katana450.errors import InputError
 from katana450.server.api.fields import STOP_PATHS
-from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import actor_of
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.security import FOR_PROGRAMS
+
+if TYPE_CHECKING:
+    from katana450.server.service.hub import Hub
 
 SOCKETS, SOCKETS_EACH, RESERVED_SOCKETS = 256, 32, 6
 """Maximum of open websockets, in total and of one identity, and number reserved for the driver and

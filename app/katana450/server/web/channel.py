@@ -21,7 +21,7 @@ from katana450.server.api import answers, requests
 from katana450.server.api.fields import Id
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
-from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.heartbeats import ARRIVAL, PING, Arrival
 from katana450.server.service.hub import Hub
 from katana450.server.service.mutes import MutedError
 from katana450.server.service.participants import Participant, session_of
@@ -30,13 +30,6 @@ from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
-
-ARRIVAL = "katana450.arrival"
-"""Key of the ``Arrival`` in the scope of a websocket."""
-
-PING = "katana450.ping"
-"""Key of the function in the scope of a websocket that sends a ping of the protocol. The answer of
-the client counts as a heartbeat."""
 
 MAX_WAITING_ANSWERS = 64
 """Maximum number of answers that wait for a slow connection; beyond it the oldest are dropped."""

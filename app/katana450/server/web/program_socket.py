@@ -7,8 +7,8 @@ import logging
 import math
 import secrets
 import socket
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, nullcontext, suppress
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
@@ -218,16 +218,14 @@ class LineServer:
         self._acceptor: Acceptor | None = None
         self._writers: set[asyncio.StreamWriter] = set()
 
-    @asynccontextmanager
-    async def open(self, listening: socket.socket | None) -> AsyncIterator[None]:
-        """Serve the clients of ``listening``, if it is a socket, inside the ``with`` block."""
+    async def run(self, listening: socket.socket | None) -> None:
+        """Serve the clients of ``listening``, if it is a socket, until this task is cancelled."""
         if listening is None:
-            yield
             return
         self._acceptor = Acceptor(listening, LINES)
         self._acceptor.start(self._protocol)
         try:
-            yield
+            await asyncio.Event().wait()
         finally:
             self._acceptor.close()
             await self._acceptor.wait_closed()

@@ -30,6 +30,9 @@ EVERYWHERE = {
 FOR_PROGRAMS = ("/api/", "/rosbridge")
 """Prefixes of the paths that need no Origin header. Programs have none, but browsers send one."""
 
+MAX_MESSAGE_BYTES = 16_384
+"""Maximum size of a message of a browser; the longest one has a typed text of 200 characters."""
+
 TLS_ONLY = "max-age=31536000"
 
 

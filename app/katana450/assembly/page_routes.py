@@ -1,0 +1,132 @@
+"""Routes that need no arm: our page and its files, the sign-in, and viser's page.
+
+Their imports are light, because a new server answers them before its libraries are imported.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import replace
+
+import msgspec
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+from katana450.arm.control.actor import CommandChannel
+from katana450.server.service.identity import Identity
+from katana450.server.service.participants import actor_of
+from katana450.server.service.recorder import ACCEPTED, REFUSED, Recorder, stranger
+from katana450.server.service.stop_path import StopPath
+from katana450.server.viser_bridge import viser_page
+from katana450.server.web import security, static_files
+from katana450.server.web.admission import address_of
+from katana450.server.web.authenticator import Authenticator
+from katana450.server.web.bodies import body_of
+from katana450.server.web.token_bucket import TokenBucket
+
+log = logging.getLogger(__name__)
+
+MAX_BODY_BYTES = 1024
+"""Maximum size of the body of a POST request [bytes]."""
+
+BAD_LINKS_PER_SECOND, BAD_LINKS_BURST = 2.0, 20.0
+"""Invalid links that are answered per second, and in a burst, for all clients together."""
+
+STOP_PORT = "X-Stop-Port"
+"""Header that names the port to which the page also sends STOP."""
+
+
+class _Entry(msgspec.Struct, forbid_unknown_fields=True):
+    token: str
+
+
+def page_routes(
+    authenticator: Authenticator, stop_path: StopPath, recorder: Recorder
+) -> list[Route]:
+    """Return the routes that need no arm."""
+    static = static_files.load()
+    index = static.pop("index.html")
+    policy = security.page_policy()
+    bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, time.monotonic())
+
+    async def page(request: Request) -> Response:
+        origin = stop_path.origin_beside(request.headers["host"])
+        return security.with_serial(index.answer(request, security.page_policy(origin)))
+
+    async def file(request: Request) -> Response:
+        found = static.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        # A web worker has the policy of its own file.
+        return found.answer(request, policy)
+
+    async def enter(request: Request) -> Response:
+        """Sign in, with the token of an access link if the server requires one."""
+        try:
+            entry = msgspec.json.decode(await body_of(request, MAX_BODY_BYTES), type=_Entry)
+        except msgspec.MsgspecError as error:
+            raise HTTPException(400, "A token is required.") from error
+        response = Response(status_code=204)
+        if stop_path.origin_beside(request.headers["host"]) is not None:
+            response.headers[STOP_PORT] = str(stop_path.port)
+        if not entry.token and authenticator.identity(request.cookies) is not None:
+            return response
+        bearer = f"Bearer {entry.token}" if entry.token else ""
+        # An admin may keep out the bearer of the token or of the cookie.
+        why = authenticator.refusal(request.cookies, bearer)
+        if why is not None:
+            raise HTTPException(403, why)
+        found, peer = authenticator.sign_in(entry.token, response), address_of(request)
+        if found is not None:
+            actor = actor_of(replace(found, address=peer), CommandChannel.PAGE)
+            recorder.note("sign-in", actor, outcome=ACCEPTED)
+        else:
+            why = "The link is invalid or has expired."
+            recorder.note("sign-in", stranger(peer), outcome=REFUSED, why=why)
+            # A valid link is accepted even while others guess.
+            if entry.token and not bad_links.take(time.monotonic()):
+                raise HTTPException(429, "Too many attempts. Wait a moment.")
+            log.warning("A client used a link that is invalid or has expired.")
+            raise HTTPException(401, "This link is invalid or has expired. Ask for another.")
+        return response
+
+    return [
+        Route("/", page),
+        Route("/static/{name:path}", file),
+        Route("/enter", enter, methods=["POST"]),
+        *_viser_routes(authenticator),
+    ]
+
+
+def _viser_routes(authenticator: Authenticator) -> list[Route]:
+    viser, policy = viser_page.load(), viser_page.policy()
+
+    async def page(request: Request) -> Response:
+        signed_in(authenticator, request)
+        scheme = "wss" if authenticator.address.cookies_are_secure else "ws"
+        origin = f"{scheme}://{request.headers['host']}"
+        why = viser_page.objection(request.query_params, origin)
+        if why is not None:
+            raise HTTPException(400, why)
+        return viser.html.answer(request, policy)
+
+    async def file(request: Request) -> Response:
+        found = viser.files.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        return found.answer(request)
+
+    return [Route("/viser/", page), Route("/viser/{name}", file)]
+
+
+def signed_in(
+    authenticator: Authenticator, request: Request, *, stopping: bool = False
+) -> Identity:
+    """Return the identity of the sender of ``request``. Raises HTTPException without one."""
+    identity = authenticator.identity(request.cookies, stopping=stopping)
+    if identity is None:
+        raise HTTPException(401, "Sign in at the start page first.")
+    return replace(identity, address=address_of(request))

@@ -1,0 +1,164 @@
+"""The web server: a thread with the only port that other machines can reach.
+
+It serves the pages at once. Other requests wait until the application is complete: its imports take
+longer than a browser needs for the pages.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+import time
+from collections.abc import Coroutine
+from typing import Any, cast
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from katana450.assembly.authentication import access_file, address_of, tls_context
+from katana450.assembly.memory_limit import check_memory_limit
+from katana450.assembly.page_routes import page_routes
+from katana450.errors import ConfigurationError
+from katana450.server.service.heartbeats import keep_alive
+from katana450.server.service.people import People
+from katana450.server.service.recorder import Recorder
+from katana450.server.service.stop_path import StopPath
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.authenticator import Authenticator, identity_of
+from katana450.server.web.browser_socket import BrowserSocket
+from katana450.server.web.listen import raise_descriptor_limit
+from katana450.server.web.security import MAX_MESSAGE_BYTES, SecurityMiddleware
+from katana450.settings import Settings
+
+PAGES, FILES = ("/", "/enter"), ("/static/", "/viser/")
+"""Paths, and prefixes of paths, that are served before the application is complete."""
+
+START_SECONDS = 10.0
+GOODBYE_SECONDS = 1
+
+
+class WebServer:
+    """The server, in a thread.
+
+    Attributes:
+        address: Names and addresses of the server.
+        people: Everybody who is connected or kept out.
+        recorder: Notes events.
+        authenticator: Identifies clients.
+        stop_path: Second path of STOP.
+        host: Address of the socket.
+        acceptor: Admits the connections.
+        routes: Routes that need no arm.
+        loop: The event loop, once the server is started.
+    """
+
+    loop: asyncio.AbstractEventLoop
+
+    def __init__(self, settings: Settings, listening: socket.socket) -> None:
+        """Set up the server on the socket ``listening``; it does not answer yet.
+
+        Raises ConfigurationError if ``settings`` do not allow serving on this socket.
+        """
+        tls_context(settings)
+        raise_descriptor_limit()
+        check_memory_limit()
+        access = access_file(settings, listening)
+        self.address = address_of(settings, listening)
+        # Behind a proxy, the paths of STOP on the page's own address lead there.
+        port = settings.stop_port if settings.public_url is None else None
+        self.stop_path = StopPath(port, listening.getsockname()[1], self.address.secure)
+        self.host: str = listening.getsockname()[0]
+        self.acceptor = Acceptor(listening)
+        keep_alive(listening)
+        self.people, self.recorder = People(time.monotonic), Recorder()
+        # Until the event log takes its notes, they wait.
+        self.recorder.enabled = True
+        self.people.links, now = access, time.time()
+        for number, grant in {} if access is None else access.grants.items():
+            if now < grant.expires:
+                self.people.restore(identity_of(number, grant), grant.muted, grant.kept_out - now)
+        port = self.stop_path.main_port
+        self.authenticator = Authenticator(access, port, self.address, self.people)
+        self.routes = page_routes(self.authenticator, self.stop_path, self.recorder)
+        self._app: ASGIApp = Starlette(routes=self.routes)
+        self._beside: list[asyncio.Task[None]] = []
+        self._complete = asyncio.Event()
+        self._server = _Server(
+            self.acceptor,
+            uvicorn.Config(
+                SecurityMiddleware(self._answer, self.address),
+                http="h11",
+                ws=BrowserSocket,
+                ws_max_size=MAX_MESSAGE_BYTES,
+                ws_per_message_deflate=False,
+                lifespan="off",
+                log_config=None,
+                access_log=False,
+                server_header=False,
+                proxy_headers=False,
+                timeout_graceful_shutdown=GOODBYE_SECONDS,
+                ssl_certfile=settings.tls_cert,
+                ssl_keyfile=settings.tls_key,
+            ),
+        )
+        self._thread = threading.Thread(
+            target=lambda: asyncio.run(self._serve()), name="gateway", daemon=True
+        )
+
+    def start(self) -> None:
+        """Start answering. Raises ConfigurationError if the server does not start."""
+        self._thread.start()
+        if not self._server.begun.wait(START_SECONDS) or not self._thread.is_alive():
+            raise ConfigurationError("The gateway did not start; see the log above.")
+
+    def complete(self, app: ASGIApp, *beside: Coroutine[Any, Any, None]) -> None:
+        """Serve all by ``app``, and run ``beside`` as long. Call it in the server's thread."""
+        self._app, self._beside = app, [asyncio.create_task(each) for each in beside]
+        self._complete.set()
+
+    def stop(self) -> None:
+        """Close every connection and stop answering."""
+        self._server.should_exit = True
+        if self._thread.is_alive():
+            self._thread.join()
+
+    async def _serve(self) -> None:
+        self.loop = asyncio.get_running_loop()
+        try:
+            await self._server.serve()
+        finally:
+            self._server.begun.set()
+            for task in self._beside:
+                task.cancel()
+            await asyncio.gather(*self._beside, return_exceptions=True)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if not (scope["path"] in PAGES or scope["path"].startswith(FILES)):
+            await self._complete.wait()
+        await self._app(scope, receive, send)
+
+
+class _Server(uvicorn.Server):
+    """A server for the connections that an acceptor admits.
+
+    asyncio alone accepts thousands of connections in a turn, has no limits, and logs a traceback
+    for each failure.
+    """
+
+    def __init__(self, acceptor: Acceptor, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._acceptor, self.begun = acceptor, threading.Event()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:  # noqa: ARG002
+        await super().startup(sockets=[])
+        # The acceptor has the methods with which uvicorn closes its servers and waits for them.
+        self.servers.append(cast(Any, self._acceptor.start(self._protocol, self.config.ssl)))
+        self.begun.set()
+
+    def _protocol(self) -> asyncio.Protocol:
+        protocol: asyncio.Protocol = cast(Any, self.config.http_protocol_class)(
+            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+        )
+        return protocol
