@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import viser.transforms as vtf
+from playwright.sync_api import Browser
 from playwright.sync_api import Error as PlaywrightError
 
 from tests.browser import chromium
@@ -238,3 +240,13 @@ def test_a_missing_browser_is_an_error_with_a_remedy() -> None:
     with pytest.raises(SystemExit, match="Install Chromium or Chrome") as stopped:
         chromium.main()
     assert "KATANA450_BROWSER" in str(stopped.value)
+
+
+def test_features_that_playwright_disables_stay_disabled(browser: Browser) -> None:
+    session = browser.new_browser_cdp_session()
+    command: str = session.send("SystemInfo.getInfo")["commandLine"]
+    session.detach()
+    lists = [set(each.split(",")) for each in re.findall(r"--disable-features=(\S+)", command)]
+    # Chromium takes the last one.
+    assert len(lists) >= 2
+    assert set().union(*lists) == lists[-1]
