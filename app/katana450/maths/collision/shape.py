@@ -43,7 +43,10 @@ class CollisionShape:
 def hull(points: npt.ArrayLike) -> CollisionShape:
     """Return the convex hull of ``points`` (n, 3) [m]; raise InputError if they lie in a plane."""
     points = np.asarray(points, dtype=np.float64)
-    corners = np.unique(finite_array(points, (len(points), 3), "The points of a hull"), axis=0)
+    corners = finite_array(points, (len(points), 3), "The points of a hull")
+    # Each once, in order, as from `np.unique`, which imports `numpy.ma` at each start.
+    corners = corners[np.lexsort(corners.T[::-1])]
+    corners = corners[(np.diff(corners, axis=0, prepend=np.nan) != 0.0).any(axis=1)]
     # The engine ends the process when it is given points without a volume.
     spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
     if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
