@@ -49,11 +49,16 @@ path would else keep the tool beside its target, and the arm would creep for sec
 HALVINGS: Final = 5
 """Maximum number of halvings of a step that brings the tool no nearer."""
 
+LEFT: Final = 0.25
+"""[1] Ratio of the cost after a step to that before, as the Jacobian predicts it, from which on the
+target counts as out of reach for the step."""
+
 EFFORT_OF_SLOPE: Final = 3
 """Effort of a slope, in looks."""
 
-LEAST_GAIN: Final = 1e-3
-"""[1] Relative gain of a step below which it counts as slow."""
+LEAST_GAIN, LEAST_GAIN_OF_FREE = 1e-3, 1e-2
+"""[1] Relative gain of a step below which it counts as slow; of arms with free joints, whose steps
+regard how the tool's path bends."""
 
 MAX_SLOW: Final = 3
 """Number of slow steps in a row after which the search ends."""
@@ -134,6 +139,7 @@ class Descent:
         """Return where steps from `q` towards ``goal`` lead; ``maximum`` bounds the effort."""
         weights = np.repeat(WEIGHTS[priority], 3)
         now, slow, effort = self.look(goal, q), 0, 1
+        least_gain = LEAST_GAIN if len(q) <= 6 else LEAST_GAIN_OF_FREE
         while effort < maximum:
             cost = float(weights @ now.error**2)
             if cost <= REACHED**2 * float(weights.max()):
@@ -142,7 +148,7 @@ class Descent:
             effort += spent
             if then is None:
                 return Descended(now.q, effort, ended=True)
-            gained = float(weights @ then.error**2) < (1.0 - LEAST_GAIN) * cost
+            gained = float(weights @ then.error**2) < (1.0 - least_gain) * cost
             slow = 0 if gained else slow + 1
             now = then
             if slow == MAX_SLOW:
@@ -160,10 +166,12 @@ class Descent:
         if now.least < NEAR:
             slope, effort = self._slope(now), EFFORT_OF_SLOPE
         dq = self._direction(now, weights, slope)
-        largest = float(np.abs(dq).max())
-        if largest <= REACHED:
+        left = now.error - _part_of_hop(dq) * (dq @ now.J)
+        if float(weights @ left**2) > LEFT * cost and len(now.q) > 6:
+            dq = self._direction(now, weights, slope, is_bent=True)
+        if float(np.abs(dq).max()) <= REACHED:
             return None, effort
-        fraction = min(1.0, HOP / largest)
+        fraction = _part_of_hop(dq)
         for tries in range(1, HALVINGS + 1):
             then = self.look(goal, self._moved(now.q, fraction * dq))
             if float(weights @ then.error**2) < cost and self.regularity.allows(
@@ -178,15 +186,26 @@ class Descent:
         moves = zip(q, dq.tolist(), lower, upper, strict=True)
         return tuple(min(max(x + d, a), b) for x, d, a, b in moves)
 
-    def _direction(self, now: Look, weights: FloatArray, slope: FloatArray | None) -> FloatArray:
+    def _direction(
+        self,
+        now: Look,
+        weights: FloatArray,
+        slope: FloatArray | None,
+        *,
+        is_bent: bool = False,
+    ) -> FloatArray:
         """Return the step (n,) [rad] of least weighted error.
 
         ``slope`` (n,): how the smallest singular value rises, which must not fall below WALL.
+        ``is_bent``: regard also how the path of the tool bends, which decides where the target
+        cannot be reached. The step then leads off a saddle (Dauphin et al. 2014).
         """
         n = len(now.q)
         lower, upper = self._ends
         weighted = now.J * weights
         A = weighted @ now.J.T + DAMPING * np.eye(n)
+        if is_bent:
+            A = A - float(weights[3]) * _bends(now)
         b = weighted @ now.error
         if n > 6 or not weights[0]:
             left = math.sqrt(float(weights @ now.error**2) / float(weights.max()))
@@ -197,6 +216,9 @@ class Descent:
         while free:
             dq = np.zeros(n)
             part = A[np.ix_(free, free)]
+            if is_bent:
+                values, vectors = np.linalg.eigh(part)
+                part = (vectors * np.maximum(np.abs(values), DAMPING)) @ vectors.T
             if slope is None:
                 dq[free] = np.linalg.solve(part, b[free])
             else:
@@ -230,6 +252,21 @@ class Descent:
             J[3:] /= self.search.length
             found.append((self.regularity.least(self.regularity.matrix(J)) - now.least) / PROBE)
         return np.array(found)
+
+
+def _part_of_hop(dq: FloatArray) -> float:
+    """Return which part of a step is a hop at most."""
+    return min(1.0, HOP / max(float(np.abs(dq).max()), REACHED))
+
+
+def _bends(now: Look) -> FloatArray:
+    """Return the second derivatives (n, n) of the tool point, each along the error.
+
+    The axis of a joint turns the velocity that a later joint gives to the tool point.
+    """
+    turned = np.cross(now.error[3:], now.J[:, :3]) @ now.J[:, 3:].T
+    bends: FloatArray = np.triu(turned) + np.triu(turned, 1).T
+    return bends
 
 
 def _turned_with_axis_1(goal: tuple[float, ...], angle: float) -> tuple[float, ...]:
