@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from katana450 import tolerances
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.general_arms.closed_form import ClosedForm
+from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.links import exact_chain, links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.swivel import SevenAxes
@@ -16,9 +17,13 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 
+FINE: Final = 1e-7
+"""[rad], [m] Rounding of a file up to which its arm is solved as it is written. A file with fewer
+decimals does not describe an arm to the accuracy that it is asked for."""
+
 
 class ExactArm(NamedTuple):
-    """A chain without the rounding of its file, and notes on what was changed."""
+    """A chain to drive, and notes on what was changed in that of its file."""
 
     chain: Chain
     notes: tuple[str, ...]
@@ -31,7 +36,7 @@ def kinematics_of(chain: Chain) -> Kinematics:
     Five axes of the family have the core's closed form. Four, six and seven axes have those of this
     package if their axes meet or are parallel as these need. All others are solved numerically, and
     `Kinematics.method` says which condition they miss. A closed form takes the angles and lengths
-    that are rounded in a file as exact; `exact_arm` gives the chain that it solves.
+    that are rounded in a file as exact, and corrects its solutions by the difference.
     """
     links = links_of(chain)
     why = f"there is no closed form for {chain.n} axes"
@@ -54,17 +59,20 @@ def kinematics_of(chain: Chain) -> Kinematics:
 def exact_arm(described: Chain) -> ExactArm:
     """Return the chain with exact axes for which the closed form of `described` holds.
 
-    An arm that is solved numerically stays as it is.
+    An arm that is solved numerically stays as it is. So does one whose file rounds by at most
+    FINE, if that is felt at the tool and the closed form can be corrected.
     """
     if isinstance(kinematics_of(described), Numerical | FiveAxisKinematics):
         return ExactArm(described, ())
     links = links_of(described)
     angle, length = links.rounding
-    chain = exact_chain(described, links)
-    if max(angle, length) <= tolerances.FAMILY_EXACT:
-        return ExactArm(chain, ())
+    rounding = FileRounding(described, links)
+    if rounding.offset <= tolerances.FAMILY_EXACT:
+        return ExactArm(exact_chain(described, links), ())
+    if rounding.is_corrected and max(angle, length) <= FINE:
+        return ExactArm(described, ())
     note = (
         "Its axes deviate from right angles, parallels or meeting points by at most "
         f"{math.degrees(angle):.2g} deg and {1e3 * length:.2g} mm; the nearest exact arm is used."
     )
-    return ExactArm(chain, (note,))
+    return ExactArm(exact_chain(described, links), (note,))

@@ -7,7 +7,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from katana450.errors import InputError
 from katana450.extensions.general_arms.branch_words import BranchWords
+from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.form import Form, form_of
 from katana450.extensions.general_arms.functions import ARRAYS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
@@ -80,8 +81,17 @@ class ClosedForm:
         return self.form.build(self.form.links, ARRAYS)
 
     @cached_property
-    def _solve(self) -> Code:
+    def rounding(self) -> FileRounding:
+        """The rounding of the file that describes the chain."""
+        return FileRounding(self.chain, self.form.links)
+
+    @cached_property
+    def _solve_exact(self) -> Code:
         return one_pose(self.chain, self.form, is_reversed=self.is_reversed)
+
+    @cached_property
+    def _solve(self) -> Code:
+        return self.rounding.corrected_code(self._solve_exact, self._solve_exact)
 
     def __post_init__(self) -> None:
         # An attribute that is found faster than a cached property.
@@ -89,6 +99,8 @@ class ClosedForm:
 
     def _first_pose(self, pose: Sequence[float]) -> list[tuple[float, ...]] | None:
         code = one_pose(self.chain, self.form, is_reversed=self.is_reversed, checks=True)
+        if self.rounding.is_corrected:
+            code = self.rounding.corrected_code(code, self._solve_exact)
         object.__setattr__(self, "_solve_pose", code)
         found: list[tuple[float, ...]] | None = code(pose)
         return found
@@ -144,6 +156,16 @@ class ClosedForm:
 
     def solve_batch(self, poses: FloatArray) -> FloatArray:
         """Return `inverse_batch` of poses (N, 4, 4), without checks."""
+        q = self._exact_batch(poses)
+        if self.rounding.is_corrected:
+            for k in range(q.shape[1]):
+                q[:, k] = self.rounding.corrected(q[:, k], poses, partial(self._exact_on, k))
+        return q
+
+    def _exact_on(self, branch: int, poses: FloatArray) -> FloatArray:
+        return self._exact_batch(poses)[:, branch]
+
+    def _exact_batch(self, poses: FloatArray) -> FloatArray:
         seen = inverses(poses) if self.is_reversed else poses
         shift = self.form.links.shift
         with np.errstate(all="ignore"):
@@ -156,7 +178,7 @@ class ClosedForm:
             # Where axes 4 and 6 are in line, case distinctions keep axis 4 in reach.
             in_line = (np.abs(np.sin(alpha[:, 4])) < LOOSE).any(axis=0)
             for number in np.flatnonzero(in_line).tolist():
-                q[number] = self._solve(poses[number].ravel().tolist(), shift)
+                q[number] = self._solve_exact(poses[number].ravel().tolist(), shift)
         return q
 
 

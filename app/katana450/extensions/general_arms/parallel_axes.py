@@ -51,7 +51,8 @@ LOOSE = 1e-3
 more than 1e-12 m. psi is then turned back, as far as that turns the tool by less than HELD."""
 
 HELD = 9e-13
-"""[rad] Turn of the tool that counts as rounding where two singularities are near."""
+"""[rad] Turn of the tool that counts as rounding where two singularities are near. To it comes
+several times the rounding of the arm's file, which `FileRounding` then corrects."""
 
 AGREES = 1e-13
 """[m] Distance of the tool point from the arm's plane up to which pose and plane agree."""
@@ -68,7 +69,8 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
     turns, bent = facing(f), two_links(f, links.a[1], links.a[2])
     t4 = links.t[3] + (0.0 if flip > 0.0 else math.pi)
     split = three_turns(f, t4, links.t[4], frees_last=True)
-    loosened = _loosened(links.a[1], links.a[2], ex, ey)
+    held = HELD + 4.0 * links.rounding[0]
+    loosened = _loosened(links.a[1], links.a[2], ex, ey, held)
     atan2 = f.atan2
 
     def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
@@ -92,7 +94,7 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
                 towards, opening, bend, square = bent(wx, wy)
                 moved = radius * f.sin(0.5 * (six - free[5]))
                 # Up to FREE alpha6 has the wanted angle already.
-                is_held = (radius > FREE) & (abs(moved) <= 0.5 * HELD)
+                is_held = (radius > FREE) & (abs(moved) <= 0.5 * held)
                 psi, six, towards, opening, bend = f.rarely(  # noqa: PLW2901
                     (radius <= LOOSE) & ((square <= 0.0) | is_held),
                     loosened,
@@ -107,10 +109,12 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
     return solve
 
 
-def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple[float, ...]]:
+def _loosened(
+    l1: float, l2: float, ex: float, ey: float, held: float
+) -> Callable[..., tuple[float, ...]]:
     """Return a function for psi and alpha6 [rad] where axes 4 and 6 are nearly in line.
 
-    Of all turns that keep their sum, or difference, and turn the tool by less than HELD, it
+    Of all turns that keep their sum, or difference, and turn the tool by less than ``held``, it
     takes the one with alpha6 at the wanted angle, else the given one, and of these the nearest that
     keeps axis 4 in reach. Axis 4 lies at (u, v) less (ex, ey) turned by psi, and must be l1 - l2 to
     l1 + l2 away: the law of cosines gives the angle between the two vectors there, subproblem 3.
@@ -134,7 +138,7 @@ def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple
     ) -> tuple[float, ...]:
         side, radius = math.copysign(1.0, radius), abs(radius)
         turn = 0.0 if radius <= FREE else math.remainder(six - free, math.tau)
-        if turn and radius * abs(turn) <= HELD:
+        if turn and radius * abs(turn) <= held:
             psi, six = psi + side * turn, six - turn
             c, s = math.cos(psi), math.sin(psi)
             wx, wy = u - ex * c + ey * s, v - ex * s - ey * c
@@ -147,7 +151,7 @@ def _loosened(l1: float, l2: float, ex: float, ey: float) -> Callable[..., tuple
             cosine = 0.5 * (g * g + e * e - (far if square >= far else near)) / (e * g)
             angle = math.acos(-1.0 if cosine < -1.0 else 1.0 if cosine > 1.0 else cosine)
             turn = (angle if away >= 0.0 else -angle) - away
-            if radius <= FREE or radius * abs(turn) <= HELD:
+            if radius <= FREE or radius * abs(turn) <= held:
                 psi, six = psi + turn, six - side * turn
                 c, s = math.cos(psi), math.sin(psi)
                 wx, wy = u - ex * c + ey * s, v - ex * s - ey * c

@@ -27,6 +27,7 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.closed_form import errors_of, in_limits_turns, inverses
+from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import Numerical
@@ -116,6 +117,11 @@ class SevenAxes:
     def _search(self) -> Numerical:
         return Numerical(self.chain, links_of(self.chain, exact=False))
 
+    @cached_property
+    def rounding(self) -> FileRounding:
+        """The rounding of the file that describes the chain; `at_swivels` does not correct it."""
+        return FileRounding(self.chain, self.links)
+
     @property
     def swivel(self) -> int:
         """Index, from 0, of the joint of the chain that is the parameter."""
@@ -202,7 +208,12 @@ class SevenAxes:
         second = q[cost.argmin(axis=0), np.arange(8)]
         better = cost.min(axis=0) < least
         chosen: FloatArray = np.where(better[:, None], second, first)
-        return chosen
+
+        def again(aimed: FloatArray) -> FloatArray:
+            branches = np.arange(8)
+            return self.at_swivels(aimed, chosen[:, self.swivel])[branches, branches]
+
+        return self.rounding.corrected(chosen, np.broadcast_to(T, (8, 4, 4)), again)
 
     def _cost(self, q: FloatArray, T: FloatArray, hint: FloatArray | None) -> FloatArray:
         """Return a number (N, 8) for each of `q` (N, 8, 7), least for the best.
@@ -223,7 +234,10 @@ class SevenAxes:
         distance, turn = errors_of(
             chain, q[checked][:, None], np.broadcast_to(T, (int(checked.sum()), 4, 4))
         )
-        exact = (distance <= tolerances.SAME_POSITION) & (turn <= tolerances.SAME_ROTATION)
+        off = self.rounding.offset
+        exact = (distance <= tolerances.SAME_POSITION + off) & (
+            turn <= tolerances.SAME_ROTATION + off
+        )
         cost[checked] = np.where(exact[:, 0], cost[checked], 1000.0 + (distance + turn)[:, 0])
         return cost
 

@@ -85,7 +85,11 @@ class PoseSolver:
         chosen = q[pose, branch]
         # Postures for a pose out of reach are only near it.
         distance, turn = errors_of(chain, chosen[:, None], T[pose])
-        exact = (distance <= tolerances.SAME_POSITION) & (turn <= tolerances.SAME_ROTATION)
+        # Of seven axes they are those of the exact arm, beside which the file rounds this one.
+        off = self.solver.rounding.offset if isinstance(self.solver, SevenAxes) else 0.0
+        exact = (distance <= tolerances.SAME_POSITION + off) & (
+            turn <= tolerances.SAME_ROTATION + off
+        )
         good = exact[:, 0] & self.accepts(chosen)
         taken = np.zeros(len(T), dtype=np.bool)
         taken[pose[good]] = True

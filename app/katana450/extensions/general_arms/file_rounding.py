@@ -1,0 +1,117 @@
+"""Solutions of an arm whose file rounds angles and lengths that a closed form takes as exact.
+
+A closed form solves the exact arm. The tool of the arm in the file is beside it by little more than
+the rounding. The closed form is asked again for the pose that is moved back by this difference,
+CORRECTIONS times; each time the error becomes smaller by the size of the rounding, divided by the
+distance of the posture from a singularity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from katana450.extensions.general_arms.links import DHLinks, links_of
+from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.straight_line import Code
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.turns import in_limits_turn
+
+CORRECTIONS: Final = 2
+
+STEPS: Final = 8
+"""Maximum number of steps of a posture near a singularity."""
+
+EXACT: Final = 1e-11
+"""[m], [1] Difference from a pose that needs no further step."""
+
+DOUBLE: Final = 1e-13
+"""[rad], [m] Rounding that is only that of double precision."""
+
+BESIDE: Final = 10.0
+"""[1] Ratio of a miss to the bound `FileRounding.offset`, above which the pose is out of reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileRounding:
+    """The difference between the arm ``chain`` of a file and the exact ``links`` that solve it."""
+
+    chain: Chain
+    links: DHLinks
+
+    @cached_property
+    def offset(self) -> float:
+        """A bound [m], [rad] on the difference of the tool's poses."""
+        angle, length = self.links.rounding
+        return self.links.n * (angle * max(1.0, self.links.reach) + length)
+
+    @cached_property
+    def is_corrected(self) -> bool:
+        """True if the file rounds more than double precision does.
+
+        Four axes are not corrected: with axes that are not quite parallel they could take one
+        posture only for each pose.
+        """
+        return self.chain.n > 4 and max(self.links.rounding) > DOUBLE
+
+    def corrected(
+        self, q: FloatArray, T: FloatArray, solve: Callable[[FloatArray], FloatArray]
+    ) -> FloatArray:
+        """Return `q` (N, n) [rad] of the exact arm as joint angles of the arm in the file.
+
+        `T` (N, 4, 4) are the poses; ``solve`` returns the exact arm's (N, n) for others. Postures
+        that miss the pose by more than the rounding explains are out of reach, and stay.
+        """
+        if not self.is_corrected:
+            return q
+        aimed = T
+        for _ in range(CORRECTIONS):
+            reached = forward_batch(self.chain, q)
+            missed = np.linalg.norm(T[:, :3, 3] - reached[:, :3, 3], axis=1)
+            aimed = aimed @ np.linalg.solve(reached, T)
+            near = missed <= BESIDE * self.offset
+            q = np.where(near[:, None], solve(aimed), q)
+        return self._polished(q, T)
+
+    def _polished(self, q: FloatArray, T: FloatArray) -> FloatArray:
+        """Return `q` (N, n) [rad] after Gauss-Newton steps where the corrections did not converge.
+
+        These are postures whose distance from a singularity is little more than the rounding.
+        """
+        q, chain = np.array(q), self.chain
+        missed = np.abs(forward_batch(chain, q) - T).max(axis=(1, 2))
+        for k in np.flatnonzero((missed > EXACT) & (missed <= BESIDE * self.offset)).tolist():
+            found, _ = self._search.descend(self._search.goal(T[k]), q[k].tolist(), STEPS)
+            if np.abs(forward(chain, found) - T[k]).max() < missed[k]:
+                q[k] = in_limits_turn(chain, np.array(found))
+        return q
+
+    @cached_property
+    def _search(self) -> Numerical:
+        return Numerical(self.chain, links_of(self.chain, exact=False))
+
+    def corrected_code(self, code: Code, exact: Code) -> Code:
+        """Return ``code`` with the solutions of `corrected`; ``exact`` does not check the pose."""
+        if not self.is_corrected:
+            return code
+
+        def solve(pose: Sequence[float], *free: Sequence[float]) -> list[tuple[float, ...]] | None:
+            found: list[tuple[float, ...]] | None = code(pose, *free)
+            if found is None:
+                return None
+
+            def again(aimed: FloatArray) -> FloatArray:
+                rows = aimed.reshape(-1, 16).tolist()
+                return np.array([exact(row, *free)[k] for k, row in enumerate(rows)])
+
+            T = np.repeat(np.reshape(pose, (1, 4, 4)), len(found), axis=0)
+            return [tuple(q) for q in self.corrected(np.array(found), T, again).tolist()]
+
+        return solve

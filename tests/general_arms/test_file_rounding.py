@@ -1,0 +1,165 @@
+"""Arms whose file rounds right angles are solved as the file describes them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import find_robot
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
+from katana450.extensions.general_arms.links import exact_chain, links_of
+from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.reachability.pose_solver import PoseSolver
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.settings import Settings
+from tests.general_arms import singular_postures as singular
+from tests.general_arms.chain_urdf import chain_urdf
+from tests.general_arms.driven import begun, pose, session_of, settled
+from tests.general_arms.published_arms import (
+    IIWA_7,
+    KR_6,
+    PANDA,
+    PINCHERX_100,
+    PUMA_560,
+    UR5E,
+)
+
+ARMS = {"UR5e": UR5E, "KR 6": KR_6, "Puma 560": PUMA_560, "Panda": PANDA, "iiwa": IIWA_7}
+DECIMALS = 8
+"""Number of decimals of a file with 1.57079633 for a right angle."""
+
+EXACT = 1e-12
+"""[m], [rad]"""
+
+
+def robot_of(folder: Path, chain: Chain, decimals: int = DECIMALS) -> Robot:
+    """Return the robot of a file that gives the rotations of ``chain`` with few decimals."""
+    text = re.sub(
+        r'rpy="([^"]*)"',
+        lambda found: f'rpy="{" ".join(f"{float(x):.{decimals}f}" for x in found[1].split())}"',
+        chain_urdf("arm", chain),
+    )
+    path = folder / "arm.urdf"
+    path.write_text(text, encoding="utf-8")
+    return find_robot(Settings(), path, "tool0").robot
+
+
+def chain_in(folder: Path, chain: Chain, decimals: int = DECIMALS) -> Chain:
+    arm = robot_of(folder, chain, decimals).require_arm()
+    return arm.chain_to(arm.default_tool)
+
+
+def postures(chain: Chain, count: int, seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(chain.lower, chain.upper, (count, chain.n))
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_kinematics_are_those_of_the_file(tmp_path: Path, name: str) -> None:
+    robot = robot_of(tmp_path, ARMS[name])
+    arm = robot.require_arm()
+    chain = arm.chain_to(arm.default_tool)
+    assert max(links_of(chain).rounding) > 1e-10
+    for q in postures(chain, 10):
+        place = robot.frames(robot.joint_values(q, 0.0))["tool0"]
+        np.testing.assert_allclose(arm.T_base_shoulder @ forward(chain, q), place, atol=EXACT)
+    assert not any("nearest exact arm" in note for note in arm.notes)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_solutions_take_the_pose_of_the_arm_in_the_file(tmp_path: Path, name: str) -> None:
+    chain = chain_in(tmp_path, ARMS[name])
+    kinematics = kinematics_of(chain)
+    assert isinstance(kinematics, ClosedForm | SevenAxes)
+    count = 0
+    for q in postures(chain, 30):
+        found = kinematics.inverse(forward(chain, q), q)
+        exact = [each for each in found if each.exact]
+        assert max(each.position_error for each in exact) <= EXACT
+        assert max(each.rotation_error for each in exact) <= EXACT
+        if chain.n == 6:
+            away = np.array([each.q for each in exact]) - q
+            away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
+            assert np.abs(away).max(axis=1).min() <= 1e-7
+        count += len(exact)
+    assert count >= 100
+
+
+@pytest.mark.parametrize("name", ["UR5e", "KR 6"])
+def test_many_poses_are_corrected_as_one(tmp_path: Path, name: str) -> None:
+    chain = chain_in(tmp_path, ARMS[name])
+    solver = kinematics_of(chain)
+    assert isinstance(solver, ClosedForm)
+    T = forward_batch(chain, postures(chain, 30))
+    distance, turn = errors_of(chain, solver.inverse_batch(T), T)
+    single = np.array([solver.solve(each) for each in T])
+    alone, _ = errors_of(chain, single, T)
+    assert ((distance <= EXACT) & (turn <= EXACT)).sum() >= 100
+    np.testing.assert_array_equal(distance <= EXACT, alone <= EXACT)
+
+
+@pytest.mark.parametrize("name", ["UR5e", "KR 6", "Puma 560"])
+def test_postures_near_singularities_are_taken_too(tmp_path: Path, name: str) -> None:
+    chain = chain_in(tmp_path, ARMS[name])
+    solver = kinematics_of(chain)
+    assert isinstance(solver, ClosedForm)
+    rng = np.random.default_rng(2)
+    near = singular.near_surface(chain, singular.determinant(chain), rng, 40)
+    in_line = singular.aligned_wrist(chain, rng, 40, 4, (0.0,))
+    q = np.concatenate((near, in_line))
+    T = forward_batch(chain, q)
+    found = np.array([solver.solve(t, each.tolist()) for t, each in zip(T, q, strict=True)])
+    distance, turn = errors_of(chain, found, T)
+    assert (np.maximum(distance, turn).min(axis=1) <= 1e-9).all()
+
+
+def test_pose_out_of_reach_keeps_the_nearest_postures(tmp_path: Path) -> None:
+    chain = chain_in(tmp_path, UR5E)
+    exact = exact_chain(chain, links_of(chain))
+    T = np.array(forward(chain, np.zeros(6)))
+    T[:3, 3] *= 3.0
+    for one, other in zip(
+        kinematics_of(chain).inverse(T), kinematics_of(exact).inverse(T), strict=True
+    ):
+        assert not one.exact
+        assert one.position_error == pytest.approx(other.position_error, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["UR5e", "iiwa"])
+def test_tool_of_such_an_arm_is_driven(tmp_path: Path, name: str) -> None:
+    session = session_of(chain_in(tmp_path, ARMS[name]))
+    state = begun(session)
+    goal = pose(session, state)[:3, 3] + (0.02, 0.03, -0.04)
+    state = settled(session, state, [cmd.MoveTool(goal)])
+    assert not state.findings
+    np.testing.assert_allclose(pose(session, state)[:3, 3], goal, atol=1e-7)
+
+
+def test_map_counts_the_poses_of_such_an_arm(tmp_path: Path) -> None:
+    chain = chain_in(tmp_path, IIWA_7)
+    solver = kinematics_of(chain)
+    assert isinstance(solver, SevenAxes)
+    T = forward_batch(chain, 0.5 * postures(chain, 20))
+    taken = PoseSolver(solver, lambda q: np.ones(len(q), dtype=np.bool)).taken(T)
+    assert taken.mean() >= 0.9
+
+
+@pytest.mark.parametrize(("chain", "decimals"), [(UR5E, 5), (PANDA, 5), (PINCHERX_100, DECIMALS)])
+def test_coarser_file_and_four_axes_mean_the_exact_arm(
+    tmp_path: Path, chain: Chain, decimals: int
+) -> None:
+    arm = robot_of(tmp_path, chain, decimals).require_arm()
+    assert any("nearest exact arm" in note for note in arm.notes)
+    exact = arm.chain_to(arm.default_tool)
+    assert max(links_of(exact).rounding) < 1e-13
+    q = postures(exact, 1)[0]
+    assert min(each.position_error for each in kinematics_of(exact).inverse(forward(exact, q))) < (
+        EXACT
+    )
