@@ -60,7 +60,7 @@ def exact_arm(described: Chain) -> ExactArm:
     """Return the chain with exact axes for which the closed form of `described` holds.
 
     An arm that is solved numerically stays as it is. So does one whose file rounds by at most
-    FINE, if that is felt at the tool and the closed form can be corrected.
+    FINE, if that moves the tool by more than FAMILY_EXACT.
     """
     if isinstance(kinematics_of(described), Numerical | FiveAxisKinematics):
         return ExactArm(described, ())
@@ -69,7 +69,7 @@ def exact_arm(described: Chain) -> ExactArm:
     rounding = FileRounding(described, links)
     if rounding.offset <= tolerances.FAMILY_EXACT:
         return ExactArm(exact_chain(described, links), ())
-    if rounding.is_corrected and max(angle, length) <= FINE:
+    if max(angle, length) <= FINE:
         return ExactArm(described, ())
     note = (
         "Its axes deviate from right angles, parallels or meeting points by at most "

@@ -85,6 +85,11 @@ class ClosedForm:
         """The rounding of the file that describes the chain."""
         return FileRounding(self.chain, self.form.links)
 
+    @property
+    def slack(self) -> float:
+        """See `FileRounding.slack`."""
+        return self.rounding.slack
+
     @cached_property
     def _solve_exact(self) -> Code:
         return one_pose(self.chain, self.form, is_reversed=self.is_reversed)

@@ -54,12 +54,17 @@ class FileRounding:
 
     @cached_property
     def is_corrected(self) -> bool:
-        """True if the file rounds more than double precision does.
+        """True if the file rounds more than double precision does."""
+        return max(self.links.rounding) > DOUBLE
 
-        Four axes are not corrected: with axes that are not quite parallel they could take one
-        posture only for each pose.
+    @cached_property
+    def slack(self) -> float:
+        """The error [m], [rad] that a solution for a pose of the exact arm cannot avoid.
+
+        Four axes that are not quite parallel take few poses exactly, and none in two postures. Near
+        axis 1 the turn of axis 1 magnifies the rounding, and a posture may count as not exact.
         """
-        return self.chain.n > 4 and max(self.links.rounding) > DOUBLE
+        return BESIDE * self.offset if self.is_corrected and self.chain.n == 4 else 0.0
 
     def corrected(
         self, q: FloatArray, T: FloatArray, solve: Callable[[FloatArray], FloatArray]
@@ -74,11 +79,16 @@ class FileRounding:
         aimed = T
         for _ in range(CORRECTIONS):
             reached = forward_batch(self.chain, q)
-            missed = np.linalg.norm(T[:, :3, 3] - reached[:, :3, 3], axis=1)
-            aimed = aimed @ np.linalg.solve(reached, T)
-            near = missed <= BESIDE * self.offset
+            missed = T[:, :3, 3] - reached[:, :3, 3]
+            if self.chain.n == 4:
+                # They hold the tool point of every pose, and the rotation as far as they can.
+                aimed = aimed.copy()
+                aimed[:, :3, 3] += missed
+            else:
+                aimed = aimed @ np.linalg.solve(reached, T)
+            near = np.linalg.norm(missed, axis=1) <= BESIDE * self.offset
             q = np.where(near[:, None], solve(aimed), q)
-        return self._polished(q, T)
+        return q if self.chain.n == 4 else self._polished(q, T)
 
     def _polished(self, q: FloatArray, T: FloatArray) -> FloatArray:
         """Return `q` (N, n) [rad] after Gauss-Newton steps where the corrections did not converge.

@@ -28,15 +28,23 @@ class GeneralPosture:
     `branch` names the branch; the solvers define the names.
     """
 
-    __slots__ = ("_T", "_chain", "_errors", "_q", "angles", "branch")
+    __slots__ = ("_T", "_chain", "_errors", "_q", "_slack", "angles", "branch")
 
     angles: tuple[float, ...]
     """The joint angles [rad] as plain floats."""
     branch: str
 
-    def __init__(self, chain: Chain, T: FloatArray, angles: tuple[float, ...], branch: str) -> None:
+    def __init__(
+        self,
+        chain: Chain,
+        T: FloatArray,
+        angles: tuple[float, ...],
+        branch: str,
+        slack: float = 0.0,
+    ) -> None:
         self._chain = chain
         self._T = T
+        self._slack = slack
         self._q: FloatArray | None = None
         self._errors: tuple[float, float] | None = None
         self.angles = angles
@@ -66,10 +74,13 @@ class GeneralPosture:
 
     @property
     def exact(self) -> bool:
-        """True if the arm takes the target pose to within rounding; else it is the nearest."""
+        """True if the arm takes the target pose, to within rounding, also that of its file.
+
+        Else it is the nearest.
+        """
         return (
-            self.position_error <= tolerances.SAME_POSITION
-            and self.rotation_error <= tolerances.SAME_ROTATION
+            self.position_error <= tolerances.SAME_POSITION + self._slack
+            and self.rotation_error <= tolerances.SAME_ROTATION + self._slack
         )
 
     @property
@@ -106,6 +117,10 @@ class Branched(Protocol):
     def branches(self) -> tuple[str, ...]:
         """Names of the branches, in the order of the solutions."""
 
+    @property
+    def slack(self) -> float:
+        """The error [m], [rad] of an exact posture that the rounding of a file explains."""
+
 
 class Postures(Sequence[GeneralPosture]):
     """The postures of one pose in the order of the branches, created on first access."""
@@ -125,8 +140,9 @@ class Postures(Sequence[GeneralPosture]):
             return self._made
         except AttributeError:
             T = np.array(self.pose).reshape(4, 4)
+        slack = self.solver.slack
         self._made = tuple(
-            GeneralPosture(self.solver.chain, T, angles, branch)
+            GeneralPosture(self.solver.chain, T, angles, branch, slack)
             for angles, branch in zip(self.angles, self.solver.branches, strict=True)
         )
         return self._made

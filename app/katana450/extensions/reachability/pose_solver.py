@@ -85,8 +85,8 @@ class PoseSolver:
         chosen = q[pose, branch]
         # Postures for a pose out of reach are only near it.
         distance, turn = errors_of(chain, chosen[:, None], T[pose])
-        # Of seven axes they are those of the exact arm, beside which the file rounds this one.
-        off = self.solver.rounding.offset if isinstance(self.solver, SevenAxes) else 0.0
+        # The swivels are solved for the exact arm, beside which the file describes this one.
+        off = 0.0 if isinstance(self.solver, Numerical) else self.solver.rounding.offset
         exact = (distance <= tolerances.SAME_POSITION + off) & (
             turn <= tolerances.SAME_ROTATION + off
         )
