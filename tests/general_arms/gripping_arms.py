@@ -47,6 +47,7 @@ FRANKA_HAND = Gripper((0.063, 0.204, 0.0584), 0.0538, 0.04, 0.0088)
 """Franka Robotics: outer sizes of the hand, and the places of its joints."""
 
 TWO_FINGERS = Gripper((0.06, 0.16, 0.07), 0.06, 0.0425)
+WIDE = Gripper((0.03, 0.11, 0.02), 0.05, 0.04)
 SMALL = Gripper((0.03, 0.07, 0.025), 0.05, 0.024)
 
 FORWARD = se3.from_rotation_translation(
@@ -66,6 +67,7 @@ HANDS = {
     "Panda": (flange(PANDA, TOOL, EIGHTH), FRANKA_HAND),
     "UR5e": (flange(UR5E, TOOL, np.eye(4)), TWO_FINGERS),
     "OpenMANIPULATOR-X": (flange(OPENMANIPULATOR_X, LEVEL, FORWARD), SMALL),
+    "four axes": (flange(OPENMANIPULATOR_X, LEVEL, FORWARD), WIDE),
     "KR 6": (flange(KR_6, TOOL, np.eye(4)), TWO_FINGERS),
 }
 """Arms with their hands."""

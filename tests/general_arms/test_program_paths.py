@@ -74,9 +74,9 @@ def test_three_axes_choose_no_orientation() -> None:
         program(THREE_AXES, "line: {pitch: 5}")
 
 
-def test_grasping_needs_a_pitch_and_a_roll() -> None:
-    with pytest.raises(InputError, match="five-axis arm"):
-        _ = builder(UR5E).at
+def test_arm_without_fingers_has_no_hand() -> None:
+    with pytest.raises(InputError, match="has no gripper"):
+        _ = builder(UR5E).hand
 
 
 @every({"UR5e": UR5E}, {"Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X})

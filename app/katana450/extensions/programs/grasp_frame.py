@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Any, Final
 
 import numpy as np
@@ -92,8 +91,8 @@ def grasp_frame(
 ) -> GraspFrame:
     """Return the grasp frame of ``hand``.
 
-    The two fingers are those that move most against each other. ``axes`` is the number of axes of
-    the arm. Raises InputError, with the reason, for a hand that cannot grasp.
+    ``axes`` is the number of axes of the arm. Raises InputError, with the reason, for a hand that
+    cannot grasp.
     """
     if not gripper.moves:
         raise InputError(NO_FINGERS)
@@ -105,28 +104,31 @@ def grasp_frame(
     def placed(parts: Sequence[Part], x: FloatArray) -> _Bodies:
         return _Bodies(world, parts, hand.palm, x)
 
-    moved = [placed([f], upper).middle - placed([f], lower).middle for f in fingers]
-    pairs = list(combinations(range(len(fingers)), 2))
-    if not pairs:
+    if len(fingers) == 1:
         raise InputError(
             f"The gripper has one finger with a body that moves, {fingers[0].name}, and two that "
             "close on each other are needed to grasp."
         )
-    one, other = min(pairs, key=lambda pair: float(moved[pair[0]] @ moved[pair[1]]))
-    stroke = moved[other] - moved[one]
-    names = f"{fingers[one].name} and {fingers[other].name}"
-    if float(moved[one] @ moved[other]) >= 0.0 or float(np.linalg.norm(stroke)) < MIN_STROKE:
+    if len(fingers) > 2:
+        listed = ", ".join(finger.name for finger in fingers)
+        raise InputError(
+            f"The gripper moves {len(fingers)} links with bodies ({listed}), and objects are held "
+            "between two. Leave out the collision shapes of those that do not touch objects."
+        )
+    one, other = (placed([f], upper).middle - placed([f], lower).middle for f in fingers)
+    stroke, names = other - one, f"{fingers[0].name} and {fingers[1].name}"
+    if float(one @ other) >= 0.0 or float(np.linalg.norm(stroke)) < MIN_STROKE:
         raise InputError(f"The fingers {names} do not close on each other, so they cannot grasp.")
-    left, right = (placed([fingers[number]], upper) for number in (one, other))
+    left, right = (placed([finger], upper) for finger in fingers)
     near, far = (
-        abs(float((placed([fingers[other]], x).middle - placed([fingers[one]], x).middle) @ stroke))
+        abs(float((placed(fingers[1:], x).middle - placed(fingers[:1], x).middle) @ stroke))
         for x in (lower, upper)
     )
     if near > far:
         raise InputError(
             f"The fingers {names} close towards the upper end of the range of their joint, and "
-            "objects are grasped only by fingers that close towards the lower end. Give the joint "
-            "the opposite axis in the description of the arm."
+            "objects are grasped only by fingers that close towards the lower end. Reverse the "
+            "axis of the joint and the signs of its limits in the description of the arm."
         )
     frames = (hand.T_palm_tool[:3, :3], np.eye(3))
     y = _snapped(stroke, frames, ALONG, None)

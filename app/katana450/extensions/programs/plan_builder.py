@@ -20,7 +20,7 @@ from katana450.extensions.programs.actions import Action, FollowPlan
 from katana450.extensions.programs.approach import Approach
 from katana450.extensions.programs.hand_choice import hand_of
 from katana450.extensions.programs.hand_planning import HandPlanning
-from katana450.extensions.programs.planning_choice import OF_FIVE_AXES, planning_of
+from katana450.extensions.programs.planning_choice import planning_of
 from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.step_target import StepTarget
 from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
@@ -185,10 +185,9 @@ class PlanBuilder:
 
     @property
     def at(self) -> ToolTarget:
-        """The present tool pose. Raises InputError for an arm outside the five-axis family."""
+        """The present target of a tool of the five-axis family."""
         found = self.target
-        if not isinstance(found, ToolTarget):
-            raise InputError(OF_FIVE_AXES)
+        assert isinstance(found, ToolTarget)
         return found
 
     @property

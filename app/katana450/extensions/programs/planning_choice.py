@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.programs.five_axis_planning import FiveAxisPlanning
 from katana450.extensions.programs.pose_planning import PosePlanning
 from katana450.extensions.programs.tool_planning import ToolPlanning
-
-OF_FIVE_AXES: Final = (
-    "This needs a five-axis arm, whose tool has a pitch and a roll. Scripts of other arms can have "
-    "all steps that move the arm or its fingers, and grasp and place objects, but none that pour."
-)
-"""Refusal of a step that needs a pitch and a roll."""
 
 
 def planning_of(kinematics: ToolKinematics) -> ToolPlanning:

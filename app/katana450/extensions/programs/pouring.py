@@ -27,6 +27,7 @@ from katana450.extensions.programs.pour_tilt import film_after, tilt_for
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
+from katana450.extensions.programs.tilting import EMPTY_TILT, Tilting, about_the_lip
 from katana450.extensions.programs.tool_curves import ToolTurn
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
@@ -81,9 +82,10 @@ POURING = "pour"
 
 @dataclass(frozen=True)
 class Pour:
-    """Carry the cup over an object, turn it over by the wrist, shake it, and turn it back.
+    """Carry the cup over an object, turn it over, shake it, and turn it back.
 
-    The cup stays upright until then: the tool keeps the pitch of the grasp.
+    The cup stays upright until then. An arm of the five-axis family keeps the pitch of the grasp,
+    and turns the cup by the roll of its wrist. Six and more axes tilt it about its lip.
 
     Attributes:
         into: name of the object.
@@ -122,6 +124,9 @@ class Pour:
         if builder.state.poured is None:
             raise InputError("There is no water in the cup: `fill` it first.")
         rest = self._rest(builder.state.poured.water)
+        if not isinstance(builder.target, ToolTarget):
+            self._pour_about_the_lip(builder, cup, basin, rest)
+            return
         level = builder.at
         if level.pitch > MAX_POUR_PITCH:
             raise InputError(
@@ -149,17 +154,70 @@ class Pour:
 
     def _turn(self, builder: PlanBuilder, level: ToolTarget, rest: float) -> float:
         """Return the roll [rad] of the tilted cup; ``rest`` [m^3] is what stays in it."""
-        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
-        if self.volume is None or pouring is None or poured is None:
+        if self.volume is None or builder.plan_context.session.pouring is None:
             return POUR_TURN
-        inside = pouring.water_environment(builder.state.objects).cup.inside
-        liquid = poured.water.liquid
-        film = film_after(self.volume, rest, PART_TIME, liquid, inside)
-        tilt = tilt_for(PART_FLOW, rest - film, liquid, inside)
-        roll = float(_roll_of(tilt, level.pitch))
+        roll = float(_roll_of(self._tilt(builder, rest), level.pitch))
         if roll >= POUR_TURN:
             raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
         return roll
+
+    def _tilt(self, builder: PlanBuilder, rest: float) -> float:
+        """Return the tilt [rad] at which the flow is PART_FLOW with ``rest`` [m^3] in the cup."""
+        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
+        if self.volume is None or pouring is None or poured is None:
+            return EMPTY_TILT
+        inside = pouring.water_environment(builder.state.objects).cup.inside
+        liquid = poured.water.liquid
+        film = film_after(self.volume, rest, PART_TIME, liquid, inside)
+        return float(tilt_for(PART_FLOW, rest - film, liquid, inside))
+
+    def _pour_about_the_lip(
+        self, builder: PlanBuilder, cup: SceneObject, basin: SceneObject, rest: float
+    ) -> None:
+        """Plan the pour of an arm with six or more axes. Raises InputError if it cannot."""
+        if builder.chain.n < 6:
+            raise InputError(
+                f"An arm with {builder.chain.n} axes cannot tilt a cup about its lip. Pouring "
+                "needs six axes, or an arm of the five-axis family."
+            )
+        if self.rate is not None:
+            raise InputError(
+                "A given rate needs an arm of the five-axis family. Leave out `rate`: the cup is "
+                "then tilted evenly."
+            )
+        environment = builder.plan_context.session.environment
+        T = environment.pose(cup, builder.state.x_setpoint)
+        rim = builder.point(T[:3, 3] + cup.height * T[:3, 2], in_base=True)
+        over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height), in_base=True)
+        shake = SHAKE_ANGLE if self.shake else 0.0
+        ways = about_the_lip(
+            builder, rim, (cup.size[0], cup.height), over, self._tilt(builder, rest), shake
+        )
+        try:
+            builder.first(list(ways), lambda way: self._tilted(builder, way, rest))
+        except InputError as error:
+            raise InputError(f"The cup cannot be emptied into {self.into}: {error}") from error
+        builder.predict_water(rest)
+
+    def _tilted(self, builder: PlanBuilder, way: Tilting, rest: float) -> None:
+        """Append the motions of ``way`` with their pace, and the draining."""
+        carry(builder, way.at, f"over {self.into}")
+        pace = POUR_PACE if self.volume is None else PART_PACE
+        builder.note("slowly", SetSpeed(pace), builder.state)
+        builder.lead([way.down], POURING)
+        if self.shake:
+            builder.lead([*way.shake] * self.shake, "shake")
+        self._drain(builder, rest)
+        builder.lead([way.back], "turn back")
+
+    def _drain(self, builder: PlanBuilder, rest: float) -> None:
+        """Append the wait until the last water, or the part, has run out."""
+        if self.volume is None:
+            builder.note("drain", Wait(DRAIN_TIME), builder.state)
+            builder.note("drain", Drain(), builder.state)
+        else:
+            builder.note("drain", Drain(counted(rest + PART_FLOW * REACTION_TIME)), builder.state)
+        builder.note("full speed", SetSpeed(1.0), builder.state)
 
     def _pour_at_rate(
         self, builder: PlanBuilder, rate: float, at: ToolTarget, turn: float, rest: float
@@ -217,12 +275,7 @@ class Pour:
         back = replace(at, roll=level.roll + turn - math.copysign(SHAKE_ANGLE, turn))
         if self.shake:
             builder.lead([ToolLine(down, back), ToolLine(back, down)] * self.shake, "shake")
-        if self.volume is None:
-            builder.note("drain", Wait(DRAIN_TIME), builder.state)
-            builder.note("drain", Drain(), builder.state)
-        else:
-            builder.note("drain", Drain(counted(rest + PART_FLOW * REACTION_TIME)), builder.state)
-        builder.note("full speed", SetSpeed(1.0), builder.state)
+        self._drain(builder, rest)
         builder.lead([ToolLine(down, at)], "turn back")
 
 

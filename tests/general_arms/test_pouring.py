@@ -1,0 +1,144 @@
+"""Arms with six and seven axes empty a cup about its lip, without spilling."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.pouring import CUP
+from katana450.arm.control.scene_objects import named
+from katana450.arm.control.state import State
+from katana450.arm.robot.props import load_props
+from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.extensions.media.measures import measurements
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.clocked_run import Planned, run_by_clock
+from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.pouring import POURING
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.simulation import Simulation
+from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.tilting import UNDERSIDES
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.planning.path import joint_derivatives
+from katana450.maths.water.units import FEMTOLITRE, ML
+from katana450.settings import Settings
+from tests.general_arms.gripping_arms import gripping_urdf
+
+MICROMETRE = 1e-6
+
+
+class Pour(NamedTuple):
+    """A planned pour and its run."""
+
+    plan: Planned
+    simulation: Simulation
+
+    def cup(self, state: State) -> FloatArray:
+        """Return the pose (4, 4) of the cup in the base frame."""
+        cup = named(state.objects, CUP)
+        assert cup is not None
+        return self.plan.session.environment.pose(cup, state.x_setpoint)
+
+    def lip(self, state: State) -> FloatArray:
+        """Return the lowest point (3,) of the rim of the tilted cup in the base frame [m]."""
+        cup, T = named(state.objects, CUP), self.cup(state)
+        assert cup is not None
+        up = T[:3, 2]
+        down = up[2] * up - (0.0, 0.0, 1.0)
+        lip: FloatArray = T[:3, 3] + cup.height * up + cup.size[0] * down / np.linalg.norm(down)
+        return lip
+
+
+def planned(tmp_path: Path, name: str, pour: str) -> Planned:
+    """Return a script that fills the cup of the scene, and pours as the step says."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(gripping_urdf(name), encoding="utf-8")
+    steps = (
+        "put: {object: cup, x: 450, y: -150}", "put: {object: basin, x: 450, y: 200}",
+        "fill: 200", "grasp: cup", "line: {by: {z: 140}}", f"pour: {pour}", "set_down:", "home",
+    )  # fmt: skip
+    script = parse("frame: base\nsteps:\n" + "".join(f"  - {step}\n" for step in steps))
+    robot, session, _ = describe_robot(Settings(), path, None, find_arm)
+    start = session.begin(session.ready, 0.0, 0.0)
+    context = PlanContext(session, robot.require_arm().T_base_shoulder)
+    return Planned(script, compiled(script, context, start), robot, session, start)
+
+
+def poured(tmp_path: Path, name: str, pour: str) -> Pour:
+    plan = planned(tmp_path, name, pour)
+    found = Pour(plan, run_by_clock(plan))
+    assert not any(state.findings for state in found.simulation.states)
+    return found
+
+
+def test_tool_turns_about_a_lip_over_the_middle_of_the_basin(tmp_path: Path) -> None:
+    plan = planned(tmp_path, "UR5e", "{into: basin, shake: 0}")
+    (path,) = (
+        task.action.plan.segments[0].path
+        for task in plan.program.tasks
+        if task.name == POURING and isinstance(task.action, FollowPlan)
+    )
+    arm = plan.robot.require_arm()
+    q = joint_derivatives(path, np.linspace(0.0, 1.0, 41))[0]
+    T = arm.T_base_shoulder @ forward_batch(arm.chain, q)
+    basin = load_props().basin.height
+    moved = T @ np.linalg.inv(T[0])
+    off = []
+    for under in UNDERSIDES:
+        lip = np.array((0.45, 0.2, basin + load_props().cup.height + under, 1.0))
+        off.append(float(np.abs(moved @ lip - lip).max()))
+    assert min(off) < MICROMETRE
+    # The cup turns evenly, about a level axis.
+    angles = [so3.angle(each[:3, :3], np.eye(3)) for each in moved]
+    np.testing.assert_allclose(np.degrees(angles), np.linspace(0.0, 120.0, 41), atol=1e-6)
+    assert moved[-1][2, 2] == pytest.approx(-0.5, abs=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["UR5e", "Panda"])
+def test_cup_is_emptied_about_its_lip(name: str, tmp_path: Path) -> None:
+    found = poured(tmp_path, name, "{into: basin, shake: 1}")
+    trace = found.simulation.trace
+    values = measurements(found.plan.program, found.plan.robot.require_arm(), trace)
+    assert values["emptied_percent"] is not None
+    assert 99.5 < values["emptied_percent"] < 99.99
+    assert values["spilled_ml"] == 0.0
+    assert values["carried_margin_to_rim_mm"] is not None
+    assert values["carried_margin_to_rim_mm"] > 1.0
+    # The lip stays where it is while the cup turns, and is over the middle of the basin.
+    names = [task.name for task in found.plan.program.tasks]
+    ticks = np.flatnonzero(trace.task == names.index(POURING)).tolist()
+    tilted = [s for s in map(found.simulation.states.__getitem__, ticks) if _tilt(found, s) > 5.0]
+    lips = np.array([found.lip(state) for state in tilted])
+    assert np.ptp(lips, axis=0).max() < MICROMETRE
+    np.testing.assert_allclose(lips[0, :2], (0.45, 0.2), atol=MICROMETRE)
+    assert _tilt(found, tilted[-1]) == pytest.approx(120.0, abs=1e-3)
+    cup = found.cup(found.simulation.states[-1])
+    np.testing.assert_allclose(cup[:3, 3], (0.45, -0.15, 0.0), atol=1e-9)
+
+
+def _tilt(found: Pour, state: State) -> float:
+    """Return the tilt of the cup [deg]."""
+    return float(np.degrees(np.arccos(np.clip(found.cup(state)[2, 2], -1.0, 1.0))))
+
+
+@pytest.mark.long
+def test_part_is_poured(tmp_path: Path) -> None:
+    found = poured(tmp_path, "UR5e", "{into: basin, ml: 60}")
+    state = found.simulation.states[-1]
+    assert state.poured is not None
+    left = state.poured.water.kept * FEMTOLITRE / ML
+    assert left == pytest.approx(140.0, abs=0.6)
+
+
+@pytest.mark.long
+def test_rate_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ScriptError, match="rate needs an arm of the five-axis family"):
+        planned(tmp_path, "UR5e", "{into: basin, rate: 5 ml/s}")
