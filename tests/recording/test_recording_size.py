@@ -9,20 +9,38 @@ import pytest
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from tests.conftest import LONG
-from tests.recording.recorded import PERIOD, Commands, dragging, header, run, swinging
+from tests.recording.recorded import (
+    PERIOD,
+    Commands,
+    dragging,
+    header,
+    random_commands,
+    run,
+    swinging,
+)
 
 TICKS = 6000 if LONG else 660
 """Ticks of a minute, as in a file of a server, or fewer."""
 
 
-@pytest.mark.parametrize("commands", [swinging, dragging])
-def test_hour_without_a_pause_takes_at_most_60_mb(tmp_path: Path, commands: Commands) -> None:
+@pytest.mark.parametrize(
+    ("commands", "seed"),
+    [
+        (swinging, 1),
+        (dragging, 1),
+        # It follows a plan to and fro with a full cup in the hand.
+        pytest.param(random_commands, 2, marks=pytest.mark.long),
+    ],
+)
+def test_hour_without_a_pause_takes_at_most_60_mb(
+    tmp_path: Path, commands: Commands, seed: int
+) -> None:
     path = tmp_path / "hour.mcap"
     sizes: list[int] = []
     with path.open("wb") as opened:
         writer = RecordingWriter(opened, header())
         records: list[TickRecord] = []
-        run(TICKS, 1, records.append, commands, odd=False)
+        run(TICKS, seed, records.append, commands, odd=False)
         for number, each in enumerate(records):
             writer.put(each)
             # As often as a server syncs.

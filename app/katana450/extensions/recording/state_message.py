@@ -27,7 +27,8 @@ from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import MILLILITRE
 
 DIGITS, SHOWN_DIGITS, RATE_DIGITS = 6, 5, 4
-"""Decimals [m, rad, 1] of poses, of numbers that are only displayed, and of rates [rad/s, m/s]."""
+"""Decimals [m, rad, 1] of poses, of what follows from other numbers or is only displayed, and of
+rates [rad/s, m/s] and the lean of water."""
 
 NANO = 1_000_000_000
 
@@ -45,11 +46,11 @@ def _rounded(values: FloatArray, digits: int) -> list[float]:
     return [round(each, digits) + 0.0 for each in values.tolist()]
 
 
-def pose_of(T: FloatArray) -> Pose:
-    """Return the pose ``T`` (4, 4), rounded."""
+def pose_of(T: FloatArray, digits: int = DIGITS) -> Pose:
+    """Return the pose ``T`` (4, 4), rounded to ``digits`` decimals."""
     w, x, y, z = so3.to_quaternion(T[:3, :3]).tolist()
-    turned = [round(each, DIGITS) + 0.0 for each in (x, y, z, w)]
-    return _rounded(T[:3, 3], DIGITS), turned
+    turned = [round(each, digits) + 0.0 for each in (x, y, z, w)]
+    return _rounded(T[:3, 3], digits), turned
 
 
 class StateMessages:
@@ -147,7 +148,9 @@ class StateMessages:
             if not each.carried:
                 yield each.name, (pose_of(each.T), False)
             elif self._environment is not None:
-                yield each.name, (pose_of(self._environment.pose(each, state.x)), each.held)
+                # It follows from the joints, and changes in every tick.
+                T = self._environment.pose(each, state.x)
+                yield each.name, (pose_of(T, SHOWN_DIGITS), each.held)
             elif known is not None:
                 yield each.name, known
 
@@ -190,7 +193,7 @@ def _motion_of(water: Water) -> dict[str, Any]:
     """
     found: dict[str, Any] = {}
     if water.slosh != Slosh():
-        found["lean"] = [round(each, SHOWN_DIGITS) + 0.0 for each in water.slosh.up]
+        found["lean"] = [round(each, RATE_DIGITS) + 0.0 for each in water.slosh.up]
     if water.parcels and water.parcels[-1].age == 0.0:
         new = water.parcels[-1]
         places = [[round(x, DIGITS) + 0.0 for x in each] for each in (new.start, new.velocity)]
