@@ -22,6 +22,8 @@ from starlette.requests import Request
 
 import katana450
 from katana450.arm.control.lease import Role
+from katana450.cli.main import main
+from katana450.extensions import progress
 from katana450.extensions.recording.files.copying import RecordingCopy
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.live.job_routes import JobRoutes
@@ -31,6 +33,7 @@ from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.gateway.client import ask, enter
+from tests.recording.recorded import record, swinging
 from tests.recording.test_recorder import waited_for
 
 POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
@@ -163,6 +166,21 @@ def test_further_formats_are_exported(page: Page, format: str, start: bytes) -> 
     content = page.made(f"do={format}&last=0.5")
     assert content.startswith(start)
     assert len(content) > 1000
+
+
+@pytest.mark.parametrize("format", ["csv", "rosbag2", "html"])
+def test_progress_of_an_export_never_moves_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, format: str
+) -> None:
+    path, out = tmp_path / "run.mcap", tmp_path / f"run.{format}"
+    record(path, 120, commands=swinging)
+    fractions: list[float] = []
+    monkeypatch.setattr(progress, "_listeners", [fractions.append])
+    assert main(["record", "export", str(path), "--format", format, "--out", str(out)]) == 0
+    assert len(fractions) > 20
+    assert fractions == sorted(fractions)
+    assert 0.0 <= fractions[0] < 0.1
+    assert 0.9 < fractions[-1] <= 1.0
 
 
 def folders(temporary: Path) -> list[Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +28,20 @@ POSITION = "position"
 
 
 def rows(
-    file: RecordingFile, start: float = -math.inf, end: float = math.inf
+    file: RecordingFile,
+    start: float = -math.inf,
+    end: float = math.inf,
+    done: Callable[[float], None] | None = None,
 ) -> Iterator[dict[str, Any]]:
-    """Yield the states that were written from ``start`` to ``end`` [s]. Raises InputError."""
+    """Yield the states that were written from ``start`` to ``end`` [s].
+
+    ``done`` is called with the fraction that was read. Raises InputError.
+    """
     first, last = max(start, file.start), min(end, file.end)
     for message in file.messages(STATE, start=start, end=end):
         row = state_numbers(message)
-        report((message.t - first) / max(last - first, LEAST))
+        if done is not None:
+            done((message.t - first) / max(last - first, LEAST))
         if not isinstance(row.get("t"), int | float):
             raise InputError(
                 f"{file.path} is damaged: the state at t = {message.t:.3f} s has no time."
@@ -62,14 +69,18 @@ def state_at(file: RecordingFile, t: float) -> dict[str, Any] | None:
 
 
 def columns(
-    file: RecordingFile, start: float = -math.inf, end: float = math.inf
+    file: RecordingFile,
+    start: float = -math.inf,
+    end: float = math.inf,
+    done: Callable[[float], None] | None = None,
 ) -> dict[str, FloatArray]:
     """Return the numbers of all states as arrays with one row for each, by their names.
 
     Names: ``t``, ``q``, ``qd``, ``setpoint``, ``gripper``, ``gripper_setpoint``, ``speed``, and
-    ``position`` of an arm. Raises InputError for a damaged recording.
+    ``position`` of an arm. ``done`` is called with the fraction that was read. Raises InputError
+    for a damaged recording.
     """
-    found = list(rows(file, start, end))
+    found = list(rows(file, start, end, done))
     if not found:
         raise InputError(f"{file.path} has no states in that time.")
     names = [*NUMBERS, *([POSITION] if POSITION in found[0] else [])]
@@ -93,7 +104,7 @@ def setpoint_table(
     These are ``t`` [s] from 0, which increases, ``theta1`` and so on [rad or m], and for an arm
     ``gripper`` [rad or m]. Raises InputError.
     """
-    table = columns(file, start, end)
+    table = columns(file, start, end, report)
     t, q = table["t"], table["setpoint"]
     # An extra tick for a STOP can have the time of the tick before.
     later = np.concatenate(([True], np.diff(t) > 0.0))

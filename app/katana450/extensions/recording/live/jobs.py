@@ -127,7 +127,9 @@ class RecordingJob:
         async for line in process.stdout:
             text = line.decode(errors="replace").strip()
             try:
-                self.fraction = msgspec.json.decode(text, type=Progress).fraction
+                found = msgspec.json.decode(text, type=Progress).fraction
+                # A bar that moves back says nothing about the time that is left.
+                self.fraction = max(found, self.fraction or 0.0)
             except msgspec.MsgspecError:
                 last = text or last
         return last
