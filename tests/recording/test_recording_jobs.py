@@ -183,6 +183,14 @@ def test_progress_of_an_export_never_moves_back(
     assert 0.9 < fractions[-1] <= 1.0
 
 
+def test_export_of_one_state_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "run.mcap"
+    record(path, 30, commands=swinging)
+    command = ["record", "export", str(path), "--to", "0", "--out", str(tmp_path / "one.csv")]
+    assert main(command) == 0
+    assert capsys.readouterr().out.endswith("one.csv: 1 row.\n")
+
+
 def folders(temporary: Path) -> list[Path]:
     """Return the folders of jobs in ``temporary``."""
     return [each for each in temporary.glob(f"{PREFIX}*/*") if each.is_dir()]

@@ -61,14 +61,18 @@ def _exported(options: argparse.Namespace, file: RecordingFile, start: float, en
     out: Path = options.out
     match options.format:
         case "csv":
-            return f"{write_csv(file, out, start, end)} rows"
+            return _counted(write_csv(file, out, start, end), "row")
         case "parquet":
-            return f"{write_parquet(file, out, start, end)} rows"
+            return _counted(write_parquet(file, out, start, end), "row")
         case "rosbag2":
-            return f"{write_bag(file, out, start, end)} messages"
+            return _counted(write_bag(file, out, start, end), "message")
         case "html":
             return _page(options, file, start, end)
     return _film(options, file, start, end)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _page(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
@@ -77,7 +81,7 @@ def _page(options: argparse.Namespace, file: RecordingFile, start: float, end: f
 
     times = frame_times(start, end, int(FPS))
     count = write_page_of(file, options.out, times, _robot(file, options.urdf))
-    return f"{count} states"
+    return _counted(count, "state")
 
 
 def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
@@ -95,7 +99,7 @@ def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: f
     pictures = PictureViews(views, size, options.urdf, is_bare(file))
     robot = _robot(file, options.urdf)
     count = write_film_of(file, options.out, (start, end), fps, robot, pictures, size)
-    return f"{count} pictures"
+    return _counted(count, "picture")
 
 
 def _lerobot(options: argparse.Namespace) -> Exported:
