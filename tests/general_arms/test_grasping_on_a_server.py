@@ -107,9 +107,9 @@ def test_stop_keeps_the_box_in_the_hand_and_the_program_continues(arm: Client) -
     started(arm, "pick: box", "place: {at: {x: 400, y: -200}}", "home")
     until(arm, lambda now: now.held == "box" and now.program is not None and now.program.step == 2)
     arm.stop()
-    stopped = until(arm, lambda now: not now.moving)
+    stopped = until(arm, lambda now: bool(now.stopped) and not now.moving)
     assert stopped.held == "box"
-    assert status(stopped) == "stopped"
+    until(arm, lambda now: status(now) == "stopped")
     arm.clear_stop()
     arm.ask(Steer(order=ProgramOrder.CONTINUE))
     end = until(arm, lambda now: status(now) in ("done", "failed"))
