@@ -56,9 +56,8 @@ target counts as out of reach for the step."""
 EFFORT_OF_SLOPE: Final = 3
 """Effort of a slope, in looks."""
 
-LEAST_GAIN, LEAST_GAIN_OF_FREE = 1e-3, 1e-2
-"""[1] Relative gain of a step below which it counts as slow; of arms with free joints, whose steps
-regard how the tool's path bends."""
+LEAST_GAIN: Final = 1e-3
+"""[1] Relative gain of a step below which it counts as slow."""
 
 MAX_SLOW: Final = 3
 """Number of slow steps in a row after which the search ends."""
@@ -139,7 +138,6 @@ class Descent:
         """Return where steps from `q` towards ``goal`` lead; ``maximum`` bounds the effort."""
         weights = np.repeat(WEIGHTS[priority], 3)
         now, slow, effort = self.look(goal, q), 0, 1
-        least_gain = LEAST_GAIN if len(q) <= 6 else LEAST_GAIN_OF_FREE
         while effort < maximum:
             cost = float(weights @ now.error**2)
             if cost <= REACHED**2 * float(weights.max()):
@@ -148,7 +146,7 @@ class Descent:
             effort += spent
             if then is None:
                 return Descended(now.q, effort, ended=True)
-            gained = float(weights @ then.error**2) < (1.0 - least_gain) * cost
+            gained = float(weights @ then.error**2) < (1.0 - LEAST_GAIN) * cost
             slow = 0 if gained else slow + 1
             now = then
             if slow == MAX_SLOW:
