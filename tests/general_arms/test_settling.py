@@ -22,7 +22,7 @@ themselves, they took 12 to 110."""
 
 
 MAX_TICKS_BEYOND = 45
-"""[1] The drags out of reach below take 10 to 30 ticks, one for each 10 mm. While the steps did not
+"""[1] The drags out of reach below take less than this. While the steps did not
 regard how the tool's path bends, they took 220 to 378."""
 
 BEYOND = [
