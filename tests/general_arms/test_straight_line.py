@@ -18,10 +18,11 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
+from tests.conftest import LONG
 from tests.general_arms.published_arms import FOUR, KR_6, PUMA_560, SIX, UR5E
 
 ARMS = FOUR | SIX | {"Puma 560 seen from the tool": reversed_chain(PUMA_560)}
-POSTURES = 100
+POSTURES = 300 if LONG else 30
 
 
 def closed_form(chain: Chain) -> ClosedForm:
