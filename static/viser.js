@@ -29,6 +29,7 @@ const Viser = (() => {
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   const groups = new Map(); // labels of the rows of buttons, by id
   const shown = new Map(); // whether the server shows a node, by name
+  const written = new Set(); // names of labels, for which viser loads no node: it draws all of them together
   let veiled = null; // returns whether this page hides the node of a name
   let page = null; // the page's worker
   const viewer = () => window.__viserMutable;
@@ -101,11 +102,16 @@ const Viser = (() => {
   function isWhole() {
     if (since === null) return false;
     if (performance.now() - since > HOLD) return true;
-    const { firstMessageBatch, messageQueue, nodeRefFromName: nodes } = viewer();
-    if (firstMessageBatch || messageQueue.length) return false;
+    const { firstMessageBatch, messageQueue } = viewer();
+    return !firstMessageBatch && !messageQueue.length && !missing().length;
+  }
+
+  // Return the names of visible nodes that are not loaded.
+  function missing() {
+    const nodes = viewer().nodeRefFromName;
     const hidden = [...shown].filter(([, visible]) => !visible).map(([name]) => name);
     const isHidden = (name) => hidden.some((each) => name === each || name.startsWith(`${each}/`));
-    return [...shown.keys()].every((name) => nodes[name] || isHidden(name));
+    return [...shown.keys()].filter((name) => !nodes[name] && !written.has(name) && !isHidden(name));
   }
 
   // viser's socket is in a worker. `server` returns the address for it. `sends` gets each message of
@@ -134,6 +140,7 @@ const Viser = (() => {
             for (const message of data.messages) {
               const { type, uuid, props, name, visible } = message;
               if (type === "GuiButtonGroupMessage") groups.set(uuid, props.label);
+              if (type === "LabelMessage") written.add(name);
               if (type !== "SetSceneNodeVisibilityMessage") continue;
               shown.set(name, visible);
               if (veiled?.(name)) message.visible = false;
@@ -290,7 +297,7 @@ const Viser = (() => {
 
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
-    HELD, start, hold, keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
+    HELD, start, hold, missing, keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
     // Return whether the scene has been drawn.
     isDrawn: () => !held,
     // Return whether nodes are hidden in this page alone.

@@ -21,6 +21,8 @@
     const shown = Object.keys(tree).filter((name) => tree[name]?.effectiveVisibility !== false);
     const { nodeRefFromName, nodePoseData } = viewer();
     return [...new Set([...shown, ...names])].filter((name) => {
+      // viser draws all labels together, so they have no nodes.
+      if (tree[name]?.message?.type === "LabelMessage") return false;
       const pose = nodePoseData[name];
       return !nodeRefFromName[name] || (pose && pose.poseUpdateState !== "updated");
     });

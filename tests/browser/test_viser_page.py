@@ -104,6 +104,10 @@ def test_page_draws_nothing_before_its_scene_is_whole(
         assert ask(page, "drawings.length > 0 && !drawings.includes(false)")
         assert ask(page, "Viser.isDrawn() && !document.documentElement.matches('[data-held]')")
         assert ask(page, "Viser.HELD.includes('[data-held]')")
+    with part("missing"):
+        # The page waits for no label, as viser has no node for it.
+        assert ask(page, "!Viser.node('/label')")
+        assert ask(page, "Viser.missing()") == []
 
 
 def test_page_finds_what_is_under_a_pixel(page: ViserPage) -> None:

@@ -25,6 +25,7 @@ def furnish(server: viser.ViserServer) -> None:
     scene.add_box("/held", color=(40, 140, 225), dimensions=(0.1, 0.1, 0.1), position=(0, 0.4, 0))
     scene.add_transform_controls("/handle", position=(0.0, 0.4, 0.0), scale=0.3)
     scene.add_transform_controls("/hidden", position=(0.0, -0.4, 0.0), scale=0.3, visible=False)
+    scene.add_label("/label", "A label", position=(0.0, 0.0, 0.5))
     gui.configure_theme(dark_mode=False)
     server.initial_camera.position = EYE
     server.initial_camera.look_at = TARGET
