@@ -38,7 +38,7 @@ steps:
   - line: {by: {z: 60}}
   - nudge: {axis: 1, by: 20}
 """
-KINDS = {"stop", "clear_stop", "driver", "step", "contact", "limit", "episode"}
+KINDS = {"stop", "clear_stop", "driver", "program", "step", "contact", "limit", "episode"}
 WATER = "/playback/0/water"
 TRACK_EDGE = 8.0
 """[px] Distance of the ends of the track from those of its slider."""
