@@ -49,10 +49,6 @@ path would else keep the tool beside its target, and the arm would creep for sec
 HALVINGS: Final = 5
 """Maximum number of halvings of a step that brings the tool no nearer."""
 
-LEFT: Final = 0.25
-"""[1] Ratio of the cost after a step to that before, as the Jacobian predicts it, from which on the
-target counts as out of reach for the step."""
-
 EFFORT_OF_SLOPE: Final = 3
 """Effort of a slope, in looks."""
 
@@ -164,12 +160,10 @@ class Descent:
         if now.least < NEAR:
             slope, effort = self._slope(now), EFFORT_OF_SLOPE
         dq = self._direction(now, weights, slope)
-        left = now.error - _part_of_hop(dq) * (dq @ now.J)
-        if float(weights @ left**2) > LEFT * cost and len(now.q) > 6:
-            dq = self._direction(now, weights, slope, is_bent=True)
-        if float(np.abs(dq).max()) <= REACHED:
+        largest = float(np.abs(dq).max())
+        if largest <= REACHED:
             return None, effort
-        fraction = _part_of_hop(dq)
+        fraction = min(1.0, HOP / largest)
         for tries in range(1, HALVINGS + 1):
             then = self.look(goal, self._moved(now.q, fraction * dq))
             if float(weights @ then.error**2) < cost and self.regularity.allows(
@@ -184,26 +178,15 @@ class Descent:
         moves = zip(q, dq.tolist(), lower, upper, strict=True)
         return tuple(min(max(x + d, a), b) for x, d, a, b in moves)
 
-    def _direction(
-        self,
-        now: Look,
-        weights: FloatArray,
-        slope: FloatArray | None,
-        *,
-        is_bent: bool = False,
-    ) -> FloatArray:
+    def _direction(self, now: Look, weights: FloatArray, slope: FloatArray | None) -> FloatArray:
         """Return the step (n,) [rad] of least weighted error.
 
         ``slope`` (n,): how the smallest singular value rises, which must not fall below WALL.
-        ``is_bent``: regard also how the path of the tool bends, which decides where the target
-        cannot be reached. The step then leads off a saddle (Dauphin et al. 2014).
         """
         n = len(now.q)
         lower, upper = self._ends
         weighted = now.J * weights
         A = weighted @ now.J.T + DAMPING * np.eye(n)
-        if is_bent:
-            A = A - float(weights[3]) * _bends(now)
         b = weighted @ now.error
         if n > 6 or not weights[0]:
             left = math.sqrt(float(weights @ now.error**2) / float(weights.max()))
@@ -214,9 +197,6 @@ class Descent:
         while free:
             dq = np.zeros(n)
             part = A[np.ix_(free, free)]
-            if is_bent:
-                values, vectors = np.linalg.eigh(part)
-                part = (vectors * np.maximum(np.abs(values), DAMPING)) @ vectors.T
             if slope is None:
                 dq[free] = np.linalg.solve(part, b[free])
             else:
@@ -250,21 +230,6 @@ class Descent:
             J[3:] /= self.search.length
             found.append((self.regularity.least(self.regularity.matrix(J)) - now.least) / PROBE)
         return np.array(found)
-
-
-def _part_of_hop(dq: FloatArray) -> float:
-    """Return which part of a step is a hop at most."""
-    return min(1.0, HOP / max(float(np.abs(dq).max()), REACHED))
-
-
-def _bends(now: Look) -> FloatArray:
-    """Return the second derivatives (n, n) of the tool point, each along the error.
-
-    The axis of a joint turns the velocity that a later joint gives to the tool point.
-    """
-    turned = np.cross(now.error[3:], now.J[:, :3]) @ now.J[:, 3:].T
-    bends: FloatArray = np.triu(turned) + np.triu(turned, 1).T
-    return bends
 
 
 def _turned_with_axis_1(goal: tuple[float, ...], angle: float) -> tuple[float, ...]:

@@ -77,8 +77,6 @@ class PoseTracker:
         for number in range(1, count + 1):
             stop = target if number == count else since.towards(target, number / count)
             here, effort, ended = self._advanced(here, place, stop, branch, priority, effort)
-            # With free joints, a stride that a whole call does not end is out of reach.
-            ended = ended or (number == 1 < count and self.chain.n > 6)
             if not ended or (effort <= 0 and number < count):
                 return Pursued(np.array(here), since=stop if ended else place)
             place = stop
