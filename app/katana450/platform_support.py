@@ -46,6 +46,13 @@ def raise_priority() -> None:
             os.setpriority(os.PRIO_PROCESS, 0, PROMPT)
 
 
+def prefer_thread() -> None:
+    """Give this thread the lowest real-time priority, on Linux, where the system allows it."""
+    if sys.platform == "linux":
+        with suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+
+
 def reset_priority() -> None:
     """Give this process the normal priority, where the system allows it."""
     if sys.platform == "win32":

@@ -101,6 +101,36 @@ def test_front_end_ends_with_the_supervisor(server: AppServer) -> None:
         time.sleep(0.05)
 
 
+def may_have_real_time() -> bool:
+    """Return whether the system lets a process of this user have a real-time priority."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+    except PermissionError:
+        return False
+    os.sched_setscheduler(0, *before)
+    return True
+
+
+def test_control_and_stop_threads_preempt_everything(server: AppServer) -> None:
+    # Once somebody drives, everything has started.
+    with connect(server.url, "Driver") as arm:
+        under_way(arm)
+    threads = [int(task.name) for task in Path(f"/proc/{server.arm}/task").iterdir()]
+    policies = [os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK for thread in threads]
+    # The control thread, and the one that takes STOP. All others can wait.
+    assert policies.count(os.SCHED_RR) == (2 if may_have_real_time() else 0)
+    assert policies.count(os.SCHED_OTHER) == len(policies) - policies.count(os.SCHED_RR)
+    others = Path(f"/proc/{server.arm}/task").glob("*/children")
+    for process in [
+        server.front,
+        server.stop_process,
+        *" ".join(p.read_text() for p in others).split(),
+    ]:
+        for task in Path(f"/proc/{process}/task").iterdir():
+            assert os.sched_getscheduler(int(task.name)) == os.SCHED_OTHER
+
+
 def process_state(number: int) -> str:
     with suppress(OSError):
         return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]

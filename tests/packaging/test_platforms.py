@@ -60,6 +60,7 @@ NAMES = {
     "sched_getaffinity",
     "sched_setaffinity",
     "sched_setscheduler",
+    "sched_param",
     "setpriority",
     "setsid",
     "start_new_session",
@@ -166,6 +167,20 @@ def test_process_that_was_started_by_nice_keeps_its_priority() -> None:
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert int(done.stdout) > 0
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="only Linux has real-time priorities of threads"
+)
+def test_thread_keeps_its_priority_where_none_is_allowed() -> None:
+    program = (
+        "import os, resource; from katana450.platform_support import prefer_thread; "
+        "resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0)); os.geteuid() or os.setuid(65534); "
+        "prefer_thread(); print(os.sched_getscheduler(0) == os.SCHED_OTHER)"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout == "True\n"
 
 
 @pytest.mark.usefixtures("windows")

@@ -23,6 +23,7 @@ from katana450.arm.runtime.mailbox import Drained, Mailbox
 from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped, waited
+from katana450.platform_support import prefer_thread
 
 log = logging.getLogger(__name__)
 
@@ -180,6 +181,7 @@ class ControlLoop:
         self._mailbox.put(command)
 
     def _run(self) -> None:
+        prefer_thread()
         due = self._clock.now()
         while not self._stopping.is_set():
             late = self._clock.now() - due

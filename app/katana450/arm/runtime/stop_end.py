@@ -14,6 +14,7 @@ from katana450.arm.runtime.arm_end import JOIN_TIMEOUT, PIPE_ERRORS
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.stop_messages import STATUS_INTERVAL, StopPress, StopStatus
+from katana450.platform_support import prefer_thread
 
 log = logging.getLogger(__name__)
 
@@ -66,6 +67,7 @@ class StopEnd:
             self._pipe.close()
 
     def _listen(self) -> None:
+        prefer_thread()
         with suppress(*PIPE_ERRORS):
             while not self._cut.is_set():
                 # A press wakes this thread at once; the end of the arm's process does later.
