@@ -3,9 +3,10 @@
     python -m benchmarks.recording --rounds 5
     python -m benchmarks.recording --rounds 5 --drags
 
-Servers with and without recording take turns. On each the arm swings all the time, or a client
-drags the tool about without a pause, 60 times a second. The processor time is that of the process
-that records, and of the arm's process, divided by the wall time.
+A server with recording and one without take turns in windows of ten seconds. In its window the
+arm swings all the time, or a client drags the tool about without a pause, 60 times a second. The
+processor time is that of the process that records, and of the arm's process, divided by the time
+of the windows.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,6 +30,9 @@ from katana450.server.api import answers, requests
 from tests.browser.server import RECORDING_APP, AppServer
 
 ENDS = ((-0.8, -1.2, 1.5, 0.1, 0.0), (0.8, -1.2, 1.5, 0.1, 0.0))
+
+WINDOW = 10.0
+"""[s] Length of a window: that of the ticks that a server reports on."""
 
 WARM_UP = 8.0
 """[s] Time in which the process that records starts."""
@@ -49,38 +53,93 @@ MIB = 2**20
 
 
 class Costs(NamedTuple):
-    """Lateness of the ticks [s], processor time as fractions of a core, memory and bytes."""
+    """Costs of a server while its arm moves.
+
+    ``p50``, ``p99``: lateness of the ticks [s], mean of its windows. ``arm``, ``recorder``:
+    processor time of the arm's process and of the process that records, of a core. ``memory``:
+    of the process that records [bytes]. ``size``: of the recording [bytes per second of motion].
+    """
 
     p50: float
     p99: float
     arm: float
     recorder: float
     memory: int
-    size: int
+    size: float
 
 
-def measured(folder: Path | None, seconds: float, move: Callable[[Client, float], None]) -> Costs:
-    """Return the costs while ``move`` moves an arm for ``seconds``.
+class Measured:
+    """One server of which the costs are measured in windows."""
 
-    ``folder``: that of its recording.
+    def __init__(self, server: AppServer, arm: Client, folder: Path | None) -> None:
+        """Measure ``server``, driven by ``arm``. ``folder``: that of its recording."""
+        self._arm, self._folder = arm, folder
+        self._pids = [server.arm] if folder is None else [server.arm, server.child("katana450 rec")]
+        self._loops: list[answers.Loop] = []
+        self._used = np.zeros(len(self._pids))
+        self._size = self._written()
+
+    def _written(self) -> int:
+        return sum(path.stat().st_size for path in self._folder.iterdir()) if self._folder else 0
+
+    def window(self, move: Callable[[Client, float], None]) -> None:
+        """Measure one window, in which ``move`` moves the arm."""
+        before = np.array([cpu_seconds([pid]) for pid in self._pids])
+        move(self._arm, WINDOW)
+        self._used += np.array([cpu_seconds([pid]) for pid in self._pids]) - before
+        self._loops.append(self._arm.query(answers.Loop))
+
+    def costs(self) -> Costs:
+        """Return the costs in all windows."""
+        seconds = WINDOW * len(self._loops)
+        used = (self._used / seconds).tolist()
+        memory = 0
+        if self._folder:
+            fields = Path(f"/proc/{self._pids[1]}/statm").read_text(encoding="ascii").split()
+            memory = 4096 * int(fields[1])
+        return Costs(
+            statistics.mean(loop.late_p50 for loop in self._loops),
+            statistics.mean(loop.late_p99 for loop in self._loops),
+            used[0],
+            used[1] if self._folder else 0.0,
+            memory,
+            (self._written() - self._size) / seconds,
+        )
+
+
+def pair(windows: int, move: Callable[[Client, float], None]) -> tuple[Costs, Costs]:
+    """Return the costs of a server without recording and of one with it.
+
+    They take turns: while the arm of one moves, that of the other is at rest, so that both see
+    the same machine.
     """
     # Otherwise alike: the planning of a server at rest would count as a cost of recording.
-    kind = ("--no-record",) if folder is None else ("--record", str(folder))
-    command = (*RECORDING_APP, "--no-idle-planning", *kind)
-    with AppServer(command) as server, connect(server.url, "Driver") as arm:
-        move(arm, WARM_UP)
-        pids = [server.arm] if folder is None else [server.arm, server.child("katana450 rec")]
-        before = [cpu_seconds([pid]) for pid in pids]
-        move(arm, seconds)
-        used = [(cpu_seconds([pid]) - t) / seconds for pid, t in zip(pids, before, strict=True)]
-        timing = arm.query(answers.Loop)
-        memory = 0
-        if folder is not None:
-            fields = Path(f"/proc/{pids[1]}/statm").read_text(encoding="ascii").split()
-            memory = 4096 * int(fields[1])
-    size = 0 if folder is None else sum(path.stat().st_size for path in folder.iterdir())
-    recorder = used[1] if len(used) > 1 else 0.0
-    return Costs(timing.late_p50, timing.late_p99, used[0], recorder, memory, size)
+    command = (*RECORDING_APP, "--no-idle-planning")
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "ring"
+        kinds: list[tuple[tuple[str, ...], Path | None]] = [
+            (("--no-record",), None),
+            (("--record", str(folder)), folder),
+        ]
+        both = []
+        for kind, recorded in kinds:
+            server = stack.enter_context(AppServer((*command, *kind)))
+            arm = stack.enter_context(connect(server.url, "Driver"))
+            move(arm, WARM_UP)
+            both.append(Measured(server, arm, recorded))
+        for i in range(windows):
+            for each in both if i % 2 == 0 else reversed(both):
+                each.window(move)
+        return both[0].costs(), both[1].costs()
+
+
+def interval(without: list[float], with_it: list[float]) -> tuple[float, float, float]:
+    """Return the ratio of two lists of pairs: geometric mean, 95 % confidence interval."""
+    ratios = np.log(with_it) - np.log(without)
+    rng = np.random.default_rng(1)
+    means = rng.choice(ratios, (10_000, len(ratios))).mean(axis=1)
+    low, high = np.quantile(means, (0.025, 0.975)).tolist()
+    return float(np.exp(ratios.mean())), float(np.exp(low)), float(np.exp(high))
 
 
 def swing(arm: Client, seconds: float) -> None:
@@ -110,30 +169,38 @@ def drag(arm: Client, seconds: float) -> None:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=5, help="servers of each kind (default: 5)")
-    parser.add_argument("--seconds", type=float, default=20.0, help="of each (default: 20)")
+    parser.add_argument("--rounds", type=int, default=5, help="pairs of servers (default: 5)")
+    parser.add_argument("--windows", type=int, default=2, help="windows of each (default: 2)")
     parser.add_argument("--drags", action="store_true", help="drag without a pause, do not swing")
     options = parser.parse_args()
-    move = drag if options.drags else swing
-    without, with_it = [], []
+    without: list[Costs] = []
+    with_it: list[Costs] = []
     for _ in range(options.rounds):
-        without.append(measured(None, options.seconds, move))
-        with tempfile.TemporaryDirectory() as folder:
-            with_it.append(measured(Path(folder) / "ring", options.seconds, move))
-        for name, each in (("without", without[-1]), ("with", with_it[-1])):
-            print(f"{name:8} p50 {1e3 * each.p50:.3f} ms  p99 {1e3 * each.p99:.3f} ms", flush=True)
+        for costs, each in zip(
+            pair(options.windows, drag if options.drags else swing),
+            (without, with_it),
+            strict=True,
+        ):
+            each.append(costs)
+        for name, costs in (("without", without[-1]), ("with", with_it[-1])):
+            print(
+                f"{name:8} p50 {1e3 * costs.p50:.3f} ms  p99 {1e3 * costs.p99:.3f} ms", flush=True
+            )
     for name in ("p50", "p99"):
-        a, b = (statistics.median(getattr(each, name) for each in x) for x in (without, with_it))
+        a, b = ([getattr(each, name) for each in x] for x in (without, with_it))
+        ratio, low, high = interval(a, b)
         print(
-            f"lateness, {name}: {1e3 * a:.3f} ms without, {1e3 * b:.3f} ms with, {b / a:.2f} times"
+            f"lateness, {name}: {1e3 * statistics.median(a):.3f} ms without, "
+            f"{1e3 * statistics.median(b):.3f} ms with; ratio in pairs {ratio:.2f}, "
+            f"95 % between {low:.2f} and {high:.2f}"
         )
     arm = [100.0 * statistics.median(each.arm for each in x) for x in (without, with_it)]
     print(f"the arm's process: {arm[0]:.1f} % of a core without, {arm[1]:.1f} % with")
     recorder = 100.0 * statistics.median(each.recorder for each in with_it)
     memory = statistics.median(each.memory for each in with_it) / MIB
-    rate = statistics.median(each.size for each in with_it) / (options.seconds + WARM_UP)
     print(f"the process that records: {recorder:.1f} % of a core, {memory:.0f} MB")
-    print(f"size: {3600 * rate / 1e6:.0f} MB an hour")
+    size = statistics.median(each.size for each in with_it)
+    print(f"size: {3600 * size / 1e6:.0f} MB an hour")
 
 
 if __name__ == "__main__":
