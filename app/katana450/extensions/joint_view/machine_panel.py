@@ -9,18 +9,17 @@ from html import escape
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.messages import signed
 from katana450.arm.control.state import State
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.joint_view.event_list import EventList
 from katana450.extensions.objects.handles import HANDLES
 from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
 from katana450.server.view.panel_folder import PanelFolder
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
+from katana450.server.view.scene_tab import LogProblem
 from katana450.server.view.view_updater import READOUT_INTERVAL
 
 GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Hold()}
@@ -76,12 +75,9 @@ class MachinePanel:
             self.handles = gui.add_checkbox(
                 HANDLES, initial_value=False, hint="Arrows that move objects on the table"
             )
-            with gui.add_folder("Why", expand_by_default=False):
-                self._why = EventList(gui, gestures)
+            self._problem = LogProblem(gui, gestures)
 
-    def follow(
-        self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool
-    ) -> None:
+    def follow(self, state: State, now: float, *, caught_up: bool) -> None:
         """Show ``state`` at time ``now`` [s]; see ``Panel.follow``."""
         for folder in self._folders:
             folder.follow()
@@ -94,7 +90,7 @@ class MachinePanel:
         text = page(self._joints, self._labels, state)
         if text != self._shown:
             self._shown = self._readout.content = text
-        self._why.follow(event_log)
+        self._problem.follow()
 
     def _slider(self, axis: int, state: State, listen: Listen) -> viser.GuiSliderHandle[float]:
         joints = self._joints

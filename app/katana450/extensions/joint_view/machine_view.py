@@ -91,7 +91,6 @@ class MachineView(ViewUpdater):
             self._panel.follow(
                 state,
                 time.perf_counter(),
-                self._state_publisher.event_log,
                 caught_up=snapshot.ticket == self._last_ticket(),
             )
         self._server.flush()

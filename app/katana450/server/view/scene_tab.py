@@ -24,16 +24,24 @@ class SceneTab:
         add_views(gui, shows)
         with gui.add_folder("Show"):
             add_shows(gui, shows)
-        self._gestures, self._problem = gestures, gui.add_html("", visible=False)
+        self._problem = LogProblem(gui, gestures)
 
     def follow(self) -> None:
         """Show a problem of the event log."""
-        content = problem_page(self._gestures.log_problem)
-        if content != self._problem.content:
-            self._problem.content, self._problem.visible = content, bool(content)
+        self._problem.follow()
 
 
-def problem_page(problem: str) -> str:
-    """Return the ``problem`` of the event log on disk as HTML; empty for none."""
-    text = f"<div class='k450'><p class='status fault'>{escape(problem)}</p></div>"
-    return text if problem else ""
+class LogProblem:
+    """Why events are not recorded on disk, hidden while they are."""
+
+    def __init__(self, gui: viser.GuiApi, gestures: GestureGate) -> None:
+        """Add it to the open tab of ``gui``."""
+        self._gestures, self._page = gestures, gui.add_html("", visible=False)
+
+    def follow(self) -> None:
+        """Show the present problem."""
+        problem = self._gestures.log_problem
+        text = f"<div class='k450'><p class='status fault'>{escape(problem)}</p></div>"
+        content = text if problem else ""
+        if content != self._page.content:
+            self._page.content, self._page.visible = content, bool(content)
