@@ -26,7 +26,7 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.robot.collision import initial_objects, world_of
+from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -34,6 +34,7 @@ from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.frontend import layers
+from katana450.extensions.kinematics.json_lines import initial_objects
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.view import View, ViewOptions

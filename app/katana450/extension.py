@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from starlette.routing import BaseRoute
 
-    from katana450.arm.control.grip_model import GripModel
     from katana450.arm.control.scene_objects import Environment, Hand
     from katana450.arm.control.session import Session
     from katana450.arm.drivers.driver import Driver
@@ -68,6 +67,7 @@ BUILT_IN = (
     "recording",
     "kinematics",
     "real_arm",
+    "hands",
     "touch",
     "leader",
     "rosbridge",
@@ -222,8 +222,9 @@ class Extension:
             Raises KatanaError.
         world: Returns the collision world of a robot, None without shapes, and sentences on what
             it leaves out. Of the first extension that has it.
-        grip_model: Returns the model of the forces in the hand of a robot with its collision world;
-            None if the pads of that hand are not known. Called for each session of an arm.
+        hand: Returns the hand of a robot with its collision world, completed by its sides, its
+            closed end, or a model of the forces in it. Called for each session of an arm, in the
+            order of the extensions.
         expand: Returns the URDF of a xacro file. Of the first extension that has it. Raises
             RobotDescriptionError.
         find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or
@@ -237,7 +238,7 @@ class Extension:
     name: str
     commands: tuple[CliCommand, ...] = ()
     serve: ServeExtension | None = None
-    grip_model: Callable[[CollisionWorld, Hand], GripModel | None] | None = None
+    hand: Callable[[CollisionWorld, Hand], Hand] | None = None
     prepare: Callable[[Namespace], None] | None = None
     world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
     expand: Callable[[Path], bytes] | None = None

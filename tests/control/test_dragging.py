@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm import NO_GRIPPER, ArmModel
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.branch_options import current_target
+from katana450.arm.control.gripper_model import NO_GRIPPER
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.arm.robot.loader import load

@@ -10,6 +10,7 @@ from katana450.extensions.programs.source import ScriptError
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import HANDS, gripping_urdf
 from tests.general_arms.published_arms import SKEWED_6
+from tests.general_arms.published_hands import HOOK, RADIAL, hand_urdf
 from tests.general_arms.test_grasping import item, planned
 
 PART = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
@@ -76,13 +77,6 @@ def without_bodies(text: str) -> str:
     return text
 
 
-def with_one_finger(text: str) -> str:
-    """Return the description with the right finger fixed to the palm."""
-    start = text.index('<joint name="finger_right"')
-    joint = text[start : text.index("</joint>", start)]
-    return text.replace(joint, joint.replace('"prismatic"', '"fixed"').split("<axis")[0])
-
-
 def test_four_axes_hold_a_cup_and_do_not_pour(tmp_path: Path) -> None:
     cup = item("cup", "cylinder", (32.0, 90.0), (230.0, 0.0))
     steps = ["fill: 100", "grasp: cup", "pour: cup"]
@@ -90,21 +84,18 @@ def test_four_axes_hold_a_cup_and_do_not_pour(tmp_path: Path) -> None:
         planned(tmp_path, gripping_urdf("four axes"), steps, cup)
 
 
-def with_three_fingers(text: str) -> str:
-    """Return the description with another finger, which moves as the right one does."""
-    start = text.index('<link name="right">')
-    finger = text[start : text.index("</joint>", text.index('<joint name="finger_right"')) + 8]
-    third = finger.replace('"right"', '"third"').replace("finger_right", "finger_third")
-    return text.replace("</robot>", third + "</robot>")
-
-
 UR5E = gripping_urdf("UR5e")
 HANDS_THAT_CANNOT = {
     "no gripper": (chain_urdf("arm", HANDS["UR5e"][0]), "has no gripper"),
     "no bodies": (without_bodies(UR5E), "contacts of the fingers cannot be computed"),
-    "one finger": (with_one_finger(UR5E), "has one finger with a body that moves, left"),
-    "three fingers": (with_three_fingers(UR5E), r"moves 3 links with bodies \(left, right, third"),
-    "other end": (gripping_urdf("UR5e", upside_down=True), "close towards the upper end"),
+    "three directions": (
+        hand_urdf("UR5e", RADIAL),
+        "moves digit_2 across the direction in which digit_1 and digit_3 close",
+    ),
+    "nothing opposite": (
+        hand_urdf("UR5e", HOOK),
+        "moves hook, which closes neither on another finger nor on a body of the palm",
+    ),
     "five axes": (
         chain_urdf("arm", HANDS["UR5e"][0]).replace("revolute", "fixed", 1),
         "5 axes outside the five-axis family cannot keep an object upright",

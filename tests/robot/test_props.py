@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.robot.collision import initial_objects, world_of
+from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, load_props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
+from katana450.extensions.kinematics.json_lines import initial_objects
 from katana450.resources import PROPS_PATH
 from katana450.settings import Settings
 

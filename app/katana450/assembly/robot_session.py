@@ -64,8 +64,7 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
     joints = robot.joint_group
     world, left_out = _world(robot)
     session = Session(joints, joints.ready, world, travel=robot.distance)
-    unchecked = (UNCHECKED,) if world is None else ()
-    notes = (*robot.notes, *robot.joint_notes, *left_out, *unchecked)
+    notes = (*robot.notes, *robot.joint_notes, *left_out)
     return DescribedRobot(robot, session, (*notes, f"Joints only. {robot.why}"))
 
 
@@ -75,32 +74,33 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         robot = bare(robot)
     arm = robot.require_arm()
     world, left_out = _world(robot)
-    notes = [*arm.notes, *robot.notes, *robot.joint_notes, *left_out]
+    notes = (*arm.notes, *robot.notes, *robot.joint_notes, *left_out)
     props = load_props()
     hand: Hand | None = None
     objects: tuple[SceneObject, ...] = ()
-    if world is None:
-        notes.append(UNCHECKED)
-    else:
+    if world is not None:
         hand, objects = hand_of(robot, world), scene_objects_of(props)
-        for each in extensions():
-            if each.grip_model is not None:
-                hand = replace(hand, grip_model=each.grip_model(world, hand))
+        for complete in (each.hand for each in extensions() if each.hand is not None):
+            hand = complete(world, hand)
+        if hand.gripper != arm.gripper:
+            robot = replace(robot, arm=replace(arm, gripper=hand.gripper))
         world = world.with_obstacles((table(),))
     session = Session(
-        arm,
+        robot.require_arm(),
         arm.ready(settings.ready),
         world,
         hand=hand,
         objects=objects,
         water_environment=water_environment(props) if objects else None,
     )
-    return DescribedRobot(robot, session, tuple(notes))
+    return DescribedRobot(robot, session, notes)
 
 
 def _world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
-    """Return the world that an extension makes; without one, only arms are checked."""
-    for each in extensions():
-        if each.world is not None:
-            return each.world(robot)
-    return (None, ()) if robot.arm is None else world_of(robot)
+    """Return the world that an extension makes, and notes; without one, only arms are checked."""
+    make = next((each.world for each in extensions() if each.world is not None), None)
+    if make is not None:
+        world, notes = make(robot)
+    else:
+        world, notes = (None, ()) if robot.arm is None else world_of(robot)
+    return world, notes if world is not None else (*notes, UNCHECKED)

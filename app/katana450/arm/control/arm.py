@@ -7,34 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from katana450.arm.control.five_axis_tool import FiveAxisTool
+from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.motion.limiter import Limits
-
-
-@dataclass(frozen=True)
-class GripperModel:
-    """The driven finger joint: limits [rad] and maximum speed [rad/s]; ``lower`` is closed.
-
-    The numbers of a sliding joint are in m and m/s. An arm without fingers has an empty range.
-    """
-
-    lower: float
-    upper: float
-    speed: float
-    slides: bool = False
-
-    @property
-    def moves(self) -> bool:
-        """True if the finger joint has a range."""
-        return self.lower < self.upper
-
-    def clamp(self, value: float) -> float:
-        """Return the value inside the limits that is nearest to ``value`` [rad or m]."""
-        return min(max(value, self.lower), self.upper)
-
 
 SPEED_RISE_TIME = 0.9
 """[s] Time until a joint reaches its maximum speed, as in the faster of the two settings of the
@@ -42,8 +20,6 @@ Katana's own controllers."""
 
 ACCELERATION_RISE_TIME = 0.1
 """[s] Time until a joint reaches its maximum acceleration."""
-
-NO_GRIPPER = GripperModel(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

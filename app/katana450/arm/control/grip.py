@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from katana450.arm.control.goals import without_finding
-from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
+from katana450.arm.control.scene_objects import Environment, Hand, SceneObject, placed
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.support import surface_below
 from katana450.maths.collision.world import CollisionWorld
-from katana450.maths.geometry.arrays import FloatArray
 
 TOUCH_DISTANCE = 3e-4
 """[m] Distance up to which a finger touches: the sensors in the pads yield by as much."""
@@ -29,39 +28,40 @@ def gripped(
     hand = environment.hand
     if world is None or hand is None or not (hand.fingers and state.objects):
         return state
-    x = state.x_setpoint
+    gripper = hand.gripper
     if (grip := state.grip) is not None:
-        opened = RELEASE_SLIDE if hand.slides else RELEASE_TURN
-        if state.gripper_setpoint > grip + opened:
+        free = gripper.wider(grip, RELEASE_SLIDE if gripper.slides else RELEASE_TURN)
+        if gripper.is_wider(state.gripper_setpoint, free):
             return _let_go(environment, state)
         if any(finding.reason is Reason.SLIDING for finding in state.findings):
             state = without_finding(state, Reason.SLIDING)
         # Fingers that open to let the object go need no force.
-        opening = state.gripper_goal > grip + opened
+        opening = gripper.is_wider(state.gripper_goal, free)
         load = None if opening or hand.grip_model is None else hand.grip_model.overload(state)
         if load is None or state.held is None or hand.grip_model is None:
             return state
         held, slid = state.held, hand.grip_model.slid(state, dt)
-        found = Finding(
-            Reason.SLIPPED if slid is None else Reason.SLIDING,
-            load,
-            parts=(held.name, hand.fingers[0]),
-        )
+        reason = Reason.SLIPPED if slid is None else Reason.SLIDING
+        found = Finding(reason, load, parts=(held.name, hand.fingers[0]))
         if slid is None:
             state = _let_go(environment, state)
         else:
             objects = tuple(slid if each is held else each for each in state.objects)
             state = replace(state, objects=objects)
         return replace(state, findings=(found, *state.findings))
-    if state.gripper_goal >= state.gripper_setpoint:
-        return (
-            without_finding(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
-        )
+    if not gripper.is_wider(state.gripper_setpoint, state.gripper_goal):
+        opening = gripper.is_wider(state.gripper_goal, state.gripper)
+        return without_finding(state, Reason.LOPSIDED) if opening else state
+    x = state.x_setpoint
     for scene_object in state.objects:
         if scene_object.can_be_held and not scene_object.fixed:
-            felt = _felt(hand.fingers, world, scene_object, x)
+            felt = {side[0]: world.gap(x, scene_object.name, *side) for side in hand.sides}
             if min(felt.values()) <= TOUCH_DISTANCE:
-                return _closed(environment, state, scene_object, felt, x)
+                if (jaw := hand.standing_jaw) is not None:
+                    name, felt[name], moved = jaw.met(world, state, scene_object)
+                    if moved is not None:
+                        return replace(state, objects=placed(state.objects, moved), blocked=False)
+                return _closed(environment, state, scene_object, felt)
     return state
 
 
@@ -72,41 +72,29 @@ def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
     if any(scene_object.held for scene_object in state.objects):
         return hand.fingers
     away = [finding.parts for finding in state.findings if finding.reason is Reason.LOPSIDED]
-    return tuple(each for parts in away if parts for each in hand.fingers if each not in parts)
+    near = [side for parts in away if parts for side in hand.sides if side[0] not in parts]
+    return tuple(each for side in near for each in side)
 
 
 def _let_go(environment: Environment, state: State) -> State:
     """Return ``state`` with an empty hand and the held object below it."""
-    objects = tuple(
-        _released(environment, state, each) if each.held else each for each in state.objects
-    )
+    x = state.x_setpoint
+
+    def released(held: SceneObject) -> SceneObject:
+        lifted = replace(held, T=environment.pose(held, x), held=False)
+        return environment.left(held, x, surface_below(state.objects, lifted))
+
+    objects = tuple(released(each) if each.held else each for each in state.objects)
     return replace(state, objects=objects, grip=None, squeeze=0.0)
 
 
-def _released(environment: Environment, state: State, held: SceneObject) -> SceneObject:
-    """Return the ``held`` object upright on the table or object below it."""
-    x = state.x_setpoint
-    lifted = replace(held, T=environment.pose(held, x), held=False)
-    return environment.left(held, x, surface_below(state.objects, lifted))
-
-
-def _felt(
-    fingers: tuple[str, ...], world: CollisionWorld, scene_object: SceneObject, x: FloatArray
-) -> dict[str, float]:
-    """Return the distance of each finger from ``scene_object`` [m]."""
-    return {finger: world.gap(x, finger, scene_object.name) for finger in fingers}
-
-
 def _closed(
-    environment: Environment,
-    state: State,
-    scene_object: SceneObject,
-    felt: dict[str, float],
-    x: FloatArray,
+    environment: Environment, state: State, scene_object: SceneObject, felt: dict[str, float]
 ) -> State:
     """Return ``state`` with the fingers closed on ``scene_object``.
 
-    The fingers stop, and they hold the object if both touch it.
+    The fingers stop, and they hold the object if both sides touch it. ``felt``: the distance of
+    each side from it [m].
     """
     state = without_finding(without_finding(state, Reason.CONTACT), Reason.LOPSIDED)
     stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
@@ -114,7 +102,6 @@ def _closed(
     if felt[far] > CENTRING_DISTANCE:
         lopsided = Finding(Reason.LOPSIDED, felt[far], parts=(far, scene_object.name))
         return replace(stopped, findings=(*stopped.findings, lopsided))
-    taken = environment.taken(scene_object, x)
-    objects = tuple(taken if each is scene_object else each for each in state.objects)
-    squeeze = state.gripper_setpoint - state.gripper_goal
+    objects = placed(state.objects, environment.taken(scene_object, state.x_setpoint))
+    squeeze = abs(state.gripper_setpoint - state.gripper_goal)
     return replace(stopped, objects=objects, grip=state.gripper_setpoint, squeeze=squeeze)

@@ -1,4 +1,4 @@
-"""The interface of a model of the forces in the hand. An extension provides the model."""
+"""The interfaces of models of the hand, which extensions provide."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from katana450.arm.control.scene_objects import SceneObject
     from katana450.arm.control.state import State
+    from katana450.maths.collision.world import CollisionWorld
 
 
 class GripModel(Protocol):
@@ -24,3 +25,15 @@ class GripModel(Protocol):
 
     def report(self, state: State) -> Mapping[str, Any]:
         """Return forces, pressures and sensor values of ``state`` for the answer to a query."""
+
+
+class StandingJaw(Protocol):
+    """A jaw that stands while the other one pushes objects against it. Its method is pure."""
+
+    def met(
+        self, world: CollisionWorld, state: State, item: SceneObject
+    ) -> tuple[str, float, SceneObject | None]:
+        """Return the name of the jaw, and its distance [m] from an object that the other touches.
+
+        The last value is the object moved towards the jaw; None if it is there or cannot be moved.
+        """

@@ -9,7 +9,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from katana450.arm.control.grip_model import GripModel
+from katana450.arm.control.grip_model import GripModel, StandingJaw
+from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.solid import PLAIN, ObjectAppearance, Solid
 from katana450.errors import InputError, digits_beyond
 from katana450.maths.collision.clearance import STOP
@@ -189,13 +190,8 @@ def _properties(scene_object: SceneObject) -> tuple[object, ...]:
     """Return all properties of the object except its pose."""
     key = None if scene_object.solid is None else scene_object.solid.key
     kind = (scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, key)
-    return (
-        *kind,
-        scene_object.can_be_held,
-        scene_object.held,
-        scene_object.fixed,
-        scene_object.appearance,
-    )
+    flags = scene_object.can_be_held, scene_object.held, scene_object.fixed
+    return (*kind, *flags, scene_object.appearance)
 
 
 def placed(objects: tuple[SceneObject, ...], scene_object: SceneObject) -> tuple[SceneObject, ...]:
@@ -236,14 +232,18 @@ class Hand:
             without fingers.
         fingers: names of the fingers among the parts.
         T_palm_tool: (4, 4) the frame of the default tool in the frame of the palm.
-        slides: whether the fingers slide instead of turning.
+        gripper: the finger joint.
+        sides: names of the fingers on each side of an object, those at the tips first.
+        standing_jaw: the body of the palm against which a single side closes; None for two.
         grip_model: the forces in the hand; None if they are not modelled, and objects never slip.
     """
 
     palm: int
     fingers: tuple[str, ...]
     T_palm_tool: FloatArray
-    slides: bool = False
+    gripper: GripperModel
+    sides: tuple[tuple[str, ...], ...]
+    standing_jaw: StandingJaw | None = None
     grip_model: GripModel | None = None
 
 

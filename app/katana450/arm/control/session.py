@@ -392,9 +392,9 @@ class Session:
         limits = self.require_arm().gripper
         wanted = limits.clamp(angle)
         # The fingers cannot close on what they hold: what is wanted beyond it squeezes the object.
-        goal = wanted if state.grip is None else max(wanted, state.grip)
+        goal = wanted if state.grip is None or limits.is_wider(wanted, state.grip) else state.grip
         reason = Reason.GRIPPER_SLIDE_LIMIT if limits.slides else Reason.GRIPPER_LIMIT
         others = without_finding(state, reason, Reason.SLIPPED).findings
         beyond = abs(wanted - angle) > tolerances.LIMIT_SLACK
         held = (Finding(reason, wanted),) if beyond else ()
-        return replace(state, gripper_goal=goal, squeeze=goal - wanted, findings=others + held)
+        return replace(state, gripper_goal=goal, squeeze=abs(goal - wanted), findings=others + held)

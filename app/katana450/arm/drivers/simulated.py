@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from katana450.arm.control.arm import GripperModel
 from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.errors import InputError

@@ -114,31 +114,21 @@ def scene_objects_of(props: Props) -> tuple[SceneObject, ...]:
     )
 
 
-def initial_objects(props: Props) -> tuple[Part, ...]:
-    """Return the table and ``scene_objects_of`` as fixed obstacles."""
-    objects = scene_objects_of(props)
-    return (
-        table(),
-        *(obstacle(each.name, each.T_collision_shape, each.collision_shape) for each in objects),
-    )
-
-
 def hand_of(robot: Robot, world: CollisionWorld) -> Hand:
     """Return the fingers and the group that carries them; without fingers, that of the last joint.
 
     Raises RobotDescriptionError if there is no arm.
     """
-    arm = robot.require_arm()
-    driven = {link.name for link in robot.links if link.joint and link.joint.name in arm.fingers}
-    fingers = [part for part in world.parts if part.name in driven]
-    if fingers:
-        palm = int(world.linkage.parent[fingers[0].mover])
-    else:
-        palm = int(np.flatnonzero(world.linkage.variable == arm.chain.n - 1)[-1])
+    arm, variable = robot.require_arm(), world.linkage.variable
+    fingers = [part for part in world.parts if variable[part.mover] == arm.chain.n]
+    palm = fingers[0].mover if fingers else int(np.flatnonzero(variable == arm.chain.n - 1)[-1])
+    while variable[palm] == arm.chain.n:
+        palm = int(world.linkage.parent[palm])
     T_base_palm = world.linkage.poses(np.zeros(arm.chain.n + 1))[palm]
     T_palm_tool = se3.inverse(T_base_palm) @ arm.T_base_shoulder @ arm.chain.M
     names = tuple(part.name for part in fingers)
-    return Hand(palm, names, frozen(T_palm_tool), slides=arm.gripper.slides)
+    sides = tuple((name,) for name in names)
+    return Hand(palm, names, frozen(T_palm_tool), arm.gripper, sides)
 
 
 def _drive(robot: Robot, joint: Joint) -> tuple[int, float, float] | None:

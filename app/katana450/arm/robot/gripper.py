@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.arm import NO_GRIPPER, GripperModel
+from katana450.arm.control.gripper_model import NO_GRIPPER, GripperModel
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
 from katana450.arm.robot.urdf import UrdfJoint
 from katana450.errors import RobotDescriptionError

@@ -14,12 +14,13 @@ import numpy as np
 from katana450.arm.control.branch_options import contact_at
 from katana450.arm.control.findings import of_projection
 from katana450.arm.control.messages import REASONS
-from katana450.arm.robot.collision import initial_objects, world_of
-from katana450.arm.robot.props import load_props
+from katana450.arm.robot.collision import scene_objects_of, table, world_of
+from katana450.arm.robot.props import Props, load_props
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import InputError
 from katana450.extensions.kinematics.numbers import numbers, shown
 from katana450.extensions.kinematics.pose_requests import KEYS, requested_pose
+from katana450.maths.collision.world import Part, obstacle
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch_metrics import BranchMetrics
@@ -205,3 +206,12 @@ def _request(line: str) -> Mapping[str, Any]:
 
 def _distance(a: FloatArray, b: FloatArray) -> float:
     return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
+
+
+def initial_objects(props: Props) -> tuple[Part, ...]:
+    """Return the table and ``scene_objects_of`` as fixed obstacles."""
+    objects = scene_objects_of(props)
+    return (
+        table(),
+        *(obstacle(each.name, each.T_collision_shape, each.collision_shape) for each in objects),
+    )

@@ -31,11 +31,13 @@ class Approach(NamedTuple):
         pitch: angle of the direction below the horizontal.
         roll: turn about it; at 0 the fingers close horizontally.
         aside: turn of the direction about the vertical, from straight away from axis 1.
+        shift: distance [m] of the object's middle from the grasp frame, along its y axis.
     """
 
     pitch: float
     roll: float = 0.0
     aside: float = 0.0
+    shift: float = 0.0
 
 
 def symmetry(held: SceneObject) -> float:

@@ -102,7 +102,7 @@ class FiveAxisHand:
 
     def before(self, middle: FloatArray, approach: Approach, back: float) -> ToolTarget:
         """Return the tool before ``middle``, on its own axis."""
-        pitch, roll, _ = approach
+        pitch, roll = approach.pitch, approach.roll
         out = np.array((middle[0], middle[1], 0.0)) / math.hypot(middle[0], middle[1])
         along = math.cos(pitch) * out - math.sin(pitch) * UP
         return ToolTarget(middle - back * along, pitch, roll)
@@ -111,6 +111,10 @@ class FiveAxisHand:
         """Return the tool at `q`, drawn back radially and along its pitch."""
         at = ToolTarget.at(self.chain, q)
         return self.before(at.position, Approach(at.pitch, at.roll), away)
+
+    def retreat(self, q: FloatArray, away: float) -> ToolTarget:
+        """Return ``drawn_back``."""
+        return self.drawn_back(q, away)
 
     def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
         """Return the nearest one if `reaching` finds a posture."""

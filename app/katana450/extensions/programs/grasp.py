@@ -128,7 +128,7 @@ class Grasp:
             builder.note(
                 f"tool {hand.tool}", UseTool(hand.tool), replace(builder.state, tool=hand.tool)
             )
-        opened = builder.plan_context.arm.gripper.upper
+        opened = builder.plan_context.arm.gripper.opened
         builder.note("open", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
         branch_of, ready = builder.plan_context.arm.kinematics.branch_of, builder.plan_context.ready
         # Pitches of a grasp are those of the posture at Home; an arm that reaches over its shoulder
@@ -244,7 +244,7 @@ class Grasp:
         # With more than six axes, the pose alone is given.
         if not hand.is_redundant and float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
             raise InputError("the straight path to it ends in another posture than planned.")
-        closed, held = builder.plan_context.arm.gripper.lower, self._closed(builder, builder.q)
+        closed, held = builder.plan_context.arm.gripper.closed, self._closed(builder, builder.q)
         holding = "" if self._checked_later(builder.ahead) else self.name
         builder.note(f"grasp {self.name}: close", MoveFingers(closed, holding), held)
         chosen = approach if self.pitch is None else None
@@ -257,7 +257,7 @@ class Grasp:
         """
         now = builder.state
         builder.state = builder.standing(q)
-        held = builder.after(cmd.SetGripper(builder.plan_context.arm.gripper.lower))
+        held = builder.after(cmd.SetGripper(builder.plan_context.arm.gripper.closed))
         builder.state = now
         if held.grip is None:
             raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")

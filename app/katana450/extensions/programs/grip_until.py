@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -68,12 +69,13 @@ def _angle_for(force: float, model: TouchModel, state: State, closed: float) -> 
     squeeze = model.squeeze_for(state, force)
     assert state.grip is not None
     assert state.held is not None
-    if state.grip - squeeze < closed:
+    angle = state.grip - math.copysign(squeeze, state.grip - closed)
+    if (angle - closed) * (state.grip - closed) < 0.0:
         raise InputError(
             f"{state.held.name} is too thin: the fingers reach the end of their range before they "
             f"press with {force:g} N."
         )
-    return state.grip - squeeze
+    return angle
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,9 @@ class GripUntil:
         if not isinstance(model, TouchModel):
             raise InputError("The pads of this gripper are not known, so its force is not either.")
         before = builder.state
-        closed = before if before.grip is not None else builder.after(cmd.SetGripper(fingers.lower))
+        closed = (
+            before if before.grip is not None else builder.after(cmd.SetGripper(fingers.closed))
+        )
         if closed.held is None or closed.grip is None:
             raise InputError(
                 "The fingers would close without an object between them. Move the open gripper "
@@ -120,9 +124,9 @@ class GripUntil:
                 f"The fingers would hold {closed.held.name} instead of {self.holding}, which has "
                 "to stand where they close."
             )
-        angle = _angle_for(self.force, model, closed, fingers.lower)
+        angle = _angle_for(self.force, model, closed, fingers.closed)
         action = CloseUntil(
-            angle, closed.held.name, force=self.force, model=model, closed=fingers.lower
+            angle, closed.held.name, force=self.force, model=model, closed=fingers.closed
         )
         builder.state = closed
         builder.note(f"grip until {self.force:g} N", action, builder.after(cmd.SetGripper(angle)))

@@ -7,6 +7,7 @@ from typing import Final
 from katana450.arm.control.session import Session
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
+from katana450.extensions.programs.family_hand import FamilyHand
 from katana450.extensions.programs.five_axis_hand import FiveAxisHand
 from katana450.extensions.programs.grasp_frame import grasp_frame
 from katana450.extensions.programs.hand_planning import HandPlanning
@@ -30,22 +31,23 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, tool: str) -> HandPla
     """
     arm, environment = session.require_arm(), session.environment
     kinematics = arm.kinematics_to(tool)
-    if not isinstance(kinematics, DrivenTool):
+    in_family = not isinstance(kinematics, DrivenTool)
+    if in_family and FiveAxisHand.tool in arm.tools:
         return FiveAxisHand(kinematics.chain, T_base_shoulder)
     axes = arm.chain.n
-    if axes < FREE_AXES and axes != PLANAR_AXES:
+    if not in_family and axes < FREE_AXES and axes != PLANAR_AXES:
         raise InputError(
             f"An arm with {axes} axes outside the five-axis family cannot keep an object upright. "
             "Objects are grasped by arms with four axes, with six or more, and by the five-axis "
             "family."
         )
     hand = environment.hand
-    frame = grasp_frame(environment.world(()), hand, arm.gripper, axes)
+    frame = grasp_frame(environment.world(()), hand, arm.gripper)
     assert hand is not None
     T_palm_tool = hand.T_palm_tool @ se3.inverse(arm.tools[arm.default_tool]) @ arm.tools[tool]
     T_tool_grasp = frozen(se3.inverse(T_palm_tool) @ frame.T_palm_grasp)
+    if not isinstance(kinematics, DrivenTool):
+        return FamilyHand.of(kinematics.chain, T_base_shoulder, T_tool_grasp, frame)
     if axes == PLANAR_AXES:
-        return PlanarHand.of(
-            kinematics, T_base_shoulder, T_tool_grasp, frame.opening, session.ready
-        )
-    return PoseHand(kinematics, T_base_shoulder, T_tool_grasp, frame.opening)
+        return PlanarHand.of(kinematics, T_base_shoulder, T_tool_grasp, frame, session.ready)
+    return PoseHand(kinematics, T_base_shoulder, T_tool_grasp, frame.opening, one_jaw=frame.one_jaw)

@@ -1,7 +1,8 @@
 """The interface between the steps that grasp and place, and the hand of an arm.
 
 A step is written once, in terms of this interface. `FiveAxisHand` gives it pitch and roll of the
-five-axis family, `PoseHand` and `PlanarHand` poses of the grasp frame of any other hand.
+five-axis family, `FamilyHand` the same for the grasp frame of its fingers, `PoseHand` and
+`PlanarHand` poses of the grasp frame of any other hand.
 """
 
 from __future__ import annotations
@@ -57,6 +58,9 @@ class HandPlanning(Protocol):
 
     def drawn_back(self, q: FloatArray, away: float) -> DragTarget:
         """Return the tool at `q`, drawn back by ``away`` [m] along its own axis."""
+
+    def retreat(self, q: FloatArray, away: float) -> DragTarget:
+        """Return ``drawn_back``, with a jaw that stands beside the object that was released."""
 
     def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
         """Return the branches on which a grasp at ``target`` is tried, that of `q` first.

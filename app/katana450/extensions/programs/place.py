@@ -170,11 +170,11 @@ def held_object(builder: PlanBuilder, step: str) -> SceneObject:
 def let_go(builder: PlanBuilder) -> None:
     """Append the opening of the fingers and the retreat. Raises InputError without room."""
     at, q, hand = builder.target, builder.q, builder.hand
-    opened = builder.plan_context.arm.gripper.upper
+    opened = builder.plan_context.arm.gripper.opened
     builder.note("let go", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
 
     def draw_back(away: float) -> None:
-        end = hand.drawn_back(q, away)
+        end = hand.retreat(q, away)
         builder.lead([builder.planning.line(at, end)], "draw back")
 
     try:

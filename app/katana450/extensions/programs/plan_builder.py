@@ -335,7 +335,7 @@ class PlanBuilder:
         """Continue as if the last grasp had missed: the fingers are closed, the object stands."""
         if self.taken is None:
             return
-        before, closed = self.taken.before, self.plan_context.arm.gripper.lower
+        before, closed = self.taken.before, self.plan_context.arm.gripper.closed
         objects = tuple(before if each.name == before.name else each for each in self.state.objects)
         missed = replace(
             self.state, objects=objects, grip=None, squeeze=0.0,

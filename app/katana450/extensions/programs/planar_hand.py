@@ -14,6 +14,7 @@ from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP, YAW_TOLERANCE, Approach, symmetry
+from katana450.extensions.programs.grasp_frame import GraspFrame
 from katana450.extensions.programs.pose_hand import PoseHand
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -56,7 +57,7 @@ class PlanarHand(PoseHand):
         kinematics: DrivenTool,
         T_base_shoulder: FloatArray,
         T_tool_grasp: FloatArray,
-        opening: float,
+        frame: GraspFrame,
         ready: FloatArray,
     ) -> PlanarHand:
         """Return the hand of an arm whose tool is in front of axis 1 at ``ready`` (4,) [rad].
@@ -82,7 +83,8 @@ class PlanarHand(PoseHand):
             kinematics,
             T_base_shoulder,
             T_tool_grasp,
-            opening,
+            frame.opening,
+            frame.one_jaw,
             outward=frozen(outward),
             across=frozen(across),
             roll=math.atan2(y[2], y[1]),
@@ -115,9 +117,11 @@ class PlanarHand(PoseHand):
 
     def before(self, middle: FloatArray, approach: Approach, back: float) -> DragTarget:
         """Return the tool with the grasp frame before ``middle``, in the plane through it."""
-        turn = self._turn(middle, self.beside[1])
-        R = so3.rotation_z(turn) @ _plane(self.outward, approach.pitch) @ so3.rotation_x(self.roll)
-        T = se3.from_rotation_translation(R, middle - back * R[:, 0])
+        R = _plane(self.outward, approach.pitch) @ so3.rotation_x(self.roll)
+        beside = self.beside[1] + approach.shift * float(R[:, 1] @ self.across)
+        turn = self._turn(middle, beside)
+        R = so3.rotation_z(turn) @ R
+        T = se3.from_rotation_translation(R, middle - back * R[:, 0] - approach.shift * R[:, 1])
         T = T @ se3.inverse(self.T_tool_grasp)
         return ToolPose(frozen(T[:3, 3]), frozen(so3.rotation_z(-turn) @ T[:3, :3]))
 

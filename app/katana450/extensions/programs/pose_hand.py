@@ -9,9 +9,7 @@ from typing import ClassVar, Final, cast
 
 import numpy as np
 
-from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.errors import InputError
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import (
@@ -22,28 +20,19 @@ from katana450.extensions.programs.approach import (
     Approach,
     symmetry,
 )
+from katana450.extensions.programs.fitting import JAW_ROOM, fitting, widths
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.kinematics.turns import wrapped
-from katana450.maths.planning.plan import MARGIN
 
 PITCHES: Final = tuple(np.radians((45.0, 25.0, 65.0)).tolist())
 """[rad] Pitches of the hand for a grasp from the front, tried in this order."""
 
 TIP_DISTANCES: Final = tuple(np.arange(0.0, 0.056, 0.002).tolist())
 """[m] Distances of the hand before the middle of a low object, tried from the smallest."""
-
-MAX_ASIDE: Final = math.radians(100.0)
-"""[rad] Maximum angle between the hand and the direction away from axis 1, seen from above."""
-
-ASIDE: Final = tuple(np.radians((0.0, 40.0, -40.0)).tolist())
-"""[rad] Those of an object that is round, tried in this order."""
-
-ROUND_ROLLS: Final = tuple(np.radians((0.0, 60.0, -60.0)).tolist())
-"""[rad] Turns of the hand over an object that is round, tried in this order."""
 
 SWINGS: Final = tuple(np.radians((-30.0, 30.0, -60.0, 60.0)).tolist())
 """[rad] Turns of the swivel of seven axes with which a pose is tried."""
@@ -64,12 +53,14 @@ class PoseHand:
         T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
         T_tool_grasp: (4, 4) pose of the grasp frame in that of the tool [m].
         opening: distance between the open fingers [m].
+        one_jaw: whether one jaw closes against another that stands.
     """
 
     kinematics: DrivenTool
     T_base_shoulder: FloatArray
     T_tool_grasp: FloatArray
     opening: float
+    one_jaw: bool = False
 
     tool: ClassVar[str] = ""
     tip_distances: ClassVar[Sequence[float]] = TIP_DISTANCES
@@ -90,7 +81,7 @@ class PoseHand:
     ) -> Sequence[Approach]:
         """Return the approaches with ``pitch``."""
         found = self._fitting((pitch,), scene_object, at, side)
-        return found[ABOVE if abs(pitch - DOWN) <= YAW_TOLERANCE else FRONT]
+        return found.get(ABOVE if abs(pitch - DOWN) <= YAW_TOLERANCE else FRONT, ())
 
     def _fitting(
         self,
@@ -100,20 +91,8 @@ class PoseHand:
         side: FloatArray,
     ) -> Mapping[str, Sequence[Approach]]:
         """Return all approaches between whose fingers the object fits, or raise InputError."""
-        most = self.opening - 2.0 * MARGIN
         options = self._options(pitches, scene_object, at, side)
-        found = {
-            name: tuple(approach for approach, width in each if width <= most)
-            for name, each in options.items()
-        }
-        if not any(found.values()):
-            width = min((width for each in options.values() for _, width in each), default=0.0)
-            raise InputError(
-                f"it is {1e3 * width:.0f} mm wide, which is too wide: the open fingers are "
-                f"{1e3 * self.opening:.0f} mm apart and need {1e3 * MARGIN:.0f} mm of room on "
-                f"either side, so an object may have {1e3 * most:.0f} mm."
-            )
-        return found
+        return fitting(options, self.opening, one_jaw=self.one_jaw)
 
     def _options(
         self,
@@ -123,34 +102,13 @@ class PoseHand:
         side: FloatArray,
     ) -> dict[str, list[tuple[Approach, float]]]:
         """Return approaches by side, each with the width [m] of the object between the fingers."""
-        if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
-            width = 2.0 * scene_object.extent[0]
-            front = [(Approach(p, 0.0, aside), width) for aside in ASIDE for p in pitches]
-            above = [(Approach(DOWN, roll), width) for roll in ROUND_ROLLS]
-            return {FRONT: front} if scene_object.name == CUP else {FRONT: front, ABOVE: above}
-        widths = scene_object.extent[1], scene_object.extent[0]
-        skew = math.atan2(at[1], at[0]) - math.atan2(side[1], side[0])
-        rolls = [(wrapped(skew + k * DOWN), widths[k % 2]) for k in range(4)]
-        asides = [(wrapped(k * DOWN - skew), widths[k % 2]) for k in range(4)]
-        near = sorted(asides, key=lambda each: abs(each[0]))
-        return {
-            ABOVE: [
-                (Approach(DOWN, roll), width)
-                for roll, width in sorted(rolls, key=lambda each: abs(each[0]))
-            ],
-            FRONT: [
-                (Approach(p, 0.0, aside), width)
-                for aside, width in near
-                if abs(aside) <= MAX_ASIDE
-                for p in pitches
-            ],
-        }
+        return widths(pitches, scene_object, at, side)
 
     def before(self, middle: FloatArray, approach: Approach, back: float) -> DragTarget:
         """Return the tool with the grasp frame before ``middle``, on its own x axis."""
         yaw = math.atan2(middle[1], middle[0]) + approach.aside
         R = so3.from_rpy(approach.roll, approach.pitch, yaw)
-        return self._tool(R, middle - back * R[:, 0])
+        return self._tool(R, middle - back * R[:, 0] - approach.shift * R[:, 1])
 
     def _tool(self, R: FloatArray, p: FloatArray) -> ToolPose:
         """Return the tool that brings the grasp frame to rotation `R` (3, 3) and point `p` (3,)."""
@@ -162,6 +120,12 @@ class PoseHand:
         at = self.kinematics.target_at(q)
         x = forward(self.kinematics.chain, q)[:3, :3] @ self.T_tool_grasp[:3, 0]
         return at.moved(frozen(at.position - away * x))
+
+    def retreat(self, q: FloatArray, away: float) -> DragTarget:
+        """Return ``drawn_back``, with a jaw that stands beside the object."""
+        back, R = self.drawn_back(q, away), forward(self.kinematics.chain, q)[:3, :3]
+        aside = JAW_ROOM * R @ self.T_tool_grasp[:3, 1]
+        return back.moved(frozen(back.position - aside)) if self.one_jaw else back
 
     def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
         """Return those with a posture inside the limits that takes the pose."""

@@ -57,7 +57,7 @@ class Gripper:
         fingers = builder.plan_context.arm.gripper
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
-        ends = {"open": fingers.upper, "closed": fingers.lower}
+        ends = {"open": fingers.opened, "closed": fingers.closed}
         unit, scale = ("mm", 1e-3) if fingers.slides else ("deg", math.radians(1.0))
         angle = ends[self.where] if isinstance(self.where, str) else scale * self.where
         if abs(fingers.clamp(angle) - angle) > tolerances.LIMIT_SLACK:

@@ -43,8 +43,8 @@ class GripperGoal(Goal):
             raise InputError("This arm has no fingers that move.")
         if not gripper.lower <= given.position <= gripper.upper:
             raise InputError(
-                f"The position {given.position:g} is not between {gripper.lower:g} (closed) and "
-                f"{gripper.upper:g} (open)."
+                f"The position {given.position:g} is not between {gripper.closed:g} (closed) and "
+                f"{gripper.opened:g} (open)."
             )
         if given.max_effort:
             raise InputError("The effort of the fingers cannot be limited. Set max_effort to 0.")
@@ -66,7 +66,8 @@ class GripperGoal(Goal):
         if ticket is not None and arm.snapshot.ticket < ticket:
             return None
         # At an object the goal lies inside it, by the squeeze.
-        if abs(state.gripper_goal - state.squeeze - self._command.position) > REACHED:
+        goal = arm.arm.gripper.wider(state.gripper_goal, -state.squeeze)
+        if abs(goal - self._command.position) > REACHED:
             return Result(GoalStatus.CANCELED, self._now())
         if abs(state.gripper - self._command.position) <= REACHED:
             return Result(GoalStatus.SUCCEEDED, self._now(reached=True))

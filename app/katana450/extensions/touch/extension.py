@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING
 from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
-    from katana450.arm.control.grip_model import GripModel
     from katana450.arm.control.scene_objects import Hand
     from katana450.maths.collision.world import CollisionWorld
     from katana450.server.view.panel_folder import FolderContext, PanelFolder
 
 
-def _grip_model(world: CollisionWorld, hand: Hand) -> GripModel | None:
+def _hand(world: CollisionWorld, hand: Hand) -> Hand:
+    from dataclasses import replace
+
     from katana450.arm.robot.props import load_props
     from katana450.extensions.touch.touch_model import touch_model
 
-    return touch_model(world, hand, {"cup": load_props().cup.mass})
+    model = touch_model(world, hand, {"cup": load_props().cup.mass})
+    return replace(hand, grip_model=model)
 
 
 def _folder(context: FolderContext) -> PanelFolder:
@@ -26,4 +28,4 @@ def _folder(context: FolderContext) -> PanelFolder:
     return PadPatches(context)
 
 
-EXTENSION = Extension("touch", serve=ServeExtension(folder=_folder), grip_model=_grip_model)
+EXTENSION = Extension("touch", serve=ServeExtension(folder=_folder), hand=_hand)

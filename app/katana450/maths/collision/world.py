@@ -193,18 +193,18 @@ class CollisionWorld:
                 best, found = distance, pair
         return placed.contact(found)
 
-    def gap(self, x: FloatArray, one: str, other: str) -> float:
-        """Return the distance [m] of two parts that may meet, at ``x`` (k,).
+    def gap(self, x: FloatArray, one: str, *others: str) -> float:
+        """Return the distance [m] of a part from the nearest of others that it may meet, at ``x``.
 
-        The distance of other parts is infinite.
+        x: (k,). The distance of parts that cannot meet is infinite.
         """
         names = [self.parts[number].name for number in self.part_of.tolist()]
-        placed, wanted = self.at(x), {one, other}
+        placed, wanted = self.at(x), {frozenset((one, other)) for other in others}
         pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
         gaps = [
             placed.distance(pair)
             for pair, (a, b) in enumerate(pairs)
-            if {names[a], names[b]} == wanted
+            if {names[a], names[b]} in wanted
         ]
         return min(gaps, default=np.inf)
 

@@ -228,7 +228,7 @@ def arm(robot: Robot, ready: list[float]) -> answers.Arm:
         tools={name: M.tolist() for name, M in found.tools.items()},
         default_tool=found.default_tool,
         freedoms=found.kinematics.freedoms,
-        gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
+        gripper=(gripper.closed, gripper.opened, gripper.speed) if gripper.moves else None,
         gripper_slides=gripper.slides,
         T_base_shoulder=found.T_base_shoulder.tolist(),
     )

@@ -125,12 +125,12 @@ class Panel:
             max=100.0,
             step=0.5,
             initial_value=self._opening(state.gripper_goal),
-            hint=f"Percent open: 0 is closed ({named(fingers.lower)} at each finger), "
-            f"100 is open ({named(fingers.upper)})",
+            hint=f"Percent open: 0 is closed ({named(fingers.closed)} at each finger), "
+            f"100 is open ({named(fingers.opened)})",
         )
         slider.precision = 1
         self._on_person(slider, lambda: cmd.SetGripper(self._finger_angle(slider.value)))
-        ends_of = {"Open": fingers.upper, "Close": fingers.lower}
+        ends_of = {"Open": fingers.opened, "Close": fingers.closed}
         buttons = self._gui.add_button_group(
             "Fingers", tuple(ends_of), hint="Opens or closes the gripper as far as it goes"
         )
@@ -139,8 +139,8 @@ class Panel:
 
     def _opening(self, angle: float) -> float:
         fingers = self._arm.gripper
-        return 100.0 * (angle - fingers.lower) / (fingers.upper - fingers.lower)
+        return 100.0 * (angle - fingers.closed) / (fingers.opened - fingers.closed)
 
     def _finger_angle(self, opening: float) -> float:
         fingers = self._arm.gripper
-        return fingers.lower + opening / 100.0 * (fingers.upper - fingers.lower)
+        return fingers.closed + opening / 100.0 * (fingers.opened - fingers.closed)

@@ -6,9 +6,11 @@ import xml.etree.ElementTree as ET
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import arm_session
 from katana450.extensions.export.excluded_pairs import excluded_pairs
 from katana450.extensions.export.home import home_of
 from katana450.extensions.export.ros2.groups import ARM, GRIPPER, groups_of
+from katana450.settings import Settings
 
 
 def srdf_text(robot: Robot) -> str:
@@ -41,8 +43,9 @@ def srdf_text(robot: Robot) -> str:
 
 def _add_gripper(root: ET.Element, robot: Robot, arm: MountedArm) -> None:
     """Add the end effector, and the states in which it is open and closed."""
+    gripper = arm_session(Settings(), robot).robot.require_arm().gripper
     fingers = next(group for group in groups_of(robot) if group.name == GRIPPER)
-    for state, end in (("closed", arm.gripper.lower), ("open", arm.gripper.upper)):
+    for state, end in (("closed", gripper.closed), ("open", gripper.opened)):
         element = ET.SubElement(root, "group_state", name=state, group=GRIPPER)
         for joint in fingers.joints:
             factor, offset = arm.fingers[joint]

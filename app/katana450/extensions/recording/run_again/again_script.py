@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from katana450.arm.control.arm import GripperModel
+from katana450.arm.control.gripper_model import GripperModel
 from katana450.errors import InputError
 from katana450.extensions.programs.blocks import MAX_STEPS
 from katana450.extensions.programs.script import MAX_NAME_LENGTH

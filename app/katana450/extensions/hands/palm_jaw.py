@@ -1,0 +1,84 @@
+"""The jaw of a hand that stands, while the other one pushes objects against it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from katana450.arm.control.grip import TOUCH_DISTANCE
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import State
+from katana450.maths.collision.engine import engine
+from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.geometry.arrays import FloatArray, frozen
+
+MAX_PUSH: Final = 0.05
+"""[m] Maximum distance of the jaw from an object that is pushed against it."""
+
+FACING: Final = np.cos(np.radians(45.0))
+"""[1] Cosine of the angle up to which a contact lies on the face of the jaw."""
+
+LEVEL: Final = np.sin(np.radians(6.0))
+"""[1] Sine of the slope of the closing direction up to which an object slides on its support."""
+
+
+@dataclass(frozen=True, eq=False)
+class PalmJaw:
+    """A body of the palm, as `StandingJaw`.
+
+    Attributes:
+        name: of the part.
+        palm: index of the group of the palm in the linkage.
+        y: (3,) unit vector in the frame of the palm, from this jaw to the one that moves.
+    """
+
+    name: str
+    palm: int
+    y: FloatArray
+
+    def met(
+        self, world: CollisionWorld, state: State, item: SceneObject
+    ) -> tuple[str, float, SceneObject | None]:
+        """Return name and distance [m] of the jaw, and the object pushed towards it.
+
+        None in place of the object if it is there, or not before the face of the jaw, or would
+        slide uphill or into another object.
+        """
+        y = np.asarray(world.linkage.poses(state.x_setpoint)[self.palm, :3, :3] @ self.y)
+        distance = self._distance(world, state.x_setpoint, item.name, y)
+        if not TOUCH_DISTANCE < distance < MAX_PUSH or abs(float(y[2])) > LEVEL:
+            return self.name, distance, None
+        T = item.T.copy()
+        T[:2, 3] -= min(distance, TOUCH_DISTANCE) * y[:2]
+        pushed = replace(item, T=frozen(T))
+        others = [each for each in state.objects if each is not item and not each.carried]
+        met = any(_overlap(pushed, each) for each in others)
+        return self.name, distance, None if met else pushed
+
+    def _distance(self, world: CollisionWorld, x: FloatArray, name: str, y: FloatArray) -> float:
+        """Return the distance [m] of an object from the face of the jaw; infinite beside it.
+
+        y: (3,) as ``y`` of this jaw, in the base frame.
+        """
+        number, placed = [part.name for part in world.parts].index(name), world.at(x)
+        found = np.inf
+        for pair in placed.nearer_than(MAX_PUSH)[0].tolist():
+            one, other = (int(world.part_of[each[pair]]) for each in (world.first, world.second))
+            if other == number and world.parts[one].mover == self.palm:
+                contact = placed.contact(pair)
+                if float(contact.normal @ y) >= FACING:
+                    found = min(found, contact.distance)
+        return found
+
+
+def _overlap(one: SceneObject, other: SceneObject) -> bool:
+    """Return whether two standing objects overlap."""
+    measure = engine()
+    placed = (
+        (each.collision_shape.geometry, measure.transform(each.T_collision_shape))
+        for each in (one, other)
+    )
+    (first, T_first), (second, T_second) = placed
+    return measure.distance(first, T_first, second, T_second) < 0.0

@@ -1,0 +1,271 @@
+"""The two sides of a hand, and the end of the range of its joint at which they are closed.
+
+Links that one joint moves rigidly together form a group. The two groups that move most against each
+other are the fingertips. Every other group belongs to the side with which it moves and on which it
+stands, such as the bars of a linkage; one that does neither, or hardly moves, belongs to the palm.
+If all groups move the same way, they are one jaw, and a body of the palm stands on the other side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from katana450.arm.control.gripper_model import GripperModel
+from katana450.arm.control.scene_objects import Hand
+from katana450.errors import InputError
+from katana450.extensions.hands.palm_jaw import PalmJaw
+from katana450.extensions.hands.placed_bodies import PlacedBodies
+from katana450.maths.collision.world import CollisionWorld, Part
+from katana450.maths.geometry.arrays import FloatArray
+
+MIN_STROKE: Final = 2e-3
+"""[m] Minimum change of the distance of two fingers that can grasp."""
+
+MIN_MOTION: Final = 1e-3
+"""[m] Motion of its middle below which a group belongs to the palm."""
+
+ASTRAY: Final = 0.5
+"""[1] Cosine of the angle up to which a group moves with the fingertip of its side."""
+
+SNAP: Final = np.cos(np.radians(30.0))
+"""[1] Cosine of the angle up to which an axis of the tool or the palm stands for a direction."""
+
+ALONG: Final = np.cos(np.radians(5.0))
+"""[1] The same for the direction in which two fingers close."""
+
+MAX_FACE_GAP: Final = 0.02
+"""[m] Maximum distance of the tip of a closed jaw from what it closes against."""
+
+NEARLY_CLOSED: Final = (0.02, 0.05, 0.1, 0.2, 0.3)
+"""[1] Fractions of the range at which the direction from a jaw to the palm is measured."""
+
+FACING: Final = 2e-3
+"""[m] Distance of the tip from the palm from which on that direction is certain."""
+
+Groups = Mapping[int, Sequence[Part]]
+"""The parts of the fingers, by the groups of the linkage."""
+
+Motions = Mapping[int, FloatArray]
+"""The motion (3,) [m] of the middle of each group from the lower to the upper end of the range."""
+
+
+class JawPlaces(NamedTuple):
+    """Places of one jaw and of what it closes against, in the frame of the palm [m].
+
+    Attributes:
+        name: of the part that stands.
+        face: where it stands, along y of `Sides`.
+        closed, opened: (3,) tip of the jaw at both ends of its range.
+    """
+
+    name: str
+    face: float
+    closed: FloatArray
+    opened: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """The two sides of a hand. Fingers close along y, and the second side is at larger y.
+
+    Attributes:
+        parts: the parts of the fingers on either side, those at the tips first. The first is empty
+            if a body of the palm stands there.
+        tips: the parts of these that move rigidly with the fingertip.
+        y: (3,) unit vector in the frame of the palm.
+        gripper: that of the hand, with its closed end.
+        jaw: the places of one jaw; None if both sides move.
+    """
+
+    parts: tuple[tuple[Part, ...], tuple[Part, ...]]
+    tips: tuple[tuple[Part, ...], tuple[Part, ...]]
+    y: FloatArray
+    gripper: GripperModel
+    jaw: JawPlaces | None = None
+
+
+def with_sides(world: CollisionWorld, hand: Hand) -> Hand:
+    """Return ``hand`` with its sides and its closed end; unchanged if they are not understood."""
+    if not hand.fingers:
+        return hand
+    try:
+        sides = sides_of(world, hand)
+    except InputError:
+        return hand
+    jaw = sides.jaw
+    return replace(
+        hand,
+        gripper=sides.gripper,
+        sides=tuple(tuple(part.name for part in each) for each in sides.parts if each),
+        standing_jaw=None if jaw is None else PalmJaw(jaw.name, hand.palm, sides.y),
+    )
+
+
+def sides_of(world: CollisionWorld, hand: Hand) -> Sides:
+    """Return the sides of ``hand``, which has fingers.
+
+    Raises InputError, with the names of the links, for a hand that does not close on an object.
+    """
+    groups: dict[int, list[Part]] = {}
+    for part in world.parts:
+        if part.name in hand.fingers:
+            groups.setdefault(part.mover, []).append(part)
+    ends = hand.gripper.lower, hand.gripper.upper
+    moved: dict[int, FloatArray] = {}
+    for mover, parts in groups.items():
+        low, high = (PlacedBodies(world, parts, hand.palm, end).middle for end in ends)
+        if float(np.linalg.norm(high - low)) >= MIN_MOTION:
+            moved[mover] = high - low
+    against = {
+        (a, b): float(np.linalg.norm(moved[b] - moved[a]))
+        for a, b in combinations(moved, 2)
+        if float(moved[a] @ moved[b]) < 0.0
+    }
+    tips = max(against, key=against.__getitem__, default=None)
+    if tips is not None and against[tips] >= MIN_STROKE:
+        return _of_two_fingers(world, hand, groups, moved, tips)
+    return _of_one_jaw(world, hand, groups, moved)
+
+
+def _of_two_fingers(
+    world: CollisionWorld, hand: Hand, groups: Groups, moved: Motions, tips: tuple[int, int]
+) -> Sides:
+    """Return the sides of fingers whose tips are those of the groups ``tips``."""
+    one, other = (groups[mover] for mover in tips)
+    stroke = moved[tips[1]] - moved[tips[0]]
+
+    def middle(parts: Sequence[Part], value: float) -> FloatArray:
+        return PlacedBodies(world, parts, hand.palm, value).middle
+
+    def apart(value: float) -> float:
+        return abs(float((middle(other, value) - middle(one, value)) @ stroke))
+
+    gripper = _closed_where(hand.gripper, apart)
+    sign = 1.0 if gripper.opened > gripper.closed else -1.0
+    y = snapped(sign * stroke, frames_of(hand), float(ALONG), None)
+    between = 0.5 * float((middle(one, gripper.opened) + middle(other, gripper.opened)) @ y)
+    sides: tuple[list[Part], list[Part]] = ([*one], [*other])
+    for mover, motion in moved.items():
+        if mover in tips:
+            continue
+        along = sign * float(motion @ y)
+        if abs(along) < ASTRAY * float(np.linalg.norm(motion)):
+            raise InputError(
+                f"The gripper moves {_listed(groups[mover])} across the direction in which "
+                f"{_listed(one)} and {_listed(other)} close, and objects are held between two "
+                "sides. Leave out the collision shapes of links that do not touch objects."
+            )
+        if (along > 0.0) == (float(middle(groups[mover], gripper.opened) @ y) > between):
+            sides[along > 0.0].extend(groups[mover])
+    return Sides((tuple(sides[0]), tuple(sides[1])), (tuple(one), tuple(other)), y, gripper)
+
+
+def _of_one_jaw(world: CollisionWorld, hand: Hand, groups: Groups, moved: Motions) -> Sides:
+    """Return the sides of one jaw that closes against a body of the palm."""
+    names = " and ".join(_listed(parts) for parts in groups.values())
+    refusal = InputError(
+        f"The gripper moves {names}, which closes neither on another finger nor on a body of the "
+        "palm, so it cannot grasp. Its joints must bring two collision shapes together."
+    )
+    main = max(moved, key=lambda mover: float(np.linalg.norm(moved[mover])), default=None)
+    palm = [part for part in world.parts if part.mover == hand.palm]
+    if main is None or not palm or any(_astray(each, moved[main]) for each in moved.values()):
+        raise refusal
+    standing = PlacedBodies(world, palm, hand.palm, hand.gripper.lower)
+
+    def tip(value: float) -> FloatArray:
+        return _tip(world, hand, groups[main], moved[main], value, standing.middle)
+
+    def apart(value: float) -> float:
+        return standing.nearest(tip(value)).distance
+
+    gripper = _closed_where(hand.gripper, apart)
+    closed, opened = gripper.closed, gripper.opened
+    facing = (
+        standing.nearest(tip(closed + fraction * (opened - closed))) for fraction in NEARLY_CLOSED
+    )
+    found = next((each for each in facing if each.distance >= FACING), None)
+    if found is None or apart(closed) > MAX_FACE_GAP or apart(opened) - apart(closed) < MIN_STROKE:
+        raise refusal
+    y = snapped(found.points[0] - found.points[1], frames_of(hand), float(SNAP), None)
+    moving = [*groups[main], *(part for m in moved if m != main for part in groups[m])]
+
+    def far(part: Part) -> float:
+        bodies = PlacedBodies(world, [part], hand.palm, closed)
+        return bodies.nearest(found.points[1]).distance
+
+    name = min(palm, key=far).name
+    places = JawPlaces(name, float(found.points[1] @ y), tip(closed), tip(opened))
+    return Sides(((), tuple(moving)), ((), tuple(groups[main])), y, gripper, places)
+
+
+def _closed_where(gripper: GripperModel, apart: Callable[[float], float]) -> GripperModel:
+    """Return ``gripper``, closed at the end at which its fingers are less far ``apart`` [m]."""
+    lower, upper = gripper.lower, gripper.upper
+    if apart(lower) > apart(upper):
+        return replace(gripper, closed=upper, opened=lower)
+    return replace(gripper, closed=lower, opened=upper)
+
+
+def _astray(motion: FloatArray, other: FloatArray) -> bool:
+    """Return whether two groups do not move the same way."""
+    size = float(np.linalg.norm(motion) * np.linalg.norm(other))
+    return float(motion @ other) < ASTRAY * size
+
+
+def _tip(
+    world: CollisionWorld,
+    hand: Hand,
+    parts: Sequence[Part],
+    motion: FloatArray,
+    value: float,
+    behind: FloatArray,
+) -> FloatArray:
+    """Return the tip (3,) [m] of a jaw with the finger joint at ``value`` [rad or m].
+
+    It is the point that is farthest from the joint of the jaw, or from the middle of the palm
+    ``behind`` (3,) [m] if the jaw slides.
+    """
+    placed = PlacedBodies(world, parts, hand.palm, value)
+    linkage, mover = world.linkage, parts[0].mover
+    root, axis = behind, motion / np.linalg.norm(motion)
+    if mover not in linkage.sliding:
+        T = placed.T_palm_group(mover)
+        root, axis = T[:3, 3], T[:3, :3] @ linkage.axis[mover]
+    out = placed.middle - root
+    out = out - (out @ axis) * axis
+    return placed.farthest(out / max(float(np.linalg.norm(out)), MIN_MOTION))
+
+
+def snapped(
+    wanted: FloatArray, frames: Sequence[FloatArray], near: float, across: FloatArray | None
+) -> FloatArray:
+    """Return the unit vector along ``wanted`` (3,), or the axis of one of ``frames`` beside it.
+
+    An axis stands for it if the cosine of their angle is at least ``near``. The result is
+    perpendicular to ``across``, to which ``wanted`` is, too.
+    """
+    unit = wanted / np.linalg.norm(wanted)
+    axes = [sign * column for R in frames for column in R.T for sign in (1.0, -1.0)]
+    if across is not None:
+        axes = [axis for axis in axes if abs(float(axis @ across)) < 1e-3]
+    best = max(axes, key=lambda axis: float(axis @ unit), default=unit)
+    chosen: FloatArray = best if float(best @ unit) >= near else unit
+    if across is not None:
+        chosen = chosen - (chosen @ across) * across
+        chosen = chosen / np.linalg.norm(chosen)
+    return chosen
+
+
+def frames_of(hand: Hand) -> tuple[FloatArray, FloatArray]:
+    """Return the rotations (3, 3) of the tool and of the palm, in the frame of the palm."""
+    return hand.T_palm_tool[:3, :3], np.eye(3)
+
+
+def _listed(parts: Sequence[Part]) -> str:
+    return ", ".join(part.name for part in parts)

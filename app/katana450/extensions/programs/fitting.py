@@ -1,0 +1,90 @@
+"""The approaches with which an object fits between the fingers of a hand that takes poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from katana450.arm.control.pouring import CUP
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.errors import InputError
+from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, Approach
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.turns import wrapped
+from katana450.maths.planning.plan import MARGIN
+
+MAX_ASIDE: Final = math.radians(100.0)
+"""[rad] Maximum angle between the hand and the direction away from axis 1, seen from above."""
+
+ASIDE: Final = tuple(np.radians((0.0, 40.0, -40.0)).tolist())
+"""[rad] Those of an object that is round, tried in this order."""
+
+ROUND_ROLLS: Final = tuple(np.radians((0.0, 60.0, -60.0)).tolist())
+"""[rad] Turns of the hand over an object that is round, tried in this order."""
+
+JAW_ROOM: Final = MARGIN + 1e-3
+"""[m] Distance of an object from a jaw that stands, before the other one pushes it there."""
+
+Widths = Mapping[str, Sequence[tuple[Approach, float]]]
+"""Approaches by side, each with the width [m] of the object between the fingers."""
+
+
+def widths(
+    pitches: Sequence[float], scene_object: SceneObject, at: FloatArray, side: FloatArray
+) -> dict[str, list[tuple[Approach, float]]]:
+    """Return all approaches at ``pitches`` [rad], whether the object fits or not.
+
+    The object stands at ``at`` (3,) [m] with its x axis along ``side`` (3,), both in {S}. The
+    fingers close on two opposite sides of a box or mesh. The cup is only grasped from the front.
+    """
+    if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
+        width = 2.0 * scene_object.extent[0]
+        front = [(Approach(p, 0.0, aside), width) for aside in ASIDE for p in pitches]
+        above = [(Approach(DOWN, roll), width) for roll in ROUND_ROLLS]
+        return {FRONT: front} if scene_object.name == CUP else {FRONT: front, ABOVE: above}
+    sizes = scene_object.extent[1], scene_object.extent[0]
+    skew = math.atan2(at[1], at[0]) - math.atan2(side[1], side[0])
+    rolls = [(wrapped(skew + k * DOWN), sizes[k % 2]) for k in range(4)]
+    asides = [(wrapped(k * DOWN - skew), sizes[k % 2]) for k in range(4)]
+    near = sorted(asides, key=lambda each: abs(each[0]))
+    return {
+        ABOVE: [
+            (Approach(DOWN, roll), width)
+            for roll, width in sorted(rolls, key=lambda each: abs(each[0]))
+        ],
+        FRONT: [
+            (Approach(p, 0.0, aside), width)
+            for aside, width in near
+            if abs(aside) <= MAX_ASIDE
+            for p in pitches
+        ],
+    }
+
+
+def fitting(options: Widths, opening: float, *, one_jaw: bool) -> Mapping[str, Sequence[Approach]]:
+    """Return the approaches of ``options`` between whose fingers the object fits.
+
+    opening: distance between the open fingers [m]. one_jaw: whether one of them stands; the object
+    is beside it then. Raises InputError, with the widths, if there is none.
+    """
+    rooms = (JAW_ROOM if one_jaw else MARGIN) + MARGIN
+    most = opening - rooms
+    found = {
+        name: tuple(
+            approach._replace(shift=JAW_ROOM + 0.5 * width) if one_jaw else approach
+            for approach, width in each
+            if width <= most
+        )
+        for name, each in options.items()
+    }
+    if not any(found.values()):
+        width = min((width for each in options.values() for _, width in each), default=0.0)
+        raise InputError(
+            f"it is {1e3 * width:.0f} mm wide, which is too wide: the open fingers are "
+            f"{1e3 * opening:.0f} mm apart and need {500.0 * rooms:.0f} mm of room on "
+            f"either side, so an object may have {1e3 * most:.0f} mm."
+        )
+    return found
