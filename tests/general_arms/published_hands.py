@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import HANDS, STAND
-from tests.robot.public_arms import SO101, J, Triple, X, urdf
+from tests.robot.public_arms import PX150, SO101, J, Triple, X, urdf
 
 ZERO: Triple = (0.0, 0.0, 0.0)
 
@@ -182,9 +182,40 @@ SO101_BOXES = [
 
 def so101_urdf() -> str:
     """Return the URDF of an SO-101 with its two jaws."""
-    text = urdf("so101", SO101)
-    for link in ("gripper_link", "moving_jaw"):
-        shapes = "".join(_shape(each) for each in SO101_BOXES if each.link == link)
+    return _with_boxes(urdf("so101", SO101), SO101_BOXES)
+
+
+PX150_BOXES = [
+    Box("hand", (0.04, 0.05, 0.04), (0.01, 0.0, 0.0)),
+    Box("left", (0.04, 0.01, 0.02), (0.02, 0.0, 0.0)),
+    Box("right", (0.04, 0.01, 0.02), (0.02, 0.0, 0.0)),
+]
+
+
+def px150_urdf() -> str:
+    """Return the URDF of a PincherX-150 with its two fingers."""
+    return _with_boxes(urdf("px150", PX150), PX150_BOXES)
+
+
+def closing_upwards(text: str) -> str:
+    """Return ``text`` of a PincherX-150 whose fingers have the opposite axis and range."""
+    for old, new in (
+        ('<axis xyz="0.0 1.0 0.0"/>\n  <limit lower="0.015" upper="0.037"', "left"),
+        ('<axis xyz="0.0 1.0 0.0"/>\n  <limit lower="-0.037" upper="-0.015"', "right"),
+    ):
+        assert text.count(old) == 1
+        low, high = ("-0.037", "-0.015") if new == "left" else ("0.015", "0.037")
+        text = text.replace(
+            old, f'<axis xyz="0.0 -1.0 0.0"/>\n  <limit lower="{low}" upper="{high}"'
+        )
+    return text
+
+
+def _with_boxes(text: str, boxes: list[Box]) -> str:
+    """Return the description with ``boxes`` for links without shapes."""
+    for link in {each.link for each in boxes}:
+        shapes = "".join(_shape(each) for each in boxes if each.link == link)
+        assert f'<link name="{link}"/>' in text
         text = text.replace(f'<link name="{link}"/>', f'<link name="{link}">{shapes}</link>')
     return text
 

@@ -15,6 +15,7 @@ from tests.general_arms.published_hands import (
     ROBOTIQ_2F_85,
     XARM_GRIPPER,
     hand_urdf,
+    px150_urdf,
     so101_urdf,
 )
 from tests.general_arms.test_grasping import in_base, item, place, planned, played
@@ -89,12 +90,16 @@ KINDS = {
         *(with_one_finger(UR5E), NEAR, AWAY, (20.0, 20.0, 60.0), (0.0, 0.0425), (("left",),)),
         jaw="right",
     ),
+    "PincherX-150": Kind(
+        *(px150_urdf(), (230.0, 60.0), (180.0, -120.0), (25.0, 20.0, 50.0)),
+        *((0.015, 0.037), FINGERS),
+    ),
     "SO-101": Kind(
         *(so101_urdf(), (230.0, 60.0), (180.0, -120.0), (25.0, 20.0, 50.0)),
         *((-0.174533, 1.74533), (("moving_jaw",),), "gripper_link"),
     ),
 }
-LONG = ("xArm gripper", "Robotiq on a Panda", "three links", "one sliding jaw")
+LONG = ("xArm gripper", "Robotiq on a Panda", "three links", "one sliding jaw", "PincherX-150")
 EVERY = [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in KINDS]
 
 

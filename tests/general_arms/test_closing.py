@@ -1,0 +1,197 @@
+"""One jaw in the session, and grippers that close upwards in answers and exports."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import IDLE
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, State
+from katana450.arm.robot.collision import hand_of, world_of
+from katana450.arm.robot.loader import load
+from katana450.assembly.robot_session import find_robot
+from katana450.extensions.export.ros2.srdf import srdf_text
+from katana450.extensions.hands.sides import with_sides
+from katana450.extensions.programs.clocked_run import Planned, run_by_clock
+from katana450.server.service import serialize
+from katana450.settings import Settings
+from tests.general_arms.published_hands import (
+    RADIAL,
+    ROBOTIQ_2F_85,
+    closing_upwards,
+    hand_urdf,
+    px150_urdf,
+    so101_urdf,
+)
+from tests.general_arms.test_grasping import item, planned
+
+TICK = 0.01
+CLOSED = cmd.SetGripper(-0.174533)
+BOX = (25.0, 20.0, 50.0)
+"""[mm] Size of the part between the jaws of an SO-101."""
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Planned:
+    """Return a grasp of an SO-101, planned."""
+    part = item("part", "box", BOX, (230.0, 60.0), 17.0)
+    return planned(tmp_path_factory.mktemp("arm"), so101_urdf(), ["grasp: part"], part)
+
+
+@pytest.fixture(scope="module")
+def before(plan: Planned) -> State:
+    """Return the state in which the jaws are open beside the part."""
+    opened = plan.session.require_arm().gripper.opened
+    states = run_by_clock(plan).states
+    last = max(n for n, state in enumerate(states) if state.gripper_setpoint == opened)
+    return replace(states[last], mode=IDLE, goal=states[last].setpoint, outcomes=())
+
+
+def run(session: Session, state: State, *commands: cmd.Command, ticks: int = 600) -> list[State]:
+    """Return the states from ``commands`` to rest, at most ``ticks``."""
+    states = []
+    for _ in range(ticks):
+        state = session.step(state, commands, state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        states.append(state)
+        commands = ()
+        if not state.moving:
+            break
+    return states
+
+
+def gaps(session: Session, state: State, part: SceneObject) -> tuple[float, float]:
+    """Return the distances [m] of both jaws from ``part``, which stands."""
+    world = session.environment.world([part])
+    assert world is not None
+    one, other = (
+        world.gap(state.x_setpoint, "part", name) for name in ("moving_jaw", "gripper_link")
+    )
+    return one, other
+
+
+def test_one_jaw_pushes_the_part_and_takes_it_between_two_faces(
+    plan: Planned, before: State
+) -> None:
+    states = run(plan.session, before, CLOSED)
+    assert states[-1].held is not None
+    assert states[-1].status.value == "ok"
+    first = next(n for n, state in enumerate(states) if state.held is not None)
+    standing = [before, *states[:first]]
+    away = [gaps(plan.session, state, state.objects[0])[1] for state in standing]
+    assert away[0] == pytest.approx(0.007, abs=2e-4)
+    # It moves only towards the jaw that stands, and only while the other one touches it.
+    assert (np.diff(away) <= 1e-9).all()
+    pushed = [n for n in range(len(away) - 1) if away[n + 1] < away[n] - 1e-9]
+    assert len(pushed) > 15
+    for n in pushed:
+        assert gaps(plan.session, standing[n + 1], standing[n].objects[0])[0] <= 3e-4
+        assert away[n] - away[n + 1] <= 3e-4 + 1e-9
+    assert max(gaps(plan.session, states[first], standing[-1].objects[0])) <= 3e-4
+    heights = [state.objects[0].T[2, 3] for state in standing]
+    assert max(heights) == min(heights) == 0.0
+
+
+def test_stop_ends_the_push_and_the_part_stays(plan: Planned, before: State) -> None:
+    start = before.objects[0].T
+    states = run(plan.session, before, CLOSED)
+    under_way = next(
+        state for state in states if np.linalg.norm(state.objects[0].T[:2, 3] - start[:2, 3]) > 3e-3
+    )
+    assert under_way.held is None
+    stopped = run(plan.session, under_way, cmd.Stop())[-1]
+    assert stopped.stopped is not None
+    assert stopped.held is None
+    np.testing.assert_array_equal(stopped.objects[0].T, under_way.objects[0].T)
+    assert stopped.gripper_setpoint == under_way.gripper_setpoint
+    ignored = run(plan.session, stopped, CLOSED)[-1]
+    np.testing.assert_array_equal(ignored.objects[0].T, under_way.objects[0].T)
+    # A stop cannot be cleared at once.
+    later = replace(stopped, t=stopped.t + 2.0)
+    again = run(plan.session, later, cmd.ClearStop())[-1]
+    assert run(plan.session, again, CLOSED)[-1].held is not None
+
+
+def test_part_is_not_pushed_into_another_object(plan: Planned, before: State) -> None:
+    part = before.objects[0]
+    pushed = run(plan.session, before, CLOSED)
+    last = [state for state in pushed if state.held is None][-1]
+    along = last.objects[0].T[:2, 3] - part.T[:2, 3]
+    along = along / np.linalg.norm(along)
+    T = part.T.copy()
+    # A low plate under the jaw that stands, 3 mm beside the part.
+    T[:2, 3] += (0.5e-3 * BOX[0] + 0.003 + 0.01) * along
+    plate = SceneObject("plate", Shape.BOX, (0.02, 0.02, 0.003), T)
+    state = run(plan.session, before, cmd.PlaceObject(plate))[-1]
+    closed = run(plan.session, state, CLOSED)[-1]
+    assert closed.held is None
+    (lopsided,) = (f for f in closed.findings if f.reason is Reason.LOPSIDED)
+    assert lopsided.parts == ("gripper_link", "part")
+    assert lopsided.amount > 3e-3
+    moved = next(each for each in closed.objects if each.name == "part").T[:2, 3] - part.T[:2, 3]
+    assert 2e-3 < np.linalg.norm(moved) <= 3.1e-3
+
+
+def test_opened_jaw_leaves_the_part_standing(plan: Planned, before: State) -> None:
+    held = run(plan.session, before, CLOSED)[-1]
+    assert held.grip is not None
+    still = run(plan.session, held, cmd.SetGripper(held.grip + 0.01))[-1]
+    assert still.held is not None
+    free = run(plan.session, held, cmd.SetGripper(1.7))[-1]
+    assert free.held is None
+    assert free.grip is None
+    assert free.objects[0].T[2, 3] == 0.0
+    # It closes again on the part that stands at the other jaw.
+    assert run(plan.session, free, CLOSED)[-1].held is not None
+
+
+def test_answer_and_description_name_the_closed_end_first(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(hand_urdf("UR5e", ROBOTIQ_2F_85), encoding="utf-8")
+    robot, session, _ = find_robot(Settings(), path, None)
+    assert serialize.arm(robot, session.ready.tolist()).gripper == (0.8, 0.0, 2.0)
+
+
+@pytest.mark.parametrize("upwards", [False, True])
+def test_export_for_moveit_opens_and_closes_as_the_fingers_do(
+    upwards: bool, tmp_path: Path
+) -> None:
+    path, sign = tmp_path / "arm.urdf", -1.0 if upwards else 1.0
+    path.write_text(closing_upwards(px150_urdf()) if upwards else px150_urdf(), encoding="utf-8")
+    states = {
+        state.attrib["name"]: float(state[0].attrib["value"])
+        for state in ET.fromstring(srdf_text(load(path))).iter("group_state")
+        if state.attrib["group"] == "gripper" and state[0].attrib["name"] == "left_finger"
+    }
+    assert states["closed"] == pytest.approx(0.015 * sign)
+    assert states["open"] == pytest.approx(0.037 * sign)
+
+
+def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(hand_urdf("UR5e", RADIAL), encoding="utf-8")
+    robot, session, _ = find_robot(Settings(), path, None)
+    hand = session.environment.hand
+    assert hand is not None
+    assert hand.sides == (("digit_1",), ("digit_2",), ("digit_3",))
+    assert robot.require_arm().gripper.closed == 0.0
+
+
+def test_katana_has_the_sides_and_ends_of_its_file() -> None:
+    robot = load()
+    world, _ = world_of(robot)
+    assert world is not None
+    hand = hand_of(robot, world)
+    found = with_sides(world, hand)
+    assert found.gripper == hand.gripper
+    assert found.gripper.closed == hand.gripper.lower
+    assert found.fingers == hand.fingers == ("finger_right_link", "finger_left_link")
+    assert found.sides == hand.sides == (("finger_right_link",), ("finger_left_link",))
+    assert found.standing_jaw is None
