@@ -1,11 +1,11 @@
-"""A box is picked and placed on the real server of a Panda, with its recording."""
+"""A box is picked and placed on real servers of arms with hands of all kinds."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -16,18 +16,48 @@ from katana450.maths.geometry import so3
 from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.general_arms.gripping_arms import gripping_urdf
+from tests.general_arms.published_hands import ROBOTIQ_2F_85, hand_urdf, so101_urdf
 
 pytestmark = pytest.mark.long
 
 SECONDS = 120.0
-AT, TO = (0.5, 0.1), (0.4, -0.2)
-"""[m] Places of the box on the table."""
+
+
+class Bench(NamedTuple):
+    """An arm, places of a box on its table and its size [m].
+
+    Attributes:
+        text: the description of the arm.
+        at, to: the places.
+        size: of the box.
+        yaw: angle to which the hand turns it [deg]; None if it cannot.
+        error: maximum error of a place; the file of the SO-101 rounds its angles.
+    """
+
+    text: str
+    at: tuple[float, float] = (0.5, 0.1)
+    to: tuple[float, float] = (0.4, -0.2)
+    size: tuple[float, float, float] = (0.04, 0.05, 0.06)
+    yaw: float | None = 40.0
+    error: float = 1e-9
+
+
+BENCHES = {
+    "Panda": Bench(gripping_urdf("Panda")),
+    "Robotiq 2F-85": Bench(hand_urdf("UR5e", ROBOTIQ_2F_85)),
+    "SO-101": Bench(so101_urdf(), (0.23, 0.06), (0.18, -0.12), (0.025, 0.02, 0.05), None, 1e-6),
+}
+
+
+@pytest.fixture(scope="module", params=BENCHES)
+def bench(request: pytest.FixtureRequest) -> Bench:
+    return BENCHES[request.param]
 
 
 @pytest.fixture(scope="module")
-def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("arm") / "panda.urdf"
-    path.write_text(gripping_urdf("Panda"), encoding="utf-8")
+def urdf(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("arm") / "arm.urdf"
+    path.write_text(bench.text, encoding="utf-8")
     return path
 
 
@@ -39,7 +69,7 @@ def server(urdf: Path) -> Iterator[AppServer]:
 
 
 @pytest.fixture
-def arm(server: AppServer) -> Iterator[Client]:
+def arm(server: AppServer, bench: Bench) -> Iterator[Client]:
     """Return the arm at Home with the box in front of it."""
     with connect(server.url) as client:
         client.clear_stop()
@@ -48,13 +78,13 @@ def arm(server: AppServer) -> Iterator[Client]:
             client.ask(requests.Remove(name=each.name))
         T = np.eye(4)
         T[:3, :3] = so3.rotation_z(0.3)
-        T[:2, 3] = AT
+        T[:2, 3] = bench.at
         rows: Any = tuple(map(tuple, T.tolist()))
         client.ask(
             requests.Place(
                 name="box",
                 shape=requests.Shape.BOX,
-                size=[0.04, 0.05, 0.06],
+                size=list(bench.size),
                 T=rows,
                 can_be_held=True,
             )
@@ -87,24 +117,35 @@ def started(arm: Client, *steps: str) -> None:
     arm.ask(Steer(order=ProgramOrder.RUN))
 
 
+def place(bench: Bench, yaw: str = "") -> str:
+    """Return the step that places the box."""
+    x, y = (1e3 * each for each in bench.to)
+    return f"place: {{at: {{x: {x:g}, y: {y:g}{yaw}}}}}"
+
+
 def box(arm: Client) -> answers.SceneObject:
     (found,) = arm.query(answers.Objects).objects
     return found
 
 
-def test_box_is_picked_and_placed(arm: Client) -> None:
-    started(arm, "pick: box", "place: {at: {x: 400, y: -200, yaw: 40}}", "home")
+def test_box_is_picked_and_placed(arm: Client, bench: Bench) -> None:
+    yaw = "" if bench.yaw is None else f", yaw: {bench.yaw:g}"
+    started(arm, "pick: box", place(bench, yaw), "home")
     until(arm, lambda now: now.held == "box")
     end = until(arm, lambda now: status(now) in ("done", "failed", "stopped"))
     assert status(end) == "done", end.program
     assert end.held is None
     T = np.array(box(arm).T)
-    np.testing.assert_allclose(T[:3, 3], (*TO, 0.0), atol=1e-9)
-    assert np.degrees(np.arctan2(T[1, 0], T[0, 0])) % 180.0 == pytest.approx(40.0, abs=1e-6)
+    np.testing.assert_allclose(T[:3, 3], (*bench.to, 0.0), atol=bench.error)
+    if bench.yaw is not None:
+        turned = np.degrees(np.arctan2(T[1, 0], T[0, 0])) % 180.0
+        assert turned == pytest.approx(bench.yaw, abs=1e-6)
 
 
-def test_stop_keeps_the_box_in_the_hand_and_the_program_continues(arm: Client) -> None:
-    started(arm, "pick: box", "place: {at: {x: 400, y: -200}}", "home")
+def test_stop_keeps_the_box_in_the_hand_and_the_program_continues(
+    arm: Client, bench: Bench
+) -> None:
+    started(arm, "pick: box", place(bench), "home")
     until(arm, lambda now: now.held == "box" and now.program is not None and now.program.step == 2)
     arm.stop()
     stopped = until(arm, lambda now: bool(now.stopped) and not now.moving)
@@ -114,4 +155,4 @@ def test_stop_keeps_the_box_in_the_hand_and_the_program_continues(arm: Client) -
     arm.ask(Steer(order=ProgramOrder.CONTINUE))
     end = until(arm, lambda now: status(now) in ("done", "failed"))
     assert status(end) == "done", end.program
-    np.testing.assert_allclose(np.array(box(arm).T)[:3, 3], (*TO, 0.0), atol=1e-9)
+    np.testing.assert_allclose(np.array(box(arm).T)[:3, 3], (*bench.to, 0.0), atol=bench.error)
