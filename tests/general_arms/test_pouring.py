@@ -13,19 +13,21 @@ from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.clocked_run import Planned, run_by_clock
-from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.plan_builder import TICK, PlanContext
+from katana450.extensions.programs.pose_curve import PoseTurn
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.simulation import Simulation
-from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.tilting import UNDERSIDES
-from katana450.maths.geometry import so3
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.water.units import FEMTOLITRE, ML
 from katana450.settings import Settings
@@ -138,7 +140,51 @@ def test_part_is_poured(tmp_path: Path) -> None:
     assert left == pytest.approx(140.0, abs=0.6)
 
 
+@pytest.mark.parametrize(
+    ("name", "ml", "rate"),
+    [
+        ("UR5e", 50.0, 10.0),
+        pytest.param("UR5e", 100.0, 5.0, marks=pytest.mark.long),
+        pytest.param("Panda", 50.0, 10.0, marks=pytest.mark.long),
+    ],
+)
+def test_flow_follows_the_rate(name: str, ml: float, rate: float, tmp_path: Path) -> None:
+    found = poured(tmp_path, name, f"{{into: basin, ml: {ml:g}, rate: {rate:g} ml/s}}")
+    states = found.simulation.states
+    filled = [state for state in states if state.poured is not None]
+    kept = np.array([state.poured.water.kept for state in filled if state.poured is not None])
+    kept = kept * FEMTOLITRE / ML
+    # The mean flow over half a second, while the middle half of the part flows out.
+    flow = (kept[:-50] - kept[50:]) / (50 * TICK)
+    out = 200.0 - 0.5 * (kept[:-50] + kept[50:])
+    middle = flow[(out > 0.25 * ml) & (out < 0.75 * ml)]
+    assert len(middle) > 0.4 * ml / rate / TICK
+    assert middle == pytest.approx(np.full(len(middle), rate), rel=0.05)
+    water = filled[-1].poured
+    assert water is not None
+    assert water.water.basin * FEMTOLITRE / ML == pytest.approx(ml, rel=0.01)
+    assert water.water.spilled == 0
+
+
 @pytest.mark.long
-def test_rate_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ScriptError, match="rate needs an arm of the five-axis family"):
-        planned(tmp_path, "UR5e", "{into: basin, rate: 5 ml/s}")
+def test_all_is_poured_at_a_rate(tmp_path: Path) -> None:
+    found = poured(tmp_path, "UR5e", "{into: basin, rate: 10 ml/s}")
+    state = found.simulation.states[-1]
+    assert state.poured is not None
+    assert state.poured.water.basin * FEMTOLITRE / ML > 199.0
+    assert state.poured.water.spilled == 0
+
+
+def test_turn_by_a_polynomial_keeps_the_lip_in_its_place() -> None:
+    start = ToolPose.of(
+        se3.from_rotation_translation(so3.from_rpy(0.3, 0.2, 0.1), np.array((0.5, 0.1, 0.4)))
+    )
+    point, axis = np.array((0.4, 0.2, 0.3)), so3.rotation_z(0.7)[:, 0]
+    angles = np.array((0.5, 0.3, 0.1, -0.05))
+    sigma = np.linspace(0.0, 1.0, 11)
+    T = PoseTurn(start, point, axis, angles).at(Jet.variable(sigma)).T
+    before = se3.from_rotation_translation(start.R, start.position)
+    for place, pose in zip(sigma.tolist(), T, strict=True):
+        R = so3.exp(np.polynomial.polynomial.polyval(2.0 * place - 1.0, angles) * axis)
+        turn = se3.from_rotation_translation(R, point - R @ point)
+        np.testing.assert_allclose(pose, turn @ before, atol=1e-12)

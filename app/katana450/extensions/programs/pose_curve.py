@@ -86,6 +86,54 @@ class TurnedCurve:
 
 
 @dataclass(frozen=True, eq=False)
+class PoseTurn:
+    """A turn of the tool about an axis beside it, by a polynomial.
+
+    Attributes:
+        start: the pose from which the angle counts.
+        point, axis: (3,) [m] and unit vector (3,) of the axis.
+        angles: coefficients (n,) of the angle [rad], of the powers of 2 sigma - 1.
+    """
+
+    start: ToolPose
+    point: FloatArray
+    axis: FloatArray
+    angles: FloatArray
+
+    def __post_init__(self) -> None:
+        angles = finite_array(self.angles, (np.size(self.angles),), "The coefficients of an angle")
+        object.__setattr__(self, "angles", frozen(angles))
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """No joins: the turn is one formula."""
+        return ()
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        *lower, highest = self.angles.tolist()
+        s, angle = 2.0 * sigma - 1.0, highest + 0.0 * sigma
+        for coefficient in reversed(lower):
+            angle = angle * s + coefficient
+        sine, cosine = sin_cos(angle)
+        beside = self.start.position - self.point
+        x, y, z = (
+            place + each
+            for place, each in zip(
+                self.point.tolist(), self._turned(beside, sine, cosine), strict=True
+            )
+        )
+        columns = tuple(self._turned(column, sine, cosine) for column in self.start.R.T)
+        return PoseJets(x, y, z, columns)  # type: ignore[arg-type]
+
+    def _turned(self, v: FloatArray, sine: Jet, cosine: Jet) -> tuple[Jet, ...]:
+        """Return the vector ``v`` (3,) turned by the angle."""
+        along = (self.axis @ v) * self.axis
+        terms = np.stack((v - along, np.cross(self.axis, v), along), axis=1).tolist()
+        return tuple(cosine * c + sine * s + f for c, s, f in terms)
+
+
+@dataclass(frozen=True, eq=False)
 class PoseLines:
     """Straight lines from pose to pose with rounded corners.
 

@@ -180,35 +180,52 @@ class Pour:
                 f"An arm with {builder.chain.n} axes cannot tilt a cup about its lip. Pouring "
                 "needs six axes, or an arm of the five-axis family."
             )
-        if self.rate is not None:
-            raise InputError(
-                "A given rate needs an arm of the five-axis family. Leave out `rate`: the cup is "
-                "then tilted evenly."
-            )
         environment = builder.plan_context.session.environment
         T = environment.pose(cup, builder.state.x_setpoint)
         rim = builder.point(T[:3, 3] + cup.height * T[:3, 2], in_base=True)
         over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height), in_base=True)
-        shake = SHAKE_ANGLE if self.shake else 0.0
-        ways = about_the_lip(
-            builder, rim, (cup.size[0], cup.height), over, self._tilt(builder, rest), shake
-        )
+        tilt, size = self._tilt(builder, rest), (cup.size[0], cup.height)
+        ways = list(about_the_lip(builder, rim, size, over))
         try:
-            builder.first(list(ways), lambda way: self._tilted(builder, way, rest))
+            builder.first(ways, lambda way: self._tilted(builder, way, tilt, rest))
         except InputError as error:
             raise InputError(f"The cup cannot be emptied into {self.into}: {error}") from error
         builder.predict_water(rest)
 
-    def _tilted(self, builder: PlanBuilder, way: Tilting, rest: float) -> None:
+    def _tilted(self, builder: PlanBuilder, way: Tilting, tilt: float, rest: float) -> None:
         """Append the motions of ``way`` with their pace, and the draining."""
         carry(builder, way.at, f"over {self.into}")
         pace = POUR_PACE if self.volume is None else PART_PACE
         builder.note("slowly", SetSpeed(pace), builder.state)
-        builder.lead([way.down], POURING)
+        if self.rate is None:
+            builder.lead([way.arc(tilt, 0.0, tilt)], POURING)
+        else:
+            tilt = self._tilted_at_rate(builder, self.rate, way, tilt, rest)
         if self.shake:
-            builder.lead([*way.shake] * self.shake, "shake")
+            up = tilt - SHAKE_ANGLE
+            shake = way.arc(-SHAKE_ANGLE, tilt, up), way.arc(SHAKE_ANGLE, up, tilt)
+            builder.lead([*shake] * self.shake, "shake")
         self._drain(builder, rest)
-        builder.lead([way.back], "turn back")
+        builder.lead([way.arc(-tilt, tilt, 0.0)], "turn back")
+
+    def _tilted_at_rate(
+        self, builder: PlanBuilder, rate: float, way: Tilting, tilt: float, rest: float
+    ) -> float:
+        """Tilt the cup about its lip so that it pours at ``rate`` [m^3/s]; return the last tilt.
+
+        ``tilt``: of a cup that is emptied [rad].
+        """
+        plan, times, tilts = self._at_rate(builder, rate, rest)
+        fitted = polyfit(2.0 * times / plan.duration - 1.0, tilts, ROLL_DEGREE)
+        first, last = (float(polyval(end, fitted)) for end in (-1, 1))
+        builder.lead([way.arc(first, 0.0, first)], POURING)
+        builder.note("at the rate", SetSpeed(1.0), builder.state)
+        builder.pace(way.by(frozen(fitted)), plan.duration, "pour at the rate")
+        if self.volume is not None:
+            return last
+        builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
+        builder.lead([way.arc(tilt - last, last, tilt)], "pour the last")
+        return tilt
 
     def _drain(self, builder: PlanBuilder, rest: float) -> None:
         """Append the wait until the last water, or the part, has run out."""
@@ -223,14 +240,7 @@ class Pour:
         self, builder: PlanBuilder, rate: float, at: ToolTarget, turn: float, rest: float
     ) -> ToolTarget:
         """Turn the cup from ``at`` so that it pours at ``rate`` [m^3/s]; return the last target."""
-        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
-        assert pouring is not None
-        assert poured is not None
-        inside = pouring.water_environment(builder.state.objects).cup.inside
-        held = poured.water.kept * FEMTOLITRE
-        out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
-        plan = RatePlan.of(out, rate)
-        times, tilts = plan.tilts(held, poured.water.liquid, inside)
+        plan, times, tilts = self._at_rate(builder, rate, rest)
         rolls = _roll_of(tilts, at.pitch)
         if rolls.max() > abs(turn) and rolls.max() >= POUR_TURN:
             raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
@@ -246,6 +256,19 @@ class Pour:
         down = replace(at, roll=at.roll + turn)
         builder.lead([ToolLine(last, down)], "pour the last")
         return down
+
+    def _at_rate(
+        self, builder: PlanBuilder, rate: float, rest: float
+    ) -> tuple[RatePlan, FloatArray, FloatArray]:
+        """Return the plan for ``rate`` [m^3/s], and times (N,) [s] and tilts (N,) [rad] of it."""
+        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
+        assert pouring is not None
+        assert poured is not None
+        inside = pouring.water_environment(builder.state.objects).cup.inside
+        held = poured.water.kept * FEMTOLITRE
+        out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
+        plan = RatePlan.of(out, rate)
+        return plan, *plan.tilts(held, poured.water.liquid, inside)
 
     def _pour(
         self, builder: PlanBuilder, basin: SceneObject, level: ToolTarget, turn: float, rest: float

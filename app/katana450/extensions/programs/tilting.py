@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,10 +12,10 @@ import numpy as np
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.tool_planning import AnyCurve
+from katana450.extensions.programs.pose_curve import PoseTurn
+from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.tool import DragTarget
 
 EMPTY_TILT: Final = math.radians(120.0)
 """[rad] Tilt of a cup that is emptied: past its side."""
@@ -35,15 +35,24 @@ class Tilting:
 
     Attributes:
         at: the tool with the cup upright over the basin.
-        down: the curve that tilts it.
-        shake: the curves of one shake; empty without.
-        back: the curve that turns it back.
+        lip: the lip about which the cup tilts.
+        planning: of the tool.
     """
 
-    at: DragTarget
-    down: AnyCurve
-    shake: Sequence[AnyCurve]
-    back: AnyCurve
+    at: ToolPose
+    lip: Lip
+    planning: ToolPlanning
+
+    def arc(self, angle: float, start: float, end: float) -> AnyCurve:
+        """Return the turn by ``angle`` [rad] from the tilt ``start`` to ``end`` [rad]."""
+        one, other = (
+            self.at if not tilt else self.lip.turned(self.at, tilt) for tilt in (start, end)
+        )
+        return self.planning.arc(self.lip.point, self.lip.axis, angle, 0.0, one, other)
+
+    def by(self, tilts: FloatArray) -> AnyCurve:
+        """Return the turn by a polynomial; ``tilts``: see `PoseTurn`."""
+        return PoseTurn(self.at, self.lip.point, self.lip.axis, tilts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +78,6 @@ def about_the_lip(
     cup: FloatArray,
     size: tuple[float, float],
     over: FloatArray,
-    tilt: float,
-    shake: float,
 ) -> Iterator[Tilting]:
     """Yield the ways to tilt an upright cup about its lip, the best first.
 
@@ -79,8 +86,6 @@ def about_the_lip(
         cup: (3,) the middle of the cup's rim [m] in {S}, at the present posture.
         size: radius of the rim, and height of the cup [m].
         over: (3,) the middle of the basin's rim [m] in {S}.
-        tilt: of the cup [rad].
-        shake: the angle of a shake [rad]; 0 for none.
     """
     level, hand, planning = builder.target, builder.hand, builder.planning
     here, there = (math.atan2(p[1], p[0]) for p in (cup, over))
@@ -97,14 +102,4 @@ def about_the_lip(
             moved = middle + so3.rotation_z(natural) @ (level.position - cup)
             at = hand.turned(level, moved, natural)
             assert isinstance(at, ToolPose)
-            down, up = lip.turned(at, tilt), lip.turned(at, tilt - shake)
-
-            def arc(angle: float, start: ToolPose, end: ToolPose, lip: Lip = lip) -> AnyCurve:
-                return planning.arc(lip.point, lip.axis, angle, 0.0, start, end)
-
-            yield Tilting(
-                at,
-                arc(tilt, at, down),
-                (arc(-shake, down, up), arc(shake, up, down)) if shake else (),
-                arc(-tilt, down, at),
-            )
+            yield Tilting(at, lip, planning)

@@ -24,7 +24,7 @@ from katana450.arm.control.following import Following
 from katana450.arm.control.lease import Person, Role
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
-from katana450.extensions.programs.pose_curve import PoseCurve, PoseLines, TurnedCurve
+from katana450.extensions.programs.pose_curve import PoseCurve, PoseLines, PoseTurn, TurnedCurve
 from katana450.extensions.programs.pose_path import PosePath
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.extensions.programs.tool_path import ToolPath
@@ -85,7 +85,7 @@ CLASSES: Final[tuple[type, ...]] = (
     *(pouring.MotionWithWater, Water, Slosh, Course),
     # Plans.
     *(Plan, Segment, Scaling, Nearest, Contact, Fingerprint, Chain, JointPath, ToolPath),
-    *(TrajectoryPath, PosePath, TurnedCurve, PoseLines),
+    *(TrajectoryPath, PosePath, TurnedCurve, PoseTurn, PoseLines),
     *(ToolLine, ToolLines, ToolArc, ToolScrew, ToolTurn, Linear, Swing),
 )
 """Frozen dataclasses that a recording can hold."""
@@ -96,7 +96,7 @@ PROFILES: Final[Any] = Linear | Swing
 MEMBERS: Final[Mapping[Any, Any]] = {
     Path: JointPath | ToolPath | TrajectoryPath | PosePath,
     Curve: CURVES,
-    PoseCurve: TurnedCurve | PoseLines,
+    PoseCurve: TurnedCurve | PoseTurn | PoseLines,
     Callable: PROFILES,
     DragTarget: ToolTarget | ToolPose,
 }
