@@ -6,7 +6,8 @@ import asyncio
 import importlib.util
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
@@ -47,6 +48,20 @@ class Line:
 
     async def send(self, frame: bytes) -> None:
         self.sent.append(frame)
+
+
+@contextmanager
+def thread_of_viser() -> Iterator[asyncio.AbstractEventLoop]:
+    """Run an event loop in a thread of its own, as viser's in the app."""
+    viser = asyncio.new_event_loop()
+    thread = threading.Thread(target=viser.run_forever)
+    thread.start()
+    try:
+        yield viser
+    finally:
+        viser.call_soon_threadsafe(viser.stop)
+        thread.join()
+        viser.close()
 
 
 def messages() -> list[Any]:
@@ -153,16 +168,8 @@ def test_unread_state_is_replaced_by_a_newer_one() -> None:
 
         await asyncio.wrap_future(there(end()))
 
-    # As in the app, viser runs in a thread of its own.
-    viser = asyncio.new_event_loop()
-    thread = threading.Thread(target=viser.run_forever)
-    thread.start()
-    try:
+    with thread_of_viser() as viser:
         asyncio.run(act(viser))
-    finally:
-        viser.call_soon_threadsafe(viser.stop)
-        thread.join()
-        viser.close()
 
 
 def test_changed_message_is_packed_again() -> None:
@@ -187,6 +194,56 @@ def test_deleted_messages_are_not_mistaken_for_later_ones() -> None:
 def test_server_of_the_app_uses_our_producer() -> None:
     open_server("a key").stop()
     assert _infra._message_producer is frames.produce
+    assert _infra._message_consumer is frames.consume
+
+
+def test_messages_of_a_browser_wait_for_viser_and_keep_their_order_and_stamps() -> None:
+    heard: list[tuple[str, int]] = []
+
+    async def act(viser: asyncio.AbstractEventLoop) -> None:
+        slot = frames.FrameSlot()
+        there = partial(asyncio.run_coroutine_threadsafe, loop=viser)
+
+        def handle(message: str) -> None:
+            # As viser does, which may answer one message while the next one comes.
+            heard.append((message, slot.stamps.popleft()))
+
+        async def begin() -> None:
+            slot.hear(handle)
+
+        receiver = asyncio.create_task(slot.receiver())
+        await asyncio.sleep(0.05)
+        # viser's end of the connection is not there yet.
+        assert not receiver.done()
+        await asyncio.wrap_future(there(begin()))
+        pass_on = await receiver
+        for number in range(100):
+            slot.stamps.append(number)
+            pass_on(f"{number}")
+        await asyncio.wrap_future(there(asyncio.sleep(0.0)))
+
+    with thread_of_viser() as viser:
+        asyncio.run(act(viser))
+    assert heard == [(f"{number}", number) for number in range(100)]
+
+
+def test_messages_after_the_end_of_viser_are_dropped() -> None:
+    async def act(viser: asyncio.AbstractEventLoop) -> frames.FrameSlot:
+        slot = frames.FrameSlot()
+
+        async def begin() -> None:
+            slot.hear(lambda _: None)
+
+        await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(begin(), viser))
+        return slot
+
+    async def all_of_it() -> None:
+        with thread_of_viser() as viser:
+            slot = await act(viser)
+        # Raises nothing, although the loop is closed.
+        (await slot.receiver())("late")
+
+    asyncio.run(all_of_it())
 
 
 def test_scene_is_sent_in_the_order_in_which_it_is_needed() -> None:

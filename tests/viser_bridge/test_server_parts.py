@@ -195,6 +195,35 @@ def test_producer_of_frames_can_be_replaced(
         run(trial())
 
 
+def test_consumer_of_messages_can_be_replaced(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handled: list[tuple[int, str]] = []
+    own = _infra._message_consumer
+
+    async def handle(client_id: Any, message: Any) -> None:
+        handled.append((int(client_id), type(message).__name__))
+
+    async def consume(line: Any, pass_on: Any, message_class: Any) -> None:
+        assert line.request.headers["X-Test"] == "here"
+        pass_on(wire.TransformControlsDragStartMessage("/n"))
+        await own(line, pass_on, message_class)
+
+    async def trial() -> None:
+        monkeypatch.setattr(_infra, "_message_consumer", consume)
+        monkeypatch.setattr(server._websock_server, "_handle_incoming_message", handle)
+        async with browser(server) as socket:
+            await socket.send(msgspec.msgpack.encode(CAMERA))
+            await until(lambda: len(handled) == 2, "both messages")
+
+    with part("_message_consumer"), part("_handle_incoming_message"):
+        run(trial())
+    assert [name for _, name in handled] == [
+        "TransformControlsDragStartMessage",
+        "ViewerCameraMessage",
+    ]
+
+
 def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> None:
     async def trial() -> None:
         connections: list[Any] = []

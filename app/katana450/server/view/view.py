@@ -137,12 +137,13 @@ class View(ViewUpdater):
         # At the end of the panel, because the element takes an empty line.
         server.gui.add_html(style())
         self.show(state_publisher.snapshot)
+        self.show_panel(state_publisher.snapshot)
 
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
         self._cameras.give(client, preset, self._state_publisher.snapshot.state)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Send the changes in ``snapshot`` to every browser."""
+        """Send the changes of the scene in ``snapshot`` to every browser."""
         state = snapshot.state
         with self._server.atomic():
             self._scenery.show(state)
@@ -150,12 +151,16 @@ class View(ViewUpdater):
             self._tint.follow(state)
             self._show_goal(state)
             self._cameras.follow(state)
+        self._server.flush()
+
+    def show_panel(self, snapshot: Snapshot) -> None:
+        """Send the changes of the panel in ``snapshot`` to every browser."""
+        with self._server.atomic():
             caught_up = snapshot.ticket == self._last_ticket()
-            self._panel.follow(state, time.perf_counter(), caught_up=caught_up)
+            self._panel.follow(snapshot.state, time.perf_counter(), caught_up=caught_up)
             self._scene_tab.follow()
             for folder in self._folders:
                 folder.follow()
-        self._server.flush()
 
     def _show_goal(self, state: State) -> None:
         away = float(np.abs(state.goal - state.q).max()) > GHOST_FROM

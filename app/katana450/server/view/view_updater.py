@@ -48,6 +48,9 @@ class ViewUpdater:
     def show(self, snapshot: Snapshot) -> None:
         """Send the changes in ``snapshot`` to every browser."""
 
+    def show_panel(self, snapshot: Snapshot) -> None:
+        """Send what may follow the scene: it does not delay the picture of a drag."""
+
     def _run(self) -> None:
         try:
             self._follow()
@@ -67,5 +70,8 @@ class ViewUpdater:
             seen = snapshot
             due = time.perf_counter() + self._interval
             self.show(snapshot)
+            # The scene is on its way meanwhile.
+            self._state_publisher.wait_for_command(snapshot, self._interval / 2)
+            self.show_panel(snapshot)
             # Motion is shown at the frame rate, the effect of a command immediately.
             self._state_publisher.wait_for_command(snapshot, due - time.perf_counter())

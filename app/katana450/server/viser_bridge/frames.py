@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
@@ -43,7 +44,8 @@ class FrameSlot:
 
     viser's thread puts frames in, and the gateway's thread takes them out, one on each request. A
     frame is made only on request, because a waiting frame would grow old. It is passed directly,
-    because a socket in between would double the cost for many browsers.
+    because a socket in between would double the cost for many browsers. Messages of the browser go
+    the other way, decoded already: by the socket a drag would be shown later.
 
     Attributes:
         name: secret name by which viser's end finds the slot.
@@ -66,21 +68,22 @@ class FrameSlot:
         self._frames: deque[bytes] = deque()
         self._taker = asyncio.get_running_loop()
         self._giver: asyncio.AbstractEventLoop | None = None
+        self._handle: Callable[[Any], None] = lambda _: None
+        self._heard = asyncio.Event()
         self._available = asyncio.Event()
         self._requested = asyncio.Event()
         _slots[self.name] = self
 
     def refuse(self, why: str) -> None:
         """Report the reason for which a gesture was refused. May be called in any thread."""
-        with suppress(RuntimeError):  # the loop may have ended
-            self._taker.call_soon_threadsafe(self._refused, why)
+        _soon(self._taker, self._refused, why)
 
     async def take(self) -> bytes:
         """Return the next frame. Call it in the taker's loop."""
         while not self._frames:
             self._available.clear()
             if self._giver is not None:
-                _signal(self._giver, self._requested)
+                _soon(self._giver, self._requested.set)
             await self._available.wait()
         return self._frames.popleft()
 
@@ -88,17 +91,29 @@ class FrameSlot:
         """Register the giver's loop, which must call it. The first frame needs no request."""
         self._giver = asyncio.get_running_loop()
 
+    def hear(self, handle: Callable[[Any], None]) -> None:
+        """Call ``handle`` in this loop, that of the giver, with each message of the browser."""
+        self.open()
+        self._handle = handle
+        _soon(self._taker, self._heard.set)
+
+    async def receiver(self) -> Callable[[Any], None]:
+        """Return the function that passes a message, after its stamp, to viser, once it listens."""
+        await self._heard.wait()
+        return partial(_soon, self._giver, self._handle)
+
     async def give(self, frame: bytes) -> None:
         """Hand over ``frame``, in the giver's loop, and return when the next one is requested."""
         self._requested.clear()
         self._frames.append(frame)
-        _signal(self._taker, self._available)
+        _soon(self._taker, self._available.set)
         await self._requested.wait()
 
 
-def _signal(loop: asyncio.AbstractEventLoop, event: asyncio.Event) -> None:
-    with suppress(RuntimeError):  # the loop may have ended
-        loop.call_soon_threadsafe(event.set)
+def _soon(loop: Any, act: Callable[..., object], *arguments: Any) -> None:
+    """Call ``act`` in ``loop``, which may have ended."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(act, *arguments)
 
 
 _slots: WeakValueDictionary[str, FrameSlot] = WeakValueDictionary()
@@ -211,6 +226,21 @@ async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: 
         await windows.aclose()
 
 
+async def consume(line: Any, handle: Callable[[Any], None], message_class: Any) -> None:
+    """Take the messages of a browser, as viser's own ``_message_consumer`` does.
+
+    Those of a browser behind the gateway come by its slot, and nothing by the socket.
+    """
+    slot = slot_of(line.request.headers)
+    if slot is not None:
+        slot.hear(handle)
+    await _own_consumer(line, handle, message_class)
+
+
+_own_consumer = _infra._message_consumer
+
+
 def share() -> None:
-    """Make the viser servers of this process pack each frame only once."""
+    """Make the viser servers of this process pack each frame once, and use the slots."""
     _infra._message_producer = produce  # type: ignore[assignment]  # without viser's types
+    _infra._message_consumer = consume  # type: ignore[assignment]

@@ -10,6 +10,7 @@ import logging
 from collections import Counter
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import Any
 
 import msgspec
 from viser import _messages as wire
@@ -51,10 +52,12 @@ class FilterResult:
     Attributes:
         ruling: the decision.
         seen: number of frames on the screen if the message reports it.
+        message: the decoded message if it passes.
     """
 
     ruling: Ruling
     seen: int | None = None
+    message: Any = None
 
 
 class MessageFilter:
@@ -78,10 +81,10 @@ class MessageFilter:
             return self._drop("flood", "messages come too fast", t)
         if data is None or len(data) > MAX_MESSAGE_BYTES:
             return self._drop("none", "it is too long or not binary", t, NO_MESSAGE)
-        seen = _seen(data)
-        if seen is not None:
-            return FilterResult(Ruling.DROP, seen=seen)
         try:
+            match msgspec.msgpack.decode(data):
+                case {"type": str(kind), "count": int(count), **rest} if kind == SEEN and not rest:
+                    return FilterResult(Ruling.DROP, seen=count)
             message = wire.Message.deserialize(data)
         except Exception as error:
             # A message that viser's decoder rejects, by any error, is not passed to viser.
@@ -89,7 +92,7 @@ class MessageFilter:
         objection = self._guard.objection(message)
         if objection is not None:
             return self._drop(type(message).__name__, objection, t)
-        return FilterResult(Ruling.PASS)
+        return FilterResult(Ruling.PASS, message=message)
 
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> FilterResult:
         self.dropped[kind] += 1
@@ -100,14 +103,3 @@ class MessageFilter:
             log.warning("Further dropped messages of %s are not logged.", self._who)
         tolerated = self._tolerance.take(t, weight)
         return FilterResult(Ruling.DROP if tolerated else Ruling.CLOSE)
-
-
-def _seen(data: bytes) -> int | None:
-    try:
-        message = msgspec.msgpack.decode(data)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError):
-        return None
-    match message:
-        case {"type": str(kind), "count": int(count), **rest} if kind == SEEN and not rest:
-            return count
-    return None

@@ -104,10 +104,6 @@ class Proxy:
                 f"ws://127.0.0.1:{self._port}",
                 subprotocols=[SUBPROTOCOL],
                 additional_headers={KEY_HEADER: self._key, FRAME_SLOT_HEADER: line.slot.name},
-                user_agent_header=None,
-                compression=None,
-                max_size=None,
-                max_queue=1,
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
@@ -143,7 +139,7 @@ class _Line:
     async def run(self, upstream: ClientConnection) -> None:
         """Pass messages until either side closes; ``upstream`` is the connection to viser."""
         self._hub.pictures.show(self._key, self._flow)
-        directions = (self._down(), self._up(upstream), upstream.wait_closed())
+        directions = (self._down(), self._up(), upstream.wait_closed())
         tasks = [asyncio.create_task(each) for each in directions]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -199,11 +195,12 @@ class _Line:
         self._due = max(self._due + interval, t)
         return self._due - t
 
-    async def _up(self, upstream: ClientConnection) -> None:
+    async def _up(self) -> None:
         """Pass the messages of the browser to viser that the message filter admits."""
         participant = self._hub.participant(self._key)
         who = participant.person.name if participant is not None else "a window without our page"
         message_filter = MessageFilter(self._guard, who, self._hub.clock())
+        pass_on = await self.slot.receiver()
         while True:
             # At most one message per turn of the event loop, so that other tasks can run.
             await asyncio.sleep(0)
@@ -212,9 +209,9 @@ class _Line:
                 return
             data = message.get("bytes")
             result = message_filter.judge(data, self._hub.clock())
-            if result.ruling is Ruling.PASS and data is not None:
+            if result.ruling is Ruling.PASS:
                 self.slot.stamps.append(self._hub.gate.revocations)
-                await upstream.send(data)
+                pass_on(result.message)
             elif result.ruling is Ruling.CLOSE or not self._note(result):
                 log.warning("Disconnected a browser that sent too many invalid messages.")
                 self._unwelcome = True

@@ -1,0 +1,83 @@
+"""The panel follows the scene, and neither waits for the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+import viser
+
+from katana450.arm.control.session import Session
+from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.server.view.view_updater import ViewUpdater
+
+FRAME_RATE = 10.0
+
+
+class Noting(ViewUpdater):
+    """A view that notes what it shows, and when."""
+
+    def __init__(self, server: viser.ViserServer, publisher: StatePublisher) -> None:
+        super().__init__(server, publisher, FRAME_RATE)
+        self.noted: list[tuple[str, int, float]] = []
+
+    def show(self, snapshot: Snapshot) -> None:
+        self.noted.append(("scene", snapshot.ticket, time.perf_counter()))
+
+    def show_panel(self, snapshot: Snapshot) -> None:
+        self.noted.append(("panel", snapshot.ticket, time.perf_counter()))
+
+    def of(self, ticket: int) -> list[tuple[str, float]]:
+        """Return what was shown of the snapshot with ``ticket``."""
+        return [(what, t) for what, number, t in [*self.noted] if number == ticket]
+
+
+@pytest.fixture
+def publisher(session: Session) -> StatePublisher:
+    return StatePublisher(Snapshot(session.begin(session.ready, 0.0, 0.0), 0), LoopTiming(0.01))
+
+
+@pytest.fixture
+def view(server: viser.ViserServer, publisher: StatePublisher) -> Iterator[Noting]:
+    view = Noting(server, publisher)
+    view.start()
+    yield view
+    view.stop()
+    assert not view.failed.is_set()
+
+
+def wait_for(view: Noting, ticket: int, count: int) -> list[tuple[str, float]]:
+    end = time.monotonic() + 10.0
+    while len(view.of(ticket)) < count and time.monotonic() < end:
+        time.sleep(0.005)
+    return view.of(ticket)
+
+
+def test_panel_follows_half_a_frame_after_the_scene(
+    view: Noting, publisher: StatePublisher
+) -> None:
+    time.sleep(2.0 / FRAME_RATE)
+    publisher.publish(Snapshot(publisher.snapshot.state, 1))
+    (scene, shown), (panel, followed), *_ = wait_for(view, 1, 2)
+    assert (scene, panel) == ("scene", "panel")
+    assert followed - shown >= 0.45 / FRAME_RATE
+
+
+def test_command_is_shown_at_once_and_leaves_the_panel_its_turn(
+    view: Noting, publisher: StatePublisher
+) -> None:
+    state = publisher.snapshot.state
+    time.sleep(2.0 / FRAME_RATE)
+    # Faster than frames, as a program streams targets.
+    for ticket in range(1, 41):
+        publisher.publish(Snapshot(state, ticket))
+        time.sleep(0.1 / FRAME_RATE)
+    wait_for(view, 40, 2)
+    shown = {ticket for what, ticket, _ in view.noted if what == "scene"}
+    followed = {ticket for what, ticket, _ in view.noted if what == "panel"}
+    # Each frame that was shown has its panel: commands never keep it back.
+    assert shown == followed
+    assert 40 in shown
+    assert len(shown) > 10
