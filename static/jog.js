@@ -115,7 +115,8 @@ const Jog = (() => {
   let stopHeld = false;
   function gamepad() {
     const found = [...(navigator.getGamepads?.() ?? [])].find((each) => each?.connected);
-    byId("gamepad").textContent = found ? "Gamepad: hold LB or RB" : "No gamepad";
+    const words = found ? "Gamepad: hold LB or RB" : "No gamepad";
+    if (byId("gamepad").textContent !== words) byId("gamepad").textContent = words;
     if (!found) return none();
     const pressed = (n) => found.buttons[n]?.pressed ?? false;
     if (pressed(1) && !stopHeld) stop();

@@ -13,6 +13,8 @@
   const PAST = "katana450.timeline.open";
   const RUMBLE = "katana450.rumble";
   const RUMBLE_RATE = 20; // Hz
+  const TRY_AFTER = 2000; // ms without a drawn scene after which the page checks whether it can be drawn
+  const REST_AFTER = 100; // ms after the first frame in which the rest of the page waits
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
@@ -153,15 +155,27 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  const canDraw = document.createElement("canvas").getContext("webgl2") !== null;
+  let canDraw = true;
+  let seen = false;
+  /** @type {(value?: any) => void} */
+  let free = () => {};
+  // Resolved when the scene is on the screen, or has not come: what can wait takes no time from its drawing.
+  const shown = new Promise((done) => (free = done));
   const drawn = () => {
     if (!canDraw) return;
+    seen = true;
     byId("poster").classList.add("done");
-    takeHold();
     if (past) showTimeline(true, past);
     past = null;
+    requestAnimationFrame(() => setTimeout(free, REST_AFTER));
+    shown.then(takeHold);
   };
-  if (!canDraw) {
+  setTimeout(tryDrawing, TRY_AFTER);
+  // A second context for drawing takes time, so it is made only if nothing was drawn.
+  function tryDrawing() {
+    if (!seen) canDraw = document.createElement("canvas").getContext("webgl2") !== null;
+    free();
+    if (canDraw) return;
     byId("poster").classList.add("failed");
     byId("poster").querySelector("p").textContent =
       "This browser cannot draw the scene: WebGL 2 is off or missing. Turn on hardware acceleration in its settings, or use another browser. STOP and Jog work without it.";
@@ -437,6 +451,7 @@
   let episodes = null;
   window.addEventListener("status", async ({ detail }) => {
     if (!episodes && !detail.episodes) return;
+    await shown;
     const { Episodes } = await import("./episodes/episodes.js");
     episodes ??= new Episodes(byId("stage"), { page, toast });
     episodes.draw(status);
@@ -555,7 +570,7 @@
     const moment = new URLSearchParams(location.search).get("moment");
     if (moment || kept?.getItem(PAST) === "yes") past = (there) => moment && there.goTo(moment);
     window.addEventListener("status", ({ detail }) => {
-      if (canDraw && detail.role !== "viewer" && !kept?.getItem(WELCOMED)) showWelcome();
+      shown.then(() => canDraw && detail.role !== "viewer" && !kept?.getItem(WELCOMED) && showWelcome());
     }, { once: true });
   });
 })();
