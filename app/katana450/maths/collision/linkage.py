@@ -6,9 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
+
+ALONG = 1e-9
+"""[1] Sine of an angle up to which an axis has a direction."""
 
 GROUND = 0
 """Index of the group that stands still: the root link and all that is fixed to it."""
@@ -93,6 +97,20 @@ class Linkage:
         ``change``: (k,) difference of two places x; sliding joints count with 1 rad per metre.
         """
         return float((self.carries @ np.abs(self.factor * change[self.variable])).max())
+
+    def turning_about(self, direction: FloatArray) -> npt.NDArray[np.int64]:
+        """Return for each group (m,) the first group on the way to it from the ground.
+
+        It is GROUND if that group does not turn about ``direction`` (3,), a unit vector.
+        """
+        T = self.poses(np.zeros(int(self.variable.max()) + 1))
+        axes = np.einsum("mij,mj->mi", T[:, :3, :3], self.axis)
+        turns = np.linalg.norm(np.cross(axes, direction), axis=1) <= ALONG
+        turns[[GROUND, *self.sliding]] = False
+        first = np.zeros(self.count, dtype=np.int64)
+        for group, parent in enumerate(self.parent.tolist()):
+            first[group] = first[parent] if parent != GROUND else group * turns[group]
+        return first
 
     def variables_between(self, a: int, b: int) -> frozenset[int]:
         """Return the indices of x that change the pose of group ``b`` relative to group ``a``."""

@@ -17,6 +17,9 @@ HALF_SPACE_RADIUS = 1e6
 its pole the error is less than a micrometre.
 """
 
+PLANE = b"half-space"
+"""The mark of every half-space."""
+
 FLAT = 1e-6
 """Points that deviate less than this [m] from a plane have no volume."""
 
@@ -111,7 +114,7 @@ def half_space() -> CollisionShape:
         HALF_SPACE_RADIUS,
         frozen(-far),
         frozen(far * (1.0, 1.0, 0.0)),
-        b"half-space",
+        PLANE,
     )
 
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.engine import engine
 from katana450.maths.collision.linkage import GROUND, Linkage
-from katana450.maths.collision.shape import CollisionShape
+from katana450.maths.collision.shape import PLANE, CollisionShape
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 IndexArray = npt.NDArray[np.int64]
@@ -144,8 +144,23 @@ class CollisionWorld:
         self.axes = directions.reshape(linkage.count, -1)
         self._carries = linkage.carries[self.mover_of].astype(np.float64)
         self._stays = (~linkage.carries).T.astype(np.float64)
-        self._second_seen = self.second * linkage.count + self.mover_of[self.first]
-        self._first_seen = self.first * linkage.count + self.mover_of[self.second]
+        self._planes = [body for body, shape in enumerate(shapes) if shape.mark == PLANE]
+        self._second_seen = self.second * linkage.count + self._seen(self.first, self.second)
+        self._first_seen = self.first * linkage.count + self._seen(self.second, self.first)
+
+    def _seen(self, bodies: IndexArray, others: IndexArray) -> IndexArray:
+        """Return the group (p,) that each of ``bodies`` (p,) moves with, as ``others`` see it.
+
+        It is its own. But a turn about the normal of a plane leaves the plane as it is, so a plane
+        at rest counts as turned by the first joint of an arm that stands on it: this joint moves no
+        part towards the table.
+        """
+        groups = self.mover_of[bodies]
+        for body in self._planes:
+            turning = self.linkage.turning_about(self.T_mover_body[body, :3, 2])
+            found = turning[self.mover_of[others]]
+            groups = np.where((bodies == body) & (groups == GROUND), found, groups)
+        return groups
 
     @cached_property
     def _closest(self) -> FloatArray:
@@ -314,10 +329,6 @@ class PlacedWorld:
         bounds = np.maximum(self._apart[pairs], away.reshape(2, -1).max(axis=0))
         near = bounds < (limit[pairs] if isinstance(limit, np.ndarray) else limit)
         return pairs[near], bounds[near]
-
-    def distances(self, pairs: IndexArray) -> FloatArray:
-        """Return the distances (k,) [m] of ``pairs`` (k,), as ``distance``."""
-        return np.array([self.distance(pair) for pair in pairs.tolist()])
 
     def distance(self, pair: int) -> float:
         """Return the distance between the bodies of a pair [m]; a negative value is their depth."""
