@@ -78,6 +78,18 @@ class BranchSolver:
         q = found[self.names.index(branch)]
         return near_turns(solver.chain, q, near) if np.isfinite(q).all() else None
 
+    def at_its_swivel(self, T: FloatArray, branch: str, near: FloatArray) -> FloatArray:
+        """Return the joint angles (N, 7) [rad] of ``branch`` for poses `T` (N, 4, 4).
+
+        The swivel is that of ``near`` (7,). The postures may miss the poses and be beyond the
+        limits; angles are not numbers where the branch has none.
+        """
+        solver = self.solver
+        assert isinstance(solver, SevenAxes)
+        swivels = np.full(len(T), near[solver.swivel])
+        found: FloatArray = solver.at_swivels(T, swivels)[:, self.names.index(branch)]
+        return found
+
 
 def near_turns(chain: Chain, q: FloatArray, near: FloatArray) -> FloatArray:
     """Return `q` (n,) [rad], each angle in the turn nearest to ``near`` inside its limits."""

@@ -7,7 +7,7 @@ branch as constraints: the arm slides along what it meets. The priority sets the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -159,29 +159,48 @@ class Descent:
         slope, effort = None, 0
         if now.least < NEAR:
             slope, effort = self._slope(now), EFFORT_OF_SLOPE
-        dq = self._direction(now, weights, slope)
-        largest = float(np.abs(dq).max())
-        if largest <= REACHED:
-            return None, effort
-        fraction = min(1.0, HOP / largest)
-        for tries in range(1, HALVINGS + 1):
-            then = self.look(goal, self._moved(now.q, fraction * dq))
-            if float(weights @ then.error**2) < cost and self.regularity.allows(
-                now.least, now.matrix, then.least, then.matrix
-            ):
-                return then, effort + tries
-            fraction *= 0.5
-        return None, effort + HALVINGS
+        held: list[int] = []
+        while True:
+            dq = self._direction(now, weights, slope, held)
+            largest = float(np.abs(dq).max())
+            if largest <= REACHED:
+                return None, effort
+            fraction = min(1.0, HOP / largest)
+            for tries in range(1, HALVINGS + 1):
+                then = self.look(goal, self._moved(now.q, fraction * dq))
+                if float(weights @ then.error**2) < cost and self.regularity.allows(
+                    now.least, now.matrix, then.least, then.matrix
+                ):
+                    return then, effort + tries
+                fraction *= 0.5
+            effort += HALVINGS
+            # A joint that its limit cut short spoils the step of the others.
+            cut = [k for k in self._beyond(now.q, 2.0 * fraction * dq) if k not in held]
+            if not cut:
+                return None, effort
+            held += cut
+
+    def _beyond(self, q: Angles, dq: FloatArray) -> list[int]:
+        lower, upper = self._ends
+        moves = enumerate(zip(q, dq.tolist(), lower, upper, strict=True))
+        return [k for k, (x, d, a, b) in moves if not a <= x + d <= b]
 
     def _moved(self, q: Angles, dq: FloatArray) -> Angles:
         lower, upper = self._ends
         moves = zip(q, dq.tolist(), lower, upper, strict=True)
         return tuple(min(max(x + d, a), b) for x, d, a, b in moves)
 
-    def _direction(self, now: Look, weights: FloatArray, slope: FloatArray | None) -> FloatArray:
+    def _direction(
+        self,
+        now: Look,
+        weights: FloatArray,
+        slope: FloatArray | None,
+        held: Sequence[int] = (),
+    ) -> FloatArray:
         """Return the step (n,) [rad] of least weighted error.
 
         ``slope`` (n,): how the smallest singular value rises, which must not fall below WALL.
+        ``held``: joints that do not move.
         """
         n = len(now.q)
         lower, upper = self._ends
@@ -192,7 +211,7 @@ class Descent:
             left = math.sqrt(float(weights @ now.error**2) / float(weights.max()))
             part_of_way = CENTRING * min(1.0, left / CENTRED)
             b = b + DAMPING * part_of_way * (self._middle - np.array(now.q))
-        free = list(range(n))
+        free = [k for k in range(n) if k not in held]
         dq = np.zeros(n)
         while free:
             dq = np.zeros(n)
@@ -228,8 +247,9 @@ class Descent:
             _, moved = self.search.motion(q)
             J = np.array(moved).T
             J[3:] /= self.search.length
-            found.append((self.regularity.least(self.regularity.matrix(J)) - now.least) / PROBE)
-        return np.array(found)
+            found.append(self.regularity.matrix(J))
+        least = np.linalg.svd(np.array(found), compute_uv=False)[:, -1]
+        return np.asarray((least - now.least) / PROBE)
 
 
 def _turned_with_axis_1(goal: tuple[float, ...], angle: float) -> tuple[float, ...]:

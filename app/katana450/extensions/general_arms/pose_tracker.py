@@ -1,7 +1,9 @@
 """Following a dragged pose: the goal moves on from its present posture along the path of the drag.
 
 Six axes with a closed form take the posture of their branch at each place of the path, if it is a
-hop away. At limits, out of reach, and for all other arms, `Descent` leads the goal on.
+hop away. At limits, out of reach, and for all other arms, `Descent` leads the goal on. Its steps
+can turn the swivel of seven axes to the edge of the branch; a way that leads on with the swivel as
+it was is then taken.
 The goal stays on its branch and never leaps; a pose that only a leap would reach is reported.
 """
 
@@ -16,10 +18,11 @@ import numpy as np
 from katana450 import tolerances
 from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.descent import Angles, Descent
-from katana450.extensions.general_arms.regularity import WALL
+from katana450.extensions.general_arms.regularity import NEAR, WALL
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tracker import DRAG_STRIDE, HOP, MAX_PATH_LENGTH, MIN_LEAP_GAIN
 
@@ -34,6 +37,9 @@ EFFORT_OF_FORM: Final = 2
 
 LEAST_PART: Final = 1.0 / 32.0
 """[1] Smallest part of a stride that the closed form is asked for."""
+
+PLACES: Final = 24
+"""Number of places of a stride to which a branch of seven axes is followed with its swivel."""
 
 EXACT: Final = 1e-8
 """[rad], [arm lengths] Error of the pose up to which a closed form's posture takes it."""
@@ -76,7 +82,11 @@ class PoseTracker:
         count = max(1, math.ceil(min(max(distance / DRAG_STRIDE, angle / HOP), MAX_PATH_LENGTH)))
         for number in range(1, count + 1):
             stop = target if number == count else since.towards(target, number / count)
+            before = here
             here, effort, ended = self._advanced(here, place, stop, branch, priority, effort)
+            if number == 1 and not ended and self._is_led_along_edge(here, stop, priority):
+                kept = self._with_its_swivel(before, stop, branch)
+                here, ended = (here, False) if kept is None else (kept, True)
             if not ended or (effort <= 0 and number < count):
                 return Pursued(np.array(here), since=stop if ended else place)
             place = stop
@@ -109,9 +119,41 @@ class PoseTracker:
             return q, effort, True
         goal = self.descent.goal(stop)
         end = self.descent.run(goal, q, priority, max(effort, MIN_EFFORT))
+        effort -= end.effort
         if self.descent.look(goal, q).least < WALL and self._leaves(end.q, branch):
-            return q, effort - end.effort, True
-        return end.q, effort - end.effort, end.ended
+            return q, effort, True
+        return end.q, effort, end.ended
+
+    def _is_led_along_edge(self, q: Angles, stop: ToolPose, priority: Priority) -> bool:
+        """Return whether steps of seven axes towards ``stop`` ended at the edge of the branch."""
+        if self.branches.swivel is None or priority is not Priority.POSE:
+            return False
+        now = self.descent.look(self.descent.goal(stop), q)
+        return now.least < NEAR and float(np.abs(now.error).max()) > EXACT
+
+    def _with_its_swivel(self, q: Angles, stop: ToolPose, branch: str) -> Angles | None:
+        """Return the posture of ``branch`` at ``stop`` with the swivel of `q`; None without a way.
+
+        On the way every posture is inside the limits, clear of the edge, and a hop from the last.
+        """
+        here = np.array(q)
+        if not self._takes(stop, self.branches.at_its_swivel(stop.T[None], branch, here)[0]):
+            return None
+        start = ToolPose.of(forward(self.chain, here))
+        places = [*(start.towards(stop, k / PLACES) for k in range(1, PLACES)), stop]
+        found = self.branches.at_its_swivel(np.array([each.T for each in places]), branch, here)
+        steps = np.diff(found, axis=0, prepend=here[None])
+        steps -= math.tau * np.round(steps / math.tau)
+        postures = here + np.cumsum(steps, axis=0)
+        leads = np.abs(steps).max() <= HOP and all(map(self._takes, places, postures))
+        return tuple(self.chain.clamp(postures[-1]).tolist()) if leads else None
+
+    def _takes(self, place: ToolPose, q: FloatArray) -> bool:
+        """Return whether `q` (n,) takes the pose inside the limits, clear of the edge."""
+        if not (np.isfinite(q).all() and self.chain.within_limits(q)):
+            return False
+        now = self.descent.look(self.descent.goal(place), tuple(q.tolist()))
+        return now.least >= WALL and float(np.abs(now.error).max()) <= EXACT
 
     def _leaves(self, q: Angles, branch: str) -> bool:
         return self.branches.branch_of(np.array(q)) != branch

@@ -12,6 +12,7 @@ norm of the change of the matrix. A step that changes it by less never passes a 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -36,10 +37,14 @@ class Regularity:
     n: int
     swivel: int | None = None
 
+    @cached_property
+    def _others(self) -> list[int]:
+        return [k for k in range(self.n) if k != self.swivel]
+
     def matrix(self, J: FloatArray) -> FloatArray:
         """Return the matrix for the Jacobian `J` (6, n), whose translations are over a length."""
         if self.swivel is not None:
-            return np.delete(J, self.swivel, axis=1)
+            return J.take(self._others, axis=-1)
         if self.n >= 6:
             return J
         turns = J[:3, min(3, self.n) :]
