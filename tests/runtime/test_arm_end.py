@@ -241,7 +241,7 @@ def test_front_end_notices_a_closed_arm_end(ends: Ends) -> None:
 
 
 def test_loop_timing_is_reported_periodically(ends: Ends) -> None:
-    until(lambda: ends.front.state_publisher.loop_timing.count > 50)
+    until(lambda: ends.front.state_publisher.loop_timing.ticks > 50)
     assert ends.front.state_publisher.loop_timing.period == 0.01
 
 

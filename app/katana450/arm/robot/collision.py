@@ -127,8 +127,7 @@ def hand_of(robot: Robot, world: CollisionWorld) -> Hand:
     T_base_palm = world.linkage.poses(np.zeros(arm.chain.n + 1))[palm]
     T_palm_tool = se3.inverse(T_base_palm) @ arm.T_base_shoulder @ arm.chain.M
     names = tuple(part.name for part in fingers)
-    sides = tuple((name,) for name in names)
-    return Hand(palm, names, frozen(T_palm_tool), arm.gripper, sides)
+    return Hand(palm, names, frozen(T_palm_tool), arm.gripper, tuple((name,) for name in names))
 
 
 def _drive(robot: Robot, joint: Joint) -> tuple[int, float, float] | None:

@@ -17,16 +17,17 @@ class LoopTiming:
 
     Attributes:
         period: period of the loop [s].
-        count: number of ticks that are measured.
-        p50, p99, maximum: quantiles and maximum of their lateness [s]; a tick is never early.
+        ticks: number of ticks that are measured.
+        late_p50, late_p99, late_max: quantiles and maximum of their lateness [s]; a tick is never
+            early.
         lost: number of ticks since the start that were more than a whole period late.
     """
 
     period: float
-    count: int = 0
-    p50: float = 0.0
-    p99: float = 0.0
-    maximum: float = 0.0
+    ticks: int = 0
+    late_p50: float = 0.0
+    late_p99: float = 0.0
+    late_max: float = 0.0
     lost: int = 0
 
 
@@ -51,5 +52,4 @@ class Punctuality:
         if late.size == 0:
             return LoopTiming(self._period)
         p50, p99 = np.quantile(late, (0.5, 0.99)).tolist()
-        maximum = float(late.max())
-        return LoopTiming(self._period, late.size, p50, p99, maximum, self._lost)
+        return LoopTiming(self._period, late.size, p50, p99, float(late.max()), self._lost)

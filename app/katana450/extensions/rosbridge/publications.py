@@ -163,12 +163,12 @@ def _arm_status(now: answers.State) -> DiagnosticStatus:
 
 def _loop_status(arm: ArmHandle) -> DiagnosticStatus:
     timing = arm.loop_timing
-    late = timing.p99 > timing.period
+    late = timing.late_p99 > timing.period
     message = "1 % of the ticks are more than a period late." if late else "ok"
     values = {
         "period [ms]": f"{1e3 * timing.period:.1f}",
-        "delay, median [ms]": f"{1e3 * timing.p50:.2f}",
-        "delay, 99th percentile [ms]": f"{1e3 * timing.p99:.2f}",
+        "delay, median [ms]": f"{1e3 * timing.late_p50:.2f}",
+        "delay, 99th percentile [ms]": f"{1e3 * timing.late_p99:.2f}",
         "ticks lost": str(timing.lost),
     }
     return _status("katana450: control loop", WARN if late else OK, message, values)

@@ -216,12 +216,8 @@ class CollisionWorld:
         names = [self.parts[number].name for number in self.part_of.tolist()]
         placed, wanted = self.at(x), {frozenset((one, other)) for other in others}
         pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
-        gaps = [
-            placed.distance(pair)
-            for pair, (a, b) in enumerate(pairs)
-            if {names[a], names[b]} in wanted
-        ]
-        return min(gaps, default=np.inf)
+        found = (pair for pair, (a, b) in enumerate(pairs) if {names[a], names[b]} in wanted)
+        return min(map(placed.distance, found), default=np.inf)
 
     @cached_property
     def fingerprint(self) -> Fingerprint:

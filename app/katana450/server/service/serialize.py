@@ -330,9 +330,7 @@ def objects(arm: ArmHandle) -> answers.Objects:
                 held=each.held,
                 mesh=None if each.solid is None else each.solid.key,
                 scale=each.scale,
-                colour=None
-                if each.appearance.colour is None
-                else hexadecimal(each.appearance.colour),
+                colour=each.appearance.colour and hexadecimal(each.appearance.colour),
                 opacity=each.appearance.opacity,
                 hidden=each.appearance.hidden,
                 fixed=each.fixed,
@@ -350,11 +348,4 @@ def hexadecimal(colour: Colour) -> str:
 
 def loop(loop_timing: LoopTiming) -> answers.Loop:
     """Return the timing of the control loop as an answer."""
-    return answers.Loop(
-        period=loop_timing.period,
-        ticks=loop_timing.count,
-        late_p50=loop_timing.p50,
-        late_p99=loop_timing.p99,
-        late_max=loop_timing.maximum,
-        lost=loop_timing.lost,
-    )
+    return msgspec.convert(loop_timing, answers.Loop, from_attributes=True)

@@ -31,7 +31,7 @@ from katana450.server.view.panel_folder import PanelFolder
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
-from katana450.server.view.scene_tab import SceneTab
+from katana450.server.view.scene_tab import add_scene_tab
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.tint import Tint
 from katana450.server.view.view_updater import ViewUpdater
@@ -133,7 +133,7 @@ class View(ViewUpdater):
             self._panel = Panel(server, robot, gestures, session.choices, state)
         self._folders = tuple(view_options.folders(tabs))
         with tabs.tab(SCENE):
-            self._scene_tab = SceneTab(server.gui, gestures, shows)
+            self._log_problem = add_scene_tab(server.gui, gestures, shows)
         # At the end of the panel, because the element takes an empty line.
         server.gui.add_html(style())
         self.show(state_publisher.snapshot)
@@ -158,7 +158,7 @@ class View(ViewUpdater):
         with self._server.atomic():
             caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(snapshot.state, time.perf_counter(), caught_up=caught_up)
-            self._scene_tab.follow()
+            self._log_problem.follow()
             for folder in self._folders:
                 folder.follow()
 
