@@ -176,14 +176,15 @@ def test_kept_plan_begins_at_once(arm: Client) -> None:
 
 
 def test_moved_arm_needs_a_new_plan(arm: Client) -> None:
-    send(arm, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
+    # Planning it takes much longer than the next question.
+    send(arm, LONG + "# moved\n")
     wait(arm, lambda state: status(state) == "ready")
     arm.joints([0.1, -1.1, 1.4, 0.3, 0.0])
     arm.ask(Steer(order=ProgramOrder.RUN))
     program = arm.query(answers.State).program
     assert program is not None
     assert (program.status, program.why) == ("planning", "Planned again: the arm has moved.")
-    wait(arm, lambda state: status(state) == "done")
+    wait(arm, lambda state: state.moving)
 
 
 def test_owner_paces_the_program_and_others_only_stop_it(server: AppServer, arm: Client) -> None:
