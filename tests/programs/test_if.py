@@ -289,7 +289,7 @@ def test_missed_object_is_grasped_again(stage: Stage, empty: State) -> None:
         while run.phase is Phase.RUNNING and state.t < 60.0:
             name = program.tasks[run.number].name
             run, commands = runner.step(program, run, state, state.t)
-            if missed and name != last == "open" and run.choices:
+            if missed and name != last == "grasp cup: open" and run.choices:
                 commands = (cmd.PlaceObject(cup), *commands)
             elif missed and not run.choices and name != last and name == "grasp cup: close":
                 commands = (away, *commands)

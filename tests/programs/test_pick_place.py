@@ -17,6 +17,7 @@ from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.server.step_list import steps_of
 from katana450.extensions.programs.source import ScriptError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.planning.plan import MARGIN
@@ -229,7 +230,8 @@ def test_arm_that_reaches_over_its_shoulder_grasps_from_home(stage: Stage) -> No
     script = parse("frame: base\nsteps:\n  - grasp: {object: box, side: front}\n")
     program = compiled(script, stage.plan_context, start)
     names = [task.name for task in program.tasks]
-    opened = names.index("open")
+    assert [step.name for step in steps_of(program)] == ["grasp box"]
+    opened = names.index("grasp box: open")
     assert names[opened + 1 : opened + 3] == ["grasp box: home", "grasp box: approach"]
     begun = compiled(script, stage.plan_context, replace(stage.begin(), objects=start.objects))
     assert "grasp box: home" not in [task.name for task in begun.tasks]

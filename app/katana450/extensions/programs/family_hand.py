@@ -11,8 +11,8 @@ import numpy as np
 
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
-from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, YAW_TOLERANCE, Approach
-from katana450.extensions.programs.fitting import JAW_ROOM, fitting, widths
+from katana450.extensions.programs.approach import FRONT, Approach
+from katana450.extensions.programs.fitting import JAW_ROOM, fitting, widths, with_pitch
 from katana450.extensions.programs.five_axis_hand import (
     MAX_SKEW,
     PITCHES,
@@ -84,8 +84,7 @@ class FamilyHand(FiveAxisHand):
         self, pitch: float, scene_object: SceneObject, at: FloatArray, side: FloatArray
     ) -> Sequence[Approach]:
         """Return the approaches with ``pitch``."""
-        found = self._fitting((pitch,), scene_object, at, side)
-        return found.get(ABOVE if abs(pitch - DOWN) <= YAW_TOLERANCE else FRONT, ())
+        return with_pitch(self._fitting((pitch,), scene_object, at, side), pitch)
 
     def _fitting(
         self, pitches: Sequence[float], scene_object: SceneObject, at: FloatArray, side: FloatArray

@@ -126,10 +126,13 @@ class Grasp:
         if hand.tool and builder.state.tool != hand.tool:
             builder.plan_context.arm.chain_to(hand.tool)
             builder.note(
-                f"tool {hand.tool}", UseTool(hand.tool), replace(builder.state, tool=hand.tool)
+                f"grasp {self.name}: tool {hand.tool}",
+                UseTool(hand.tool),
+                replace(builder.state, tool=hand.tool),
             )
         opened = builder.plan_context.arm.gripper.opened
-        builder.note("open", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
+        after = builder.after(cmd.SetGripper(opened))
+        builder.note(f"grasp {self.name}: open", MoveFingers(opened), after)
         branch_of, ready = builder.plan_context.arm.kinematics.branch_of, builder.plan_context.ready
         # Pitches of a grasp are those of the posture at Home; an arm that reaches over its shoulder
         # would take the object with the hand upside down.

@@ -12,15 +12,8 @@ import numpy as np
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
-from katana450.extensions.programs.approach import (
-    ABOVE,
-    DOWN,
-    FRONT,
-    YAW_TOLERANCE,
-    Approach,
-    symmetry,
-)
-from katana450.extensions.programs.fitting import JAW_ROOM, fitting, widths
+from katana450.extensions.programs.approach import Approach, symmetry
+from katana450.extensions.programs.fitting import JAW_ROOM, fitting, widths, with_pitch
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -80,8 +73,7 @@ class PoseHand:
         self, pitch: float, scene_object: SceneObject, at: FloatArray, side: FloatArray
     ) -> Sequence[Approach]:
         """Return the approaches with ``pitch``."""
-        found = self._fitting((pitch,), scene_object, at, side)
-        return found.get(ABOVE if abs(pitch - DOWN) <= YAW_TOLERANCE else FRONT, ())
+        return with_pitch(self._fitting((pitch,), scene_object, at, side), pitch)
 
     def _fitting(
         self,
