@@ -137,12 +137,14 @@ class AppServer:
 
     def child(self, name: str) -> int:
         """Return the id of the child process ``name``. Raises ServerError if there is none."""
-        found = [
-            int(child)
-            for children in Path(f"/proc/{self.pid}/task").glob("*/children")
-            for child in children.read_text().split()
-            if Path(f"/proc/{child}/comm").read_text().strip() == name
-        ]
+        found = []
+        # The lists of children in /proc may lack one while another process ends.
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                stat = (process / "stat").read_text()
+                comm, _, rest = stat.partition("(")[2].rpartition(") ")
+                if comm == name and int(rest.split()[1]) == self.pid:
+                    found.append(int(process.name))
         if len(found) != 1:
             raise ServerError(f"{self._name} has {len(found)} processes {name!r}")
         return found[0]

@@ -228,7 +228,7 @@ def program(person: Person) -> None:
     person.press(page.frame.get_by_role("button", name="Preview", exact=True))
 
     def status() -> Any:
-        return (truth.status()["program"] or {}).get("status")
+        return truth.status().get("program", {}).get("status")
 
     page.wait_until(lambda: status() == "ready", "the plan", seconds=PLANNED)
     person.keep("previewed")

@@ -43,7 +43,7 @@ def server(tmp_path: Path) -> Iterator[AppServer]:
 
 
 def progress(truth: Truth) -> Any:
-    return truth.status()["program"] or {"status": "", "why": ""}
+    return truth.status().get("program", {"status": "", "why": ""})
 
 
 def wait(page: ViserPage, truth: Truth, status: str, seconds: float = PLANNED) -> None:
