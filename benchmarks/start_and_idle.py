@@ -14,13 +14,14 @@ from __future__ import annotations
 import argparse
 import asyncio
 import compileall
+import json
 import re
 import socket
 import statistics
 import time
 import urllib.request
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
 from pathlib import Path
@@ -48,18 +49,30 @@ APPS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
 }
 
 
+class Page(NamedTuple):
+    """Times of a page [s].
+
+    Attributes:
+        usable: until the pixels of the first frame that shows arm and gizmo are there.
+        complete: until the panel and hidden nodes are there too.
+    """
+
+    usable: float
+    complete: float
+
+
 class Times(NamedTuple):
     """Times in seconds.
 
     Attributes:
         port: from the command to the open port.
-        usable: from the command to a usable page.
-        load: of a page load when the server runs.
+        start: of the page from the command on.
+        load: of a page that is loaded when the server runs.
     """
 
     port: float
-    usable: float
-    load: float
+    start: Page
+    load: Page
 
 
 def cpu_seconds(pids: Sequence[int]) -> float:
@@ -119,15 +132,16 @@ def wait_for_port(port: int) -> None:
     raise TimeoutError(f"no server listened on port {port} for {OPEN_SECONDS:g} s")
 
 
-class SeenPage(ViserPage):
-    """A page that is ready when arm and gizmo are drawn; the panel may follow."""
-
-    waits_for_panel = False
-
-
-def opened(browser: Browser, url: str, nodes: Sequence[str]) -> ViserPage:
-    """Return a page in which arm and gizmo are drawn."""
-    return SeenPage.open(browser, url, nodes=nodes, drawing=Drawing.ALWAYS)
+def load(browser: Browser, url: str, nodes: Sequence[str], began: float) -> tuple[ViserPage, Page]:
+    """Return a page in which everything is drawn, and its times since ``began`` (`time.time()`)."""
+    watch = f"window.whole = harness.firstWhole({json.dumps(nodes)})"
+    script = f"""addEventListener("DOMContentLoaded", () => {{
+        if (!document.querySelector("iframe#scene")) {watch};
+    }});"""
+    page = ViserPage.open(browser, url, nodes=nodes, drawing=Drawing.ALWAYS, script=script)
+    complete = time.time()
+    usable: float = page.frame.evaluate("() => window.whole")
+    return page, Page(usable - began, complete - began)
 
 
 def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | None]:
@@ -138,17 +152,15 @@ def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | N
     command, nodes = APPS[app]
     server = AppServer(command)
     with ThreadPoolExecutor(1) as starter, closing(server):
-        started = time.perf_counter()
+        started = time.time()
         starting = starter.submit(server.start)
         wait_for_port(server.port)
-        port = time.perf_counter() - started
-        page = opened(browser, server.url, nodes)
-        usable = time.perf_counter() - started
+        port = time.time() - started
+        page, start = load(browser, server.url, nodes, started)
         starting.result()
         page.close()
-        began = time.perf_counter()
-        page = opened(browser, server.url, nodes)
-        times = Times(port, usable, time.perf_counter() - began)
+        page, again = load(browser, server.url, nodes, time.time())
+        times = Times(port, start, again)
         fraction = None
         if idle:
             time.sleep(SETTLE_SECONDS)
@@ -185,17 +197,33 @@ def main() -> None:
                 taken, fractions[app] = one_start(browser, app, options.idle if last else 0.0)
                 times[app].append(taken)
                 print(
-                    f"{app:5} port {taken.port:.2f} s  usable {taken.usable:.2f} s  "
-                    f"loaded again {taken.load:.2f} s",
+                    f"{app:5} port {taken.port:.2f} s  usable {taken.start.usable:.2f} s  "
+                    f"complete {taken.start.complete:.2f} s  loaded again: usable "
+                    f"{taken.load.usable:.2f} s  complete {taken.load.complete:.2f} s",
                     flush=True,
                 )
-    for app, all_taken in times.items():
-        port = statistics.median(each.port for each in all_taken)
-        usable = statistics.median(each.usable for each in all_taken)
-        load = statistics.median(each.load for each in all_taken)
-        print(f"{app:5} median: port {port:.2f} s, usable page {usable:.2f} s", end="")
-        print(f", loaded again {load:.2f} s", end="")
-        print(f", at rest {100.0 * (fractions[app] or 0.0):.1f} % of a core")
+    table(times)
+    for app, fraction in fractions.items():
+        print(f"{app}, at rest: {100.0 * (fraction or 0.0):.1f} % of a core")
+
+
+ROWS: dict[str, Callable[[Times], float]] = {
+    "port open": lambda each: each.port,
+    "page usable: arm and gizmo drawn": lambda each: each.start.usable,
+    "page complete: with its panel": lambda each: each.start.complete,
+    "usable, loaded from a running server": lambda each: each.load.usable,
+    "complete, loaded from a running server": lambda each: each.load.complete,
+}
+
+
+def table(times: Mapping[str, Sequence[Times]]) -> None:
+    """Print the medians, and the median ratio of the pairs."""
+    print("| median, s | app | bare app | ratio of pairs |\n|---|--:|--:|--:|")
+    for name, value in ROWS.items():
+        app, bare = (list(map(value, times[each])) for each in ("app", "bare"))
+        ratio = statistics.median(a / b for a, b in zip(app, bare, strict=True))
+        print(f"| {name} | {statistics.median(app):.2f} | {statistics.median(bare):.2f} |", end="")
+        print(f" {ratio:.2f} |")
 
 
 if __name__ == "__main__":

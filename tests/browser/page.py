@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal, Self
 
 import imageio.v3 as imageio
 import numpy as np
@@ -45,9 +45,6 @@ class ViserPage:
     ``page`` is the window and ``frame`` the document of viser. Nodes have their names in viser's
     scene. Poses are 4x4 matrices in metres; pixels are relative to the window's top left corner.
     """
-
-    waits_for_panel: ClassVar[bool] = True
-    """Whether a page is ready only when it has the panel and the hidden nodes too."""
 
     def __init__(self, page: Page, frame: Frame, errors: list[str]) -> None:
         self.page = page
@@ -125,12 +122,11 @@ class ViserPage:
                 + "".join(f"\n  console: {error}" for error in self.errors)
             )
             self.page.wait_for_timeout(POLL_MILLISECONDS)
-        if self.waits_for_panel:
-            self.wait_until(
-                lambda: self.frame.evaluate("() => harness.replayed()"),
-                "the end of the scene",
-                seconds=seconds,
-            )
+        self.wait_until(
+            lambda: self.frame.evaluate("() => harness.replayed()"),
+            "the end of the scene",
+            seconds=seconds,
+        )
         self.wait_drawn()
 
     def wait_drawn(self) -> None:

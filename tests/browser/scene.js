@@ -34,6 +34,29 @@
     return harness.received.some(({ type, time }) => type === "ReplayDoneMessage" && time >= since);
   };
 
+  // Resolve with the time of the first frame that shows the whole scene with these nodes, when its pixels are there.
+  harness.firstWhole = (names) =>
+    new Promise((resolve) => {
+      (function watch() {
+        if (!viewer()?.scene) return requestAnimationFrame(watch);
+        const { scene } = viewer();
+        let whole = false;
+        const [before, after] = [scene.onBeforeRender, scene.onAfterRender];
+        scene.onBeforeRender = function (...args) {
+          before.apply(this, args);
+          whole = renderer().gl.getRenderTarget() === null && !harness.missing(names).length;
+        };
+        scene.onAfterRender = function (gl, ...args) {
+          after.call(this, gl, ...args);
+          if (!whole) return;
+          [scene.onBeforeRender, scene.onAfterRender] = [before, after];
+          const context = gl.getContext();
+          context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));
+          resolve(harness.now());
+        };
+      })();
+    });
+
   // Resolve after one more frame, in which all messages that have come are handled.
   harness.drawn = () =>
     new Promise((resolve, reject) => {
