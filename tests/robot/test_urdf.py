@@ -154,6 +154,25 @@ def test_libraries_are_loaded_when_they_are_needed() -> None:
     assert done.stdout == "[]\n"
 
 
+def test_described_robot_needs_no_engine_until_a_distance_is_measured() -> None:
+    script = (
+        "import sys; from katana450.assembly.robot_session import find_robot;"
+        "from katana450.resources import URDF_PATH; from katana450.settings import Settings;"
+        "session = find_robot(Settings(), URDF_PATH, None).session;"
+        "before = 'coal' in sys.modules; session.choices(session.begin(session.ready, 0.0, 0.0));"
+        "print(before, 'coal' in sys.modules)"
+    )
+    # The first process may have to find the pairs that can meet, and keeps them.
+    first, second = (
+        subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
+        )
+        for _ in range(2)
+    )
+    assert first.stdout.endswith("True\n")
+    assert second.stdout == "False True\n"
+
+
 @pytest.mark.parametrize(
     "part",
     ["<gazebo>" * 300 + "</gazebo>" * 300, f"<gazebo a='{'x' * 11_000_000}'/>"],

@@ -20,7 +20,10 @@ from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
+from katana450.assembly.robot_session import find_robot
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
 
 RATE = 100.0
 
@@ -96,6 +99,15 @@ class BrokenDriver(SimulatedDriver):
         if self.broken:
             raise OSError("the cable came out")
         return super().send(q, gripper, t, stopped)
+
+
+def test_geometries_are_made_before_the_first_tick(arm: ArmModel) -> None:
+    session = find_robot(Settings(), URDF_PATH, None).session
+    assert session.world is not None
+    assert "measured" not in vars(session.world)
+    driver = SimulatedDriver(arm, session.ready, 0.0)
+    ControlLoop(session, driver, Mailbox(session.check), SteppedClock(), RATE)
+    assert len(vars(session.world)["measured"]) == len(session.world.first) > 0
 
 
 def test_failing_driver_makes_the_arm_hold_and_report_it(

@@ -69,6 +69,9 @@ class ControlLoop:
         self.profile = profile
         self.paused_at = -math.inf
         """Time of the newest command with which the arm's process itself brakes the arm [s]."""
+        if session.world is not None:
+            # A tick has no time for it.
+            session.world.load()
         t = clock.now()
         sent = driver.start(t)
         begun = session.begin(sent.q, sent.gripper, t)

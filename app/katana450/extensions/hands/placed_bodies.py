@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -41,31 +42,34 @@ class PlacedBodies:
             for part in parts
             for T_mover_shape, shape in zip(part.T_mover_shape, part.shapes, strict=True)
         ]
-        self._engine = world.engine
-        self._placed: list[tuple[Any, Any]] = [
-            (shape.geometry, world.engine.transform(T_palm_shape)) for shape, T_palm_shape in placed
-        ]
+        self._world, self._bodies = world, placed
         middles = [T[:3, :3] @ shape.centre + T[:3, 3] for shape, T in placed]
         self.middle: FloatArray = np.mean(middles, axis=0) if middles else np.zeros(3)
+
+    @cached_property
+    def _placed(self) -> list[tuple[Any, Any]]:
+        """The bodies as the engine of the world needs them."""
+        transform = self._world.engine.transform
+        return [(shape.geometry, transform(T_palm_shape)) for shape, T_palm_shape in self._bodies]
 
     def reach(self, u: FloatArray) -> float:
         """Return how far the bodies reach along the unit vector `u` (3,) [m]."""
         plane, beyond = self._plane(u), half_space().geometry
         return FAR - min(
-            self._engine.distance(geometry, T, beyond, plane) for geometry, T in self._placed
+            self._world.engine.distance(geometry, T, beyond, plane) for geometry, T in self._placed
         )
 
     def farthest(self, u: FloatArray) -> FloatArray:
         """Return the point (3,) [m] of the bodies that is farthest along the unit vector `u`."""
         plane, beyond = self._plane(u), half_space().geometry
-        found = [self._engine.witness(*placed, beyond, plane) for placed in self._placed]
+        found = [self._world.engine.witness(*placed, beyond, plane) for placed in self._placed]
         return np.asarray(min(found, key=lambda each: each.distance).points[0])
 
     def nearest(self, point: FloatArray) -> Witness:
         """Return the nearest point of the bodies to ``point`` (3,) [m], which comes first."""
         ball = sphere(PROBE).geometry
-        at = self._engine.transform(se3.from_rotation_translation(np.eye(3), point))
-        found = [self._engine.witness(ball, at, *placed) for placed in self._placed]
+        at = self._world.engine.transform(se3.from_rotation_translation(np.eye(3), point))
+        found = [self._world.engine.witness(ball, at, *placed) for placed in self._placed]
         return min(found, key=lambda each: each.distance)
 
     def T_palm_group(self, group: int) -> FloatArray:
@@ -73,7 +77,7 @@ class PlacedBodies:
         return np.asarray(self._T_palm_base @ self._T[group])
 
     def _plane(self, u: FloatArray) -> Any:
-        return self._engine.transform(se3.from_rotation_translation(_with_z(-u), FAR * u))
+        return self._world.engine.transform(se3.from_rotation_translation(_with_z(-u), FAR * u))
 
 
 def _with_z(u: FloatArray) -> FloatArray:

@@ -58,9 +58,15 @@ class Engine(Protocol):
 
 
 @cache
+def library() -> str:
+    """Return the name of the library, which need not be loaded for it."""
+    return "fcl" if find_spec("coal") is None else "coal"
+
+
+@cache
 def engine() -> Engine:
     """Return the engine of this process. Raises ImportError without coal and python-fcl."""
-    if find_spec("coal") is not None:
+    if library() == "coal":
         from katana450.maths.collision.coal_engine import CoalEngine
 
         return CoalEngine()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.maths.collision.engine import engine
+from katana450.maths.collision.engine import Engine, engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 HALF_SPACE_RADIUS = 1e6
@@ -29,18 +31,23 @@ class CollisionShape:
     """A convex body in a frame of its own.
 
     Attributes:
-        geometry: the geometry of the engine.
+        make: returns its geometry in an engine.
         centre, radius: a ball (3,), scalar [m] that contains the body.
         low, high: corners (3,) of a box along the axes that contains the body [m].
         mark: bytes that identify the shape; other shapes have other marks.
     """
 
-    geometry: Any
+    make: Callable[[Engine], Any]
     centre: FloatArray
     radius: float
     low: FloatArray
     high: FloatArray
     mark: bytes
+
+    @cached_property
+    def geometry(self) -> Any:
+        """The geometry of the engine, made on first use: no picture needs it."""
+        return self.make(engine())
 
 
 def hull(points: npt.ArrayLike) -> CollisionShape:
@@ -55,66 +62,49 @@ def hull(points: npt.ArrayLike) -> CollisionShape:
     if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
         raise InputError(f"The hull has no volume: its {len(corners)} points lie in one plane.")
     low, high = corners.min(axis=0), corners.max(axis=0)
-    geometry = engine().hull(corners)
     centre = 0.5 * (low + high)
     radius = float(np.linalg.norm(corners - centre, axis=1).max())
-    return CollisionShape(
-        geometry, frozen(centre), radius, frozen(low), frozen(high), corners.tobytes()
-    )
+    make, mark = (lambda engine: engine.hull(corners)), corners.tobytes()
+    return CollisionShape(make, frozen(centre), radius, frozen(low), frozen(high), mark)
 
 
 def box(size: npt.ArrayLike) -> CollisionShape:
     """Return a box of ``size`` (3,) [m] about its middle."""
     size = _lengths(size, 3, "The size of a box")
-    half = frozen(0.5 * size)
-    return CollisionShape(
-        engine().box(size),
-        frozen(np.zeros(3)),
-        float(np.linalg.norm(half)),
-        -half,
-        half,
-        b"box" + size.tobytes(),
-    )
+    half, mark = frozen(0.5 * size), b"box" + size.tobytes()
+    return _round_middle(lambda engine: engine.box(size), float(np.linalg.norm(half)), half, mark)
 
 
 def cylinder(radius: float, length: float) -> CollisionShape:
     """Return an upright cylinder about its middle; lengths in m."""
     _lengths((radius, length), 2, "Radius and length of a cylinder")
     half = frozen((radius, radius, 0.5 * length))
-    return CollisionShape(
-        engine().cylinder(radius, length),
-        frozen(np.zeros(3)),
-        float(np.hypot(radius, 0.5 * length)),
-        -half,
-        half,
-        b"cylinder" + half.tobytes(),
-    )
+    mark, reach = b"cylinder" + half.tobytes(), float(np.hypot(radius, 0.5 * length))
+    return _round_middle(lambda engine: engine.cylinder(radius, length), reach, half, mark)
 
 
 def sphere(radius: float) -> CollisionShape:
     """Return a ball about its middle; radius in m."""
     _lengths((radius,), 1, "The radius of a sphere")
     half = frozen((radius, radius, radius))
-    return CollisionShape(
-        engine().sphere(radius),
-        frozen(np.zeros(3)),
-        radius,
-        -half,
-        half,
-        b"sphere" + half.tobytes(),
-    )
+    mark = b"sphere" + half.tobytes()
+    return _round_middle(lambda engine: engine.sphere(radius), radius, half, mark)
+
+
+def _round_middle(
+    make: Callable[[Engine], Any], radius: float, half: FloatArray, mark: bytes
+) -> CollisionShape:
+    """Return a shape about its middle; ``half`` (3,) of the size of its box [m]."""
+    return CollisionShape(make, frozen(np.zeros(3)), radius, -half, half, mark)
 
 
 def half_space() -> CollisionShape:
     """Return the half-space z <= 0."""
     far = np.full(3, HALF_SPACE_RADIUS)
+    low, high = frozen(-far), frozen(far * (1.0, 1.0, 0.0))
+    centre = frozen((0.0, 0.0, -HALF_SPACE_RADIUS))
     return CollisionShape(
-        engine().half_space(),
-        frozen((0.0, 0.0, -HALF_SPACE_RADIUS)),
-        HALF_SPACE_RADIUS,
-        frozen(-far),
-        frozen(far * (1.0, 1.0, 0.0)),
-        PLANE,
+        lambda engine: engine.half_space(), centre, HALF_SPACE_RADIUS, low, high, PLANE
     )
 
 

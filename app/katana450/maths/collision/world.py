@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.engine import engine
+from katana450.maths.collision.engine import Engine, engine
 from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.shape import PLANE, CollisionShape
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -88,7 +88,6 @@ class CollisionWorld:
     ) -> None:
         """Build the world; ``pairs`` are indices of parts that may meet, the smaller one first."""
         self.linkage = linkage
-        self.engine = engine()
         self.parts = tuple(parts)
         self.pairs = tuple(pairs)
         self.close = dict(close or {})
@@ -128,12 +127,7 @@ class CollisionWorld:
         for a, b in self.pairs:
             met[a, b] = True
         self.first, self.second = np.nonzero(met[self.part_of[:, None], self.part_of[None, :]])
-        # The arguments of the engine for each pair: both geometries, each with the number of its
-        # frame.
-        self.measured = [
-            (shapes[a].geometry, frame_of[a], shapes[b].geometry, frame_of[b])
-            for a, b in zip(self.first.tolist(), self.second.tolist(), strict=True)
-        ]
+        self._shapes, self._frame_of = shapes, frame_of
         self.apart: FloatArray | None = None
         if len(self.first) <= FEW_PAIRS:
             self.apart = self.spread[self.second] - self.spread[self.first]
@@ -161,6 +155,22 @@ class CollisionWorld:
             found = turning[self.mover_of[others]]
             groups = np.where((bodies == body) & (groups == GROUND), found, groups)
         return groups
+
+    @cached_property
+    def engine(self) -> Engine:
+        """The engine of this process. It is loaded on first use, like the geometries."""
+        return engine()
+
+    @cached_property
+    def measured(self) -> list[tuple[Any, int, Any, int]]:
+        """Both geometries of each pair, each with the number of its frame."""
+        made, frame = [shape.geometry for shape in self._shapes], self._frame_of
+        pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
+        return [(made[a], frame[a], made[b], frame[b]) for a, b in pairs]
+
+    def load(self) -> None:
+        """Make all geometries, for those who must not wait at their first use."""
+        _ = self.engine, self.measured
 
     @cached_property
     def _closest(self) -> FloatArray:
@@ -193,7 +203,7 @@ class CollisionWorld:
 
         None means that no two parts can meet.
         """
-        if not self.measured:
+        if not len(self.first):
             return None
         placed = self.at(x)
         found = placed.likely_nearest()

@@ -36,7 +36,8 @@ NONE, OTHERS = "None", "All others"
 INTERVAL = 1.0
 """Time [s] between two updates while the arm moves and no ghost is shown.
 
-One update takes longer than several frames.
+One update takes longer than several frames. The first one, which loads the engine of the collision
+checks, waits as long, so that it takes no time from the first picture.
 """
 
 Find = Callable[[State], tuple[BranchOption, ...]]
@@ -53,14 +54,13 @@ class BranchList:
         self._find = find
         self._robot = robot
         self._listen = listen
-        self._seen = state
-        self._seen_at = -math.inf
+        self._seen: State | None = None
+        self._seen_at = math.nan
         self._branches = robot.require_arm().kinematics.branches
         self._ghosts: list[GhostNodes] = []
         # viser calls `_show` in a thread of its own when a ghost is chosen.
         self._lock = threading.Lock()
-        found = find(state)
-        self._table = server.gui.add_html(_rows(found, state.branch))
+        self._table = server.gui.add_html(_rows((), state.branch))
         self._ghost_choice = server.gui.add_dropdown(
             "Ghosts",
             (NONE, OTHERS, *map(str, self._branches)),
@@ -79,10 +79,13 @@ class BranchList:
     def follow(self, state: State, now: float) -> None:
         """Update the branches for ``state`` at time ``now`` [s].
 
-        The update is immediate while the arm is at rest or ghosts are shown. Otherwise at least
-        INTERVAL lies between two updates.
+        The update is immediate while the arm is at rest or ghosts are shown. Otherwise, and before
+        the first one, at least INTERVAL passes.
         """
-        watched = self._ghost_choice.value != NONE or not state.moving
+        if math.isnan(self._seen_at):
+            self._seen_at = now
+        rests = self._seen is not None and not state.moving
+        watched = self._ghost_choice.value != NONE or rests
         if state is self._seen or not (watched or now - self._seen_at >= INTERVAL):
             return
         self._seen, self._seen_at = state, now
@@ -90,7 +93,8 @@ class BranchList:
 
     def _show(self) -> None:
         with self._lock:
-            self._draw(self._seen)
+            if self._seen is not None:
+                self._draw(self._seen)
 
     def _draw(self, state: State) -> None:
         found = self._find(state)
