@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +62,14 @@ def flange(chain: Chain, tool: FloatArray, T: FloatArray) -> Chain:
     return chain.with_tool(chain.M @ se3.inverse(tool) @ T)
 
 
+def larger(chain: Chain, factor: float) -> Chain:
+    """Return ``chain`` with all lengths times ``factor``, whose joints turn by 150 deg each way."""
+    M, far = chain.M.copy(), np.full(chain.n, math.radians(150.0))
+    M[:3, 3] *= factor
+    S = chain.S * np.repeat((1.0, factor), 3)[:, None]
+    return replace(chain, M=M, S=S, lower=-far, upper=far)
+
+
 EIGHTH = se3.from_rotation_translation(so3.rotation_z(-0.25 * math.pi), np.zeros(3))
 
 HANDS = {
@@ -68,6 +77,7 @@ HANDS = {
     "UR5e": (flange(UR5E, TOOL, np.eye(4)), TWO_FINGERS),
     "OpenMANIPULATOR-X": (flange(OPENMANIPULATOR_X, LEVEL, FORWARD), SMALL),
     "four axes": (flange(OPENMANIPULATOR_X, LEVEL, FORWARD), WIDE),
+    "four long axes": (flange(larger(OPENMANIPULATOR_X, 2.0), LEVEL, FORWARD), WIDE),
     "KR 6": (flange(KR_6, TOOL, np.eye(4)), TWO_FINGERS),
 }
 """Arms with their hands."""

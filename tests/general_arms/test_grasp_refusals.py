@@ -77,13 +77,6 @@ def without_bodies(text: str) -> str:
     return text
 
 
-def test_four_axes_hold_a_cup_and_do_not_pour(tmp_path: Path) -> None:
-    cup = item("cup", "cylinder", (32.0, 90.0), (230.0, 0.0))
-    steps = ["fill: 100", "grasp: cup", "pour: cup"]
-    with pytest.raises(ScriptError, match="An arm with 4 axes cannot tilt a cup about its lip"):
-        planned(tmp_path, gripping_urdf("four axes"), steps, cup)
-
-
 UR5E = gripping_urdf("UR5e")
 HANDS_THAT_CANNOT = {
     "no gripper": (chain_urdf("arm", HANDS["UR5e"][0]), "has no gripper"),

@@ -1,4 +1,4 @@
-"""Arms with six and seven axes empty a cup about its lip, without spilling."""
+"""Arms with four, six and seven axes empty a cup about its lip, without spilling."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.simulation import Simulation
+from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.tilting import UNDERSIDES
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -34,6 +35,21 @@ from katana450.settings import Settings
 from tests.general_arms.gripping_arms import gripping_urdf
 
 MICROMETRE = 1e-6
+
+
+class Setting(NamedTuple):
+    """Places of cup and basin on the table [mm], the lift [mm], and the water in the cup [ml]."""
+
+    cup: tuple[float, float] = (450.0, -150.0)
+    basin: tuple[float, float] = (450.0, 200.0)
+    lift: float = 140.0
+    water: float = 200.0
+
+
+SETTINGS = {
+    "four axes": Setting((230.0, -60.0), (60.0, 190.0), 60.0, 100.0),
+    "four long axes": Setting((400.0, -120.0), (60.0, 190.0)),
+}
 
 
 class Pour(NamedTuple):
@@ -60,12 +76,18 @@ class Pour(NamedTuple):
 
 def planned(tmp_path: Path, name: str, pour: str) -> Planned:
     """Return a script that fills the cup of the scene, and pours as the step says."""
-    path = tmp_path / "arm.urdf"
+    path, at = tmp_path / "arm.urdf", SETTINGS.get(name, Setting())
     path.write_text(gripping_urdf(name), encoding="utf-8")
     steps = (
-        "put: {object: cup, x: 450, y: -150}", "put: {object: basin, x: 450, y: 200}",
-        "fill: 200", "grasp: cup", "line: {by: {z: 140}}", f"pour: {pour}", "set_down:", "home",
-    )  # fmt: skip
+        "put: {{object: cup, x: {:g}, y: {:g}}}".format(*at.cup),
+        "put: {{object: basin, x: {:g}, y: {:g}}}".format(*at.basin),
+        f"fill: {at.water:g}",
+        "grasp: cup",
+        f"line: {{by: {{z: {at.lift:g}}}}}",
+        f"pour: {pour}",
+        "set_down:",
+        "home",
+    )
     script = parse("frame: base\nsteps:\n" + "".join(f"  - {step}\n" for step in steps))
     robot, session, _ = describe_robot(Settings(), path, None, find_arm)
     start = session.begin(session.ready, 0.0, 0.0)
@@ -104,7 +126,7 @@ def test_tool_turns_about_a_lip_over_the_middle_of_the_basin(tmp_path: Path) -> 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["UR5e", "Panda"])
+@pytest.mark.parametrize("name", ["UR5e", "Panda", "four long axes"])
 def test_cup_is_emptied_about_its_lip(name: str, tmp_path: Path) -> None:
     found = poured(tmp_path, name, "{into: basin, shake: 1}")
     trace = found.simulation.trace
@@ -120,10 +142,11 @@ def test_cup_is_emptied_about_its_lip(name: str, tmp_path: Path) -> None:
     tilted = [s for s in map(found.simulation.states.__getitem__, ticks) if _tilt(found, s) > 5.0]
     lips = np.array([found.lip(state) for state in tilted])
     assert np.ptp(lips, axis=0).max() < MICROMETRE
-    np.testing.assert_allclose(lips[0, :2], (0.45, 0.2), atol=MICROMETRE)
+    at = SETTINGS.get(name, Setting())
+    np.testing.assert_allclose(1e3 * lips[0, :2], at.basin, atol=1e-3)
     assert _tilt(found, tilted[-1]) == pytest.approx(120.0, abs=1e-3)
     cup = found.cup(found.simulation.states[-1])
-    np.testing.assert_allclose(cup[:3, 3], (0.45, -0.15, 0.0), atol=1e-9)
+    np.testing.assert_allclose(1e3 * cup[:3, 3], (*at.cup, 0.0), atol=1e-6)
 
 
 def _tilt(found: Pour, state: State) -> float:
@@ -131,13 +154,23 @@ def _tilt(found: Pour, state: State) -> float:
     return float(np.degrees(np.arccos(np.clip(found.cup(state)[2, 2], -1.0, 1.0))))
 
 
-@pytest.mark.long
-def test_part_is_poured(tmp_path: Path) -> None:
-    found = poured(tmp_path, "UR5e", "{into: basin, ml: 60}")
+@pytest.mark.parametrize(
+    ("name", "left"), [pytest.param("UR5e", 140.0, marks=pytest.mark.long), ("four axes", 40.0)]
+)
+def test_part_is_poured(name: str, left: float, tmp_path: Path) -> None:
+    found = poured(tmp_path, name, "{into: basin, ml: 60}")
     state = found.simulation.states[-1]
     assert state.poured is not None
-    left = state.poured.water.kept * FEMTOLITRE / ML
-    assert left == pytest.approx(140.0, abs=0.6)
+    water = state.poured.water
+    assert water.kept * FEMTOLITRE / ML == pytest.approx(left, abs=0.6)
+    assert water.basin * FEMTOLITRE / ML == pytest.approx(60.0, abs=0.6)
+    assert water.spilled == 0
+
+
+def test_cup_that_cannot_be_turned_over_is_not_emptied(tmp_path: Path) -> None:
+    why = "The cup cannot be emptied into basin: The path leaves the reach of the arm"
+    with pytest.raises(ScriptError, match=why):
+        planned(tmp_path, "four axes", "{into: basin, shake: 0}")
 
 
 @pytest.mark.parametrize(
@@ -146,6 +179,7 @@ def test_part_is_poured(tmp_path: Path) -> None:
         ("UR5e", 50.0, 10.0),
         pytest.param("UR5e", 100.0, 5.0, marks=pytest.mark.long),
         pytest.param("Panda", 50.0, 10.0, marks=pytest.mark.long),
+        pytest.param("four axes", 50.0, 5.0, marks=pytest.mark.long),
     ],
 )
 def test_flow_follows_the_rate(name: str, ml: float, rate: float, tmp_path: Path) -> None:
@@ -156,7 +190,7 @@ def test_flow_follows_the_rate(name: str, ml: float, rate: float, tmp_path: Path
     kept = kept * FEMTOLITRE / ML
     # The mean flow over half a second, while the middle half of the part flows out.
     flow = (kept[:-50] - kept[50:]) / (50 * TICK)
-    out = 200.0 - 0.5 * (kept[:-50] + kept[50:])
+    out = kept[0] - 0.5 * (kept[:-50] + kept[50:])
     middle = flow[(out > 0.25 * ml) & (out < 0.75 * ml)]
     assert len(middle) > 0.4 * ml / rate / TICK
     assert middle == pytest.approx(np.full(len(middle), rate), rel=0.05)
@@ -182,7 +216,7 @@ def test_turn_by_a_polynomial_keeps_the_lip_in_its_place() -> None:
     point, axis = np.array((0.4, 0.2, 0.3)), so3.rotation_z(0.7)[:, 0]
     angles = np.array((0.5, 0.3, 0.1, -0.05))
     sigma = np.linspace(0.0, 1.0, 11)
-    T = PoseTurn(start, point, axis, angles).at(Jet.variable(sigma)).T
+    T = PoseTurn(start, point, axis, axis, angles).at(Jet.variable(sigma)).T
     before = se3.from_rotation_translation(start.R, start.position)
     for place, pose in zip(sigma.tolist(), T, strict=True):
         R = so3.exp(np.polynomial.polynomial.polyval(2.0 * place - 1.0, angles) * axis)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, cast
 
@@ -15,7 +15,7 @@ from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP, YAW_TOLERANCE, Approach, symmetry
 from katana450.extensions.programs.grasp_frame import GraspFrame
-from katana450.extensions.programs.pose_hand import PoseHand
+from katana450.extensions.programs.pose_hand import PoseHand, Tilt
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -142,6 +142,17 @@ class PlanarHand(PoseHand):
         R = so3.rotation_z(self._turn(pose.position, self.beside[0])) @ pose.R
         return self._branches_to(q, se3.from_rotation_translation(R, pose.position))
 
+    def tilts(self, q: FloatArray, cup: FloatArray, over: FloatArray) -> Iterable[Tilt]:
+        """Yield the two directions in the plane of the arm, that away from axis 1 first."""
+        present = self._present(q)
+        turn = self._turn(over, float(self.across @ so3.rotation_z(-present) @ cup))
+        for outward in (self.outward, -self.outward):
+            yield Tilt(wrapped(turn - present), so3.rotation_z(turn) @ outward, outward)
+
+    def _present(self, q: FloatArray) -> float:
+        """Return the turn [rad] of the plane of the arm about the vertical at `q` (4,) [rad]."""
+        return math.copysign(1.0, self.kinematics.chain.S[2, 0]) * float(q[0])
+
     def turned(self, target: DragTarget, position: FloatArray, angle: float) -> DragTarget:  # noqa: ARG002
         """Return the pose there: its rotation turns with axis 1."""
         return target.moved(frozen(position))
@@ -156,7 +167,7 @@ class PlanarHand(PoseHand):
     ) -> Sequence[DragTarget]:
         """Return the tool; the object turns with the arm."""
         T = se3.inverse(self.T_base_shoulder) @ T_base_object
-        present = math.copysign(1.0, self.kinematics.chain.S[2, 0]) * float(q[0])
+        present = self._present(q)
         p = so3.rotation_z(-present) @ T[:3, 3]
         turn = self._turn(goal, float(self.across @ p)) - present
         alike = symmetry(held)

@@ -92,12 +92,14 @@ class PoseTurn:
     Attributes:
         start: the pose from which the angle counts.
         point, axis: (3,) [m] and unit vector (3,) of the axis.
+        axis_in_pose: the same axis in the frame of the rotation of ``start``.
         angles: coefficients (n,) of the angle [rad], of the powers of 2 sigma - 1.
     """
 
     start: ToolPose
     point: FloatArray
     axis: FloatArray
+    axis_in_pose: FloatArray
     angles: FloatArray
 
     def __post_init__(self) -> None:
@@ -120,17 +122,18 @@ class PoseTurn:
         x, y, z = (
             place + each
             for place, each in zip(
-                self.point.tolist(), self._turned(beside, sine, cosine), strict=True
+                self.point.tolist(), _turned(beside, self.axis, sine, cosine), strict=True
             )
         )
-        columns = tuple(self._turned(column, sine, cosine) for column in self.start.R.T)
-        return PoseJets(x, y, z, columns)  # type: ignore[arg-type]
+        turned = (_turned(c, self.axis_in_pose, sine, cosine) for c in self.start.R.T)
+        return PoseJets(x, y, z, tuple(turned))  # type: ignore[arg-type]
 
-    def _turned(self, v: FloatArray, sine: Jet, cosine: Jet) -> tuple[Jet, ...]:
-        """Return the vector ``v`` (3,) turned by the angle."""
-        along = (self.axis @ v) * self.axis
-        terms = np.stack((v - along, np.cross(self.axis, v), along), axis=1).tolist()
-        return tuple(cosine * c + sine * s + f for c, s, f in terms)
+
+def _turned(v: FloatArray, axis: FloatArray, sine: Jet, cosine: Jet) -> tuple[Jet, ...]:
+    """Return the vector ``v`` (3,) turned by an angle about the unit vector ``axis`` (3,)."""
+    along = (axis @ v) * axis
+    terms = np.stack((v - along, np.cross(axis, v), along), axis=1).tolist()
+    return tuple(cosine * c + sine * s + f for c, s, f in terms)
 
 
 @dataclass(frozen=True, eq=False)

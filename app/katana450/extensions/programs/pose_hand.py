@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final, cast
+from typing import ClassVar, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -33,8 +33,27 @@ SWINGS: Final = tuple(np.radians((-30.0, 30.0, -60.0, 60.0)).tolist())
 MAX_BRANCHES: Final = 4
 """Maximum number of branches on which a grasp is tried."""
 
+TILTS: Final = tuple(np.radians((90.0, -90.0, 45.0, -45.0, 0.0)).tolist())
+"""[rad] Directions in which a cup is tilted, seen from above, from that in which the hand points.
+Beside the hand the wrist does most of the turn.
+"""
+
 TURNS: Final = tuple(np.radians((45.0, -45.0, 90.0, -90.0, 180.0)).tolist())
 """[rad] Further turns of an object over its new place, beside those with the arm and without."""
+
+
+class Tilt(NamedTuple):
+    """A direction in which a held cup is tilted over a place.
+
+    Attributes:
+        turn: turn about axis 1 that brings the cup there [rad].
+        toward: (3,) unit vector, level, from the middle of the rim to the lip, in {S}.
+        in_pose: the same in the frame of the rotation of a `ToolPose`.
+    """
+
+    turn: float
+    toward: FloatArray
+    in_pose: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +163,21 @@ class PoseHand:
     def way_round(self, here: float, there: float) -> float:
         """Return the shorter way."""
         return wrapped(there - here)
+
+    def tilts(self, q: FloatArray, cup: FloatArray, over: FloatArray) -> Iterable[Tilt]:
+        """Yield the directions in which a cup can be tilted with its lip over a place.
+
+        Args:
+            q: the present posture.
+            cup: (3,) the present middle of its rim [m] in {S}.
+            over: (3,) the place of the lip [m] in {S}.
+        """
+        here, there = (math.atan2(p[1], p[0]) for p in (cup, over))
+        turn = self.way_round(here, there)
+        x, y, _ = self.kinematics.target_at(q).position - self.drawn_back(q, 1.0).position
+        for aside in TILTS:
+            toward = so3.rotation_z(math.atan2(y, x) + turn + aside)[:, 0]
+            yield Tilt(turn, toward, toward)
 
     def turned(self, target: DragTarget, position: FloatArray, angle: float) -> DragTarget:
         """Return the pose, turned as one rigid body."""

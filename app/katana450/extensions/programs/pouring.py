@@ -85,7 +85,8 @@ class Pour:
     """Carry the cup over an object, turn it over, shake it, and turn it back.
 
     The cup stays upright until then. An arm of the five-axis family keeps the pitch of the grasp,
-    and turns the cup by the roll of its wrist. Six and more axes tilt it about its lip.
+    and turns the cup by the roll of its wrist. Other arms tilt it about its lip; those with four
+    axes do so in their plane.
 
     Attributes:
         into: name of the object.
@@ -174,12 +175,7 @@ class Pour:
     def _pour_about_the_lip(
         self, builder: PlanBuilder, cup: SceneObject, basin: SceneObject, rest: float
     ) -> None:
-        """Plan the pour of an arm with six or more axes. Raises InputError if it cannot."""
-        if builder.chain.n < 6:
-            raise InputError(
-                f"An arm with {builder.chain.n} axes cannot tilt a cup about its lip. Pouring "
-                "needs six axes, or an arm of the five-axis family."
-            )
+        """Plan the pour of an arm outside the five-axis family. Raises InputError if it cannot."""
         environment = builder.plan_context.session.environment
         T = environment.pose(cup, builder.state.x_setpoint)
         rim = builder.point(T[:3, 3] + cup.height * T[:3, 2], in_base=True)

@@ -13,6 +13,7 @@ from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.pose_curve import PoseTurn
+from katana450.extensions.programs.pose_hand import PoseHand
 from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -22,11 +23,6 @@ EMPTY_TILT: Final = math.radians(120.0)
 
 UNDERSIDES: Final = (0.02, 0.05, 0.09)
 """[m] Heights of the upright cup over the basin's rim, tried in this order."""
-
-SIDES: Final = tuple(np.radians((90.0, -90.0, 45.0, -45.0, 0.0)).tolist())
-"""[rad] Directions in which a cup is tilted, seen from above, from that in which the hand points.
-Beside the hand the wrist does most of the turn.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,25 +48,28 @@ class Tilting:
 
     def by(self, tilts: FloatArray) -> AnyCurve:
         """Return the turn by a polynomial; ``tilts``: see `PoseTurn`."""
-        return PoseTurn(self.at, self.lip.point, self.lip.axis, tilts)
+        lip = self.lip
+        return PoseTurn(self.at, lip.point, lip.axis, lip.axis_in_pose, tilts)
 
 
 @dataclass(frozen=True, eq=False)
 class Lip:
-    """The lip of a cup in the hand of an arm with six or more axes, and the axis along it.
+    """The lip of a cup in the hand of an arm outside the five-axis family, and the axis along it.
 
     Attributes:
         point: (3,) [m] in {S}.
         axis: unit vector (3,), level, about which the cup tilts.
+        axis_in_pose: the same in the frame of the rotation of a `ToolPose`.
     """
 
     point: FloatArray
     axis: FloatArray
+    axis_in_pose: FloatArray
 
     def turned(self, pose: ToolPose, angle: float) -> ToolPose:
         """Return ``pose``, turned by ``angle`` [rad] about the axis."""
-        R = so3.exp(angle * self.axis)
-        return ToolPose(frozen(self.point + R @ (pose.position - self.point)), frozen(R @ pose.R))
+        position = self.point + so3.exp(angle * self.axis) @ (pose.position - self.point)
+        return ToolPose(frozen(position), frozen(so3.exp(angle * self.axis_in_pose) @ pose.R))
 
 
 def about_the_lip(
@@ -82,24 +81,22 @@ def about_the_lip(
     """Yield the ways to tilt an upright cup about its lip, the best first.
 
     Args:
-        builder: the arm, with six or more axes, which holds the cup.
+        builder: the arm, outside the five-axis family, which holds the cup.
         cup: (3,) the middle of the cup's rim [m] in {S}, at the present posture.
         size: radius of the rim, and height of the cup [m].
         over: (3,) the middle of the basin's rim [m] in {S}.
     """
-    level, hand, planning = builder.target, builder.hand, builder.planning
-    here, there = (math.atan2(p[1], p[0]) for p in (cup, over))
-    natural = hand.way_round(here, there)
-    x, y, _ = level.position - hand.drawn_back(builder.q, 1.0).position
-    ahead = math.atan2(y, x)
+    level, hand = builder.target, builder.hand
+    assert isinstance(hand, PoseHand)
     radius, tall = size
     for height in UNDERSIDES:
-        for side in SIDES:
+        point = over + (tall + height) * UP
+        for tilt in hand.tilts(builder.q, cup, point):
+            lip = Lip(
+                frozen(point), *(frozen(np.cross(UP, d)) for d in (tilt.toward, tilt.in_pose))
+            )
             # The cup turns with the arm on the way to the basin.
-            toward = so3.rotation_z(ahead + natural + side)[:, 0]
-            lip = Lip(frozen(over + (tall + height) * UP), frozen(np.cross(UP, toward)))
-            middle = lip.point - radius * toward
-            moved = middle + so3.rotation_z(natural) @ (level.position - cup)
-            at = hand.turned(level, moved, natural)
+            moved = so3.rotation_z(tilt.turn) @ (level.position - cup)
+            at = hand.turned(level, point - radius * tilt.toward + moved, tilt.turn)
             assert isinstance(at, ToolPose)
-            yield Tilting(at, lip, planning)
+            yield Tilting(at, lip, builder.planning)
