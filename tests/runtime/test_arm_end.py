@@ -105,6 +105,20 @@ def test_started_front_end_has_the_newest_state(ends: Ends) -> None:
     arm_end.close()
 
 
+def test_arm_that_has_just_ended_is_not_young(ends: Ends) -> None:
+    ours, theirs = multiprocessing.Pipe()
+    arm_end = ArmEnd(ours, ends.loop, ends.mailbox, SILENCE)
+    arm_end.start()
+    # No thread reads the end of the pipe yet.
+    front = FrontEnd(theirs, ends.session.check)
+    with socket.socket(fileno=os.dup(ours.fileno())) as line:
+        line.shutdown(socket.SHUT_RDWR)
+    time.sleep(0.01)
+    assert theirs.poll()
+    assert front.age > 0.01
+    arm_end.close()
+
+
 def test_command_crosses_the_pipe_and_its_ticket_returns(ends: Ends) -> None:
     tickets = [ends.front.deliver(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
     assert tickets == [1, 2, 3]

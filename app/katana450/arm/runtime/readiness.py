@@ -11,6 +11,10 @@ LAST_DATA_RECEIVED, LAST_ACK_RECEIVED = 52, 56
 """Bytes before ``tcpi_last_data_recv`` and ``tcpi_last_ack_recv`` [ms] in Linux's ``struct
 tcp_info``."""
 
+ENDED = getattr(select, "POLLHUP", 0) | getattr(select, "POLLRDHUP", 0)
+"""Events of a connection whose other side has ended. It can also be read then, without a message.
+"""
+
 
 class SocketChannel(Protocol):
     """A socket, or the object that asyncio provides for one."""
@@ -25,7 +29,7 @@ class SocketChannel(Protocol):
 
 
 def readable(fd: int) -> bool:
-    """Return whether data, or the end of the other side, waits at ``fd``; False if unknown."""
+    """Return whether data of a side that has not ended waits at ``fd``; False if unknown."""
     return _polled(fd, getattr(select, "POLLIN", 0), unknown=False)
 
 
@@ -70,5 +74,5 @@ def _polled(fd: int, event: int, *, unknown: bool) -> bool:
     if not hasattr(select, "poll"):
         return unknown
     poll = select.poll()
-    poll.register(fd, event)
-    return any(found & event for _, found in poll.poll(0))
+    poll.register(fd, event | ENDED)
+    return any(found & event and not found & ENDED for _, found in poll.poll(0))
