@@ -116,6 +116,11 @@ def test_arm_that_has_just_ended_is_not_young(ends: Ends) -> None:
     time.sleep(0.01)
     assert theirs.poll()
     assert front.age > 0.01
+    # Its command is not sent, and will be reported as dropped.
+    front.deliver(cmd.SetJoint(0, 1.0))
+    assert len(front._unsent) == 1
+    with pytest.raises(InputError, match="only STOP"):
+        front.deliver(cmd.SetJoint(0, 1.0))
     arm_end.close()
 
 

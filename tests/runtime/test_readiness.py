@@ -20,6 +20,16 @@ def test_pipe_is_readable_while_data_waits() -> None:
         assert not readable(ours.fileno())
 
 
+def test_message_to_an_ended_process_is_sent_and_fails() -> None:
+    """A sender must learn of the end; a message that is not sent would be lost."""
+    ours, theirs = multiprocessing.Pipe()
+    with ours:
+        theirs.close()
+        assert writable(ours.fileno())
+        with pytest.raises(OSError, match="pipe"):
+            ours.send_bytes(b"one")
+
+
 @pytest.mark.parametrize("last", [b"", b"the last message"])
 def test_end_of_the_other_process_is_no_message(last: bytes) -> None:
     ours, theirs = multiprocessing.Pipe()

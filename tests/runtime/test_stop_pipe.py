@@ -96,6 +96,9 @@ def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
             assert stop_pipe.status is not None
             assert stop_pipe.status.presses == ("one", "two")
             assert stop_pipe.age < TIMEOUT
+        # The event loop has not learned of the end yet.
+        assert connected(stop_pipe)
+        stop_pipe.press(press("meanwhile"))
         first.close()
         async with asyncio.timeout(TIMEOUT):
             while connected(stop_pipe):
@@ -103,7 +106,8 @@ def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
         stop_pipe.press(press("three"))
         with arm_end(arm, session) as second:
             pipes.put(second)
-            assert await stop_pipe.executed("three", TIMEOUT) == press("three").cause
+            assert await stop_pipe.executed("three", TIMEOUT) == press("meanwhile").cause
+            assert await stop_pipe.executed("meanwhile", TIMEOUT) is not None
         second.close()
         assert stop_pipe.running
         pipes.put(None)

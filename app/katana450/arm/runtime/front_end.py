@@ -173,13 +173,13 @@ class FrontEnd:
 
     def _send(self, message: CommandMessage | Heartbeat) -> bool:
         try:
-            if not writable(self._pipe.fileno()):
-                return False
-            self._pipe.send(message)
+            if writable(self._pipe.fileno()):
+                self._pipe.send(message)
+                return True
         except PIPE_ERRORS:
             # The thread that reads notices it too, and connects again.
             self._connected = False
-        return True
+        return False
 
     def _listen(self) -> None:
         while not self.cut.is_set():

@@ -12,8 +12,7 @@ LAST_DATA_RECEIVED, LAST_ACK_RECEIVED = 52, 56
 tcp_info``."""
 
 ENDED = getattr(select, "POLLHUP", 0) | getattr(select, "POLLRDHUP", 0)
-"""Events of a connection whose other side has ended. It can also be read then, without a message.
-"""
+"""Events of a connection whose other end is closed, and which is readable without a message."""
 
 
 class SocketChannel(Protocol):
@@ -30,7 +29,7 @@ class SocketChannel(Protocol):
 
 def readable(fd: int) -> bool:
     """Return whether data of a side that has not ended waits at ``fd``; False if unknown."""
-    return _polled(fd, getattr(select, "POLLIN", 0), unknown=False)
+    return _polled(fd, getattr(select, "POLLIN", 0), unknown=False, unless=ENDED)
 
 
 def writable(fd: int) -> bool:
@@ -68,11 +67,11 @@ def _age(channel: SocketChannel, offset: int) -> float:
     return 1e-3 * milliseconds
 
 
-def _polled(fd: int, event: int, *, unknown: bool) -> bool:
+def _polled(fd: int, event: int, *, unknown: bool, unless: int = 0) -> bool:
     if fd < 0:
         return False
     if not hasattr(select, "poll"):
         return unknown
     poll = select.poll()
-    poll.register(fd, event | ENDED)
-    return any(found & event and not found & ENDED for _, found in poll.poll(0))
+    poll.register(fd, event | unless)
+    return any(found & event and not found & unless for _, found in poll.poll(0))
