@@ -49,7 +49,8 @@ def raise_priority() -> None:
 def prefer_thread() -> None:
     """Give this thread the lowest real-time priority, on Linux, where the system allows it."""
     if sys.platform == "linux":
-        with suppress(PermissionError):
+        # Some systems have no such priorities: musl, sandboxes.
+        with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import errno
 import os
 import signal
 import socket
@@ -181,6 +182,17 @@ def test_thread_keeps_its_priority_where_none_is_allowed() -> None:
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout == "True\n"
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="only Linux has real-time priorities of threads"
+)
+def test_system_without_real_time_priorities_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(*_: object) -> None:
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr(os, "sched_setscheduler", missing)
+    platform_support.prefer_thread()
 
 
 @pytest.mark.usefixtures("windows")
