@@ -34,7 +34,7 @@ from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.frontend import layers
-from katana450.extensions.kinematics.json_lines import initial_objects
+from katana450.extensions.kinematics.json_lines import initial_obstacles
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.view import View, ViewOptions
@@ -72,7 +72,7 @@ def loop_of(robot: Robot, settings: Settings) -> tuple[ControlLoop, Session, Mai
     arm = robot.require_arm()
     world, _ = world_of(robot)
     assert world is not None
-    world = world.with_obstacles(initial_objects(load_props()))
+    world = world.with_obstacles(initial_obstacles(load_props()))
     session = Session(arm, arm.ready(settings.ready), world)
     mailbox, clock = Mailbox(session.check), Hand()
     driver = SimulatedDriver(arm, session.ready, gripper=0.0)

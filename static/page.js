@@ -158,23 +158,24 @@
   let canDraw = true;
   let seen = false;
   /** @type {(value?: any) => void} */
-  let free = () => {};
-  // Resolved when the scene is on the screen, or has not come: what can wait takes no time from its drawing.
-  const shown = new Promise((done) => (free = done));
+  let loadRest = () => {};
+  // Resolved REST_AFTER after the first frame, or TRY_AFTER after the start without one: what can wait takes no
+  // time from the drawing of the scene.
+  const restMayLoad = new Promise((done) => (loadRest = done));
   const drawn = () => {
     if (!canDraw) return;
     seen = true;
     byId("poster").classList.add("done");
     if (past) showTimeline(true, past);
     past = null;
-    requestAnimationFrame(() => setTimeout(free, REST_AFTER));
-    shown.then(takeHold);
+    requestAnimationFrame(() => setTimeout(loadRest, REST_AFTER));
+    restMayLoad.then(takeHold);
   };
   setTimeout(tryDrawing, TRY_AFTER);
   // A second context for drawing takes time, so it is made only if nothing was drawn.
   function tryDrawing() {
     if (!seen) canDraw = document.createElement("canvas").getContext("webgl2") !== null;
-    free();
+    loadRest();
     if (canDraw) return;
     byId("poster").classList.add("failed");
     byId("poster").querySelector("p").textContent =
@@ -570,7 +571,7 @@
     const moment = new URLSearchParams(location.search).get("moment");
     if (moment || kept?.getItem(PAST) === "yes") past = (there) => moment && there.goTo(moment);
     window.addEventListener("status", ({ detail }) => {
-      shown.then(() => canDraw && detail.role !== "viewer" && !kept?.getItem(WELCOMED) && showWelcome());
+      restMayLoad.then(() => canDraw && detail.role !== "viewer" && !kept?.getItem(WELCOMED) && showWelcome());
     }, { once: true });
   });
 })();

@@ -15,7 +15,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, load_props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.kinematics.json_lines import initial_objects
+from katana450.extensions.kinematics.json_lines import initial_obstacles
 from katana450.resources import PROPS_PATH
 from katana450.settings import Settings
 
@@ -81,7 +81,7 @@ def test_an_invalid_file_is_refused(tmp_path: Path, text: str) -> None:
 def test_obstacles_enclose_the_props(robot: Robot, arm: MountedArm) -> None:
     """Check that no mesh of a prop leaves its collision shape, nor the table's top face."""
     props = load_props()
-    table, cup, basin = initial_objects(props)
+    table, cup, basin = initial_obstacles(props)
     assert table.name == "table"
     for part, vessel, at in ((cup, props.cup, CUP_AT), (basin, props.basin, BASIN_AT)):
         points = np.asarray(trimesh.load_scene(vessel.mesh).to_mesh().vertices) + at

@@ -70,7 +70,7 @@ class ControlLoop:
         self.paused_at = -math.inf
         """Time of the newest command with which the arm's process itself brakes the arm [s]."""
         if session.world is not None:
-            # A tick has no time for it.
+            # It takes longer than a tick.
             session.world.load()
         t = clock.now()
         sent = driver.start(t)

@@ -38,7 +38,7 @@ EFFORT_OF_FORM: Final = 2
 LEAST_PART: Final = 1.0 / 32.0
 """[1] Smallest part of a stride that the closed form is asked for."""
 
-PLACES: Final = 24
+SWIVEL_SAMPLES: Final = 24
 """Number of places of a stride to which a branch of seven axes is followed with its swivel."""
 
 EXACT: Final = 1e-8
@@ -140,7 +140,10 @@ class PoseTracker:
         if not self._takes(stop, self.branches.at_its_swivel(stop.T[None], branch, here)[0]):
             return None
         start = ToolPose.of(forward(self.chain, here))
-        places = [*(start.towards(stop, k / PLACES) for k in range(1, PLACES)), stop]
+        places = [
+            *(start.towards(stop, k / SWIVEL_SAMPLES) for k in range(1, SWIVEL_SAMPLES)),
+            stop,
+        ]
         found = self.branches.at_its_swivel(np.array([each.T for each in places]), branch, here)
         steps = np.diff(found, axis=0, prepend=here[None])
         steps -= math.tau * np.round(steps / math.tau)

@@ -65,7 +65,7 @@ class JsonKinematics:
         self._world = None
         if all_metrics:
             world, _ = world_of(robot)
-            self._world = world and world.with_obstacles(initial_objects(load_props()))
+            self._world = world and world.with_obstacles(initial_obstacles(load_props()))
         self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def _distance(a: FloatArray, b: FloatArray) -> float:
     return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
 
 
-def initial_objects(props: Props) -> tuple[Part, ...]:
+def initial_obstacles(props: Props) -> tuple[Part, ...]:
     """Return the table and ``scene_objects_of`` as fixed obstacles."""
     objects = scene_objects_of(props)
     return (

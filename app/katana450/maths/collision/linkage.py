@@ -11,7 +11,7 @@ import numpy.typing as npt
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
-ALONG = 1e-9
+PARALLEL_SINE = 1e-9
 """[1] Sine of an angle up to which an axis has a direction."""
 
 GROUND = 0
@@ -105,11 +105,11 @@ class Linkage:
         """
         T = self.poses(np.zeros(int(self.variable.max()) + 1))
         axes = np.einsum("mij,mj->mi", T[:, :3, :3], self.axis)
-        turns = np.linalg.norm(np.cross(axes, direction), axis=1) <= ALONG
+        turns = np.linalg.norm(np.cross(axes, direction), axis=1) <= PARALLEL_SINE
         turns[[GROUND, *self.sliding]] = False
         first = np.zeros(self.count, dtype=np.int64)
         for group, parent in enumerate(self.parent.tolist()):
-            first[group] = first[parent] if parent != GROUND else group * turns[group]
+            first[group] = first[parent] if parent != GROUND else group if turns[group] else GROUND
         return first
 
     def variables_between(self, a: int, b: int) -> frozenset[int]:

@@ -46,7 +46,7 @@ class CollisionShape:
 
     @cached_property
     def geometry(self) -> Any:
-        """The geometry of the engine, made on first use: no picture needs it."""
+        """The geometry of the engine, made at its first use: drawing needs none."""
         return self.make(engine())
 
 

@@ -145,9 +145,9 @@ class CollisionWorld:
     def _seen(self, bodies: IndexArray, others: IndexArray) -> IndexArray:
         """Return the group (p,) that each of ``bodies`` (p,) moves with, as ``others`` see it.
 
-        It is its own. But a turn about the normal of a plane leaves the plane as it is, so a plane
-        at rest counts as turned by the first joint of an arm that stands on it: this joint moves no
-        part towards the table.
+        A body moves with its own group. But a turn about the normal of a plane leaves the plane as
+        it is, so a plane at rest counts as turned by the first joint of an arm that stands on it:
+        this joint moves no part towards the table.
         """
         groups = self.mover_of[bodies]
         for body in self._planes:
@@ -169,7 +169,7 @@ class CollisionWorld:
         return [(made[a], frame[a], made[b], frame[b]) for a, b in pairs]
 
     def load(self) -> None:
-        """Make all geometries, for those who must not wait at their first use."""
+        """Load the engine and make all geometries now, so that no later check waits for them."""
         _ = self.engine, self.measured
 
     @cached_property

@@ -79,8 +79,8 @@ class BranchList:
     def follow(self, state: State, now: float) -> None:
         """Update the branches for ``state`` at time ``now`` [s].
 
-        The update is immediate while the arm is at rest or ghosts are shown. Otherwise, and before
-        the first one, at least INTERVAL passes.
+        The update is immediate while the arm is at rest or ghosts are shown. Otherwise at least
+        INTERVAL passes. The first update waits INTERVAL, unless a ghost is chosen.
         """
         if math.isnan(self._seen_at):
             self._seen_at = now

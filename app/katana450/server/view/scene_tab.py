@@ -11,7 +11,7 @@ from katana450.server.view.display_options import DisplayOptions, add_shows, add
 
 
 class LogProblem:
-    """Why events are not recorded on disk, hidden while they are."""
+    """The problem of the event log on disk, hidden if there is none."""
 
     def __init__(self, gui: viser.GuiApi, gestures: GestureGate) -> None:
         """Add it to the open tab of ``gui``."""

@@ -98,7 +98,10 @@ class FrameSlot:
         _soon(self._taker, self._heard.set)
 
     async def receiver(self) -> Callable[[Any], None]:
-        """Return the function that passes a message, after its stamp, to viser, once it listens."""
+        """Wait until viser listens, and return the function that passes it a message.
+
+        Append the stamp of the message to ``stamps`` first.
+        """
         await self._heard.wait()
         return partial(_soon, self._giver, self._handle)
 
