@@ -24,7 +24,7 @@ from katana450.client.files import LostError, RefusedError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Shape
-from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask
 from tests.gateway.test_isolation import FAR
 
@@ -99,6 +99,12 @@ class Strike(NamedTuple):
 def strike(server: AppServer, process: str, number: signal.Signals, delay: float) -> Strike:
     """Send ``number`` to ``process`` ``delay`` [s] into a motion, and check what follows."""
     victim = server.child(f"katana450 {process}")
+
+    def replaced() -> bool:
+        with suppress(ServerError):
+            return server.child(f"katana450 {process}") != victim
+        return False
+
     with lost_connection(), connect(server.url, "Driver") as arm:
         clear_stop(arm)
         start = arm.query(answers.State).q[0]
@@ -108,8 +114,9 @@ def strike(server: AppServer, process: str, number: signal.Signals, delay: float
         before = arm.query(answers.State)
         os.kill(victim, number)
         struck = time.monotonic()
-        # An arm that does not answer is reported; a front end that is lost disconnects its clients.
-        while process == "front" or healthy(server):
+        # An arm that does not answer is reported, unless it is replaced before anybody misses it; a
+        # front end that is lost disconnects its clients.
+        while process == "front" or (healthy(server) and not replaced()):
             assert time.monotonic() < struck + 20.0
             arm.query(answers.State)
     shown = time.monotonic() - struck
