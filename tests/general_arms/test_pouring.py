@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +33,7 @@ from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.water.units import FEMTOLITRE, ML
 from katana450.settings import Settings
-from tests.general_arms.gripping_arms import gripping_urdf
+from tests.general_arms.gripping_arms import HANDS, gripping_urdf
 
 MICROMETRE = 1e-6
 
@@ -171,6 +172,17 @@ def test_cup_that_cannot_be_turned_over_is_not_emptied(tmp_path: Path) -> None:
     why = "The cup cannot be emptied into basin: The path leaves the reach of the arm"
     with pytest.raises(ScriptError, match=why):
         planned(tmp_path, "four axes", "{into: basin, shake: 0}")
+
+
+def test_basin_too_near_to_axis_1_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hand moves in a plane 120 mm beside axis 1, and the basin is 100 mm from that axis."""
+    chain, gripper = HANDS["four axes"]
+    M = chain.M.copy()
+    M[1, 3] += 0.12
+    monkeypatch.setitem(HANDS, "beside", (replace(chain, M=M), gripper))
+    monkeypatch.setitem(SETTINGS, "beside", Setting((230.0, -60.0), (-100.0, 0.0), 60.0, 100.0))
+    with pytest.raises(ScriptError, match="cannot be emptied into basin: it stands too near to a"):
+        planned(tmp_path, "beside", "{into: basin, ml: 60}")
 
 
 @pytest.mark.parametrize(

@@ -125,18 +125,20 @@ class Pour:
         if builder.state.poured is None:
             raise InputError("There is no water in the cup: `fill` it first.")
         rest = self._rest(builder.state.poured.water)
-        if not isinstance(builder.target, ToolTarget):
-            self._pour_about_the_lip(builder, cup, basin, rest)
-            return
-        level = builder.at
-        if level.pitch > MAX_POUR_PITCH:
+        level = builder.target
+        if isinstance(level, ToolTarget) and level.pitch > MAX_POUR_PITCH:
             raise InputError(
                 "The cup is held from above, where the wrist cannot tilt it: pick it with "
                 "`side: front`."
             )
         try:
-            turn = self._turn(builder, level, rest)
-            builder.first((turn, -turn), lambda turn: self._pour(builder, basin, level, turn, rest))
+            if isinstance(level, ToolTarget):
+                turn = self._turn(builder, level, rest)
+                builder.first(
+                    (turn, -turn), lambda turn: self._pour(builder, basin, level, turn, rest)
+                )
+            else:
+                self._pour_about_the_lip(builder, cup, basin, rest)
         except InputError as error:
             raise InputError(f"The cup cannot be emptied into {self.into}: {error}") from error
         builder.predict_water(rest)
@@ -181,12 +183,8 @@ class Pour:
         rim = builder.point(T[:3, 3] + cup.height * T[:3, 2], in_base=True)
         over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height), in_base=True)
         tilt, size = self._tilt(builder, rest), (cup.size[0], cup.height)
-        ways = list(about_the_lip(builder, rim, size, over))
-        try:
-            builder.first(ways, lambda way: self._tilted(builder, way, tilt, rest))
-        except InputError as error:
-            raise InputError(f"The cup cannot be emptied into {self.into}: {error}") from error
-        builder.predict_water(rest)
+        ways = about_the_lip(builder, rim, size, over)
+        builder.first(ways, lambda way: self._tilted(builder, way, tilt, rest))
 
     def _tilted(self, builder: PlanBuilder, way: Tilting, tilt: float, rest: float) -> None:
         """Append the motions of ``way`` with their pace, and the draining."""
