@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyfit
 
 from katana450.extensions.programs.pour_tilt import film_after, tilt_for
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.liquid import Liquid
 from katana450.maths.water.units import ML
@@ -20,6 +22,30 @@ END_RATE = 0.5 * ML
 
 SAMPLES = 49
 """Number of times at which the tilt is computed."""
+
+RATE_DEGREE = 14
+"""Degree of the polynomial that gives roll or tilt over time for a rate."""
+
+
+class RatedTilt(NamedTuple):
+    """The tilt of a cup over time with which it pours at a rate.
+
+    Attributes:
+        duration: of the pour [s].
+        times: (N,) from 0 to ``duration`` [s].
+        tilts: (N,) at these times [rad].
+    """
+
+    duration: float
+    times: FloatArray
+    tilts: FloatArray
+
+    def fitted(self, angles: FloatArray) -> FloatArray:
+        """Return the coefficients of the polynomial through ``angles`` (N,) at these times.
+
+        They are those of the powers of s, which grows evenly from -1 to 1.
+        """
+        return frozen(polyfit(2.0 * self.times / self.duration - 1.0, angles, RATE_DEGREE))
 
 
 @dataclass(frozen=True)
@@ -65,8 +91,8 @@ class RatePlan:
         grown = self.ramp * (s**3 - 0.5 * s**4)
         return self.low * t + (self.rate - self.low) * (grown + max(t - self.ramp, 0.0))
 
-    def tilts(self, held: float, liquid: Liquid, cup: Cylinder) -> tuple[FloatArray, FloatArray]:
-        """Return times (N,) [s] and the tilts (N,) [rad] of a cup with ``held`` [m^3] at first.
+    def tilts(self, held: float, liquid: Liquid, cup: Cylinder) -> RatedTilt:
+        """Return the tilts of a cup with ``held`` [m^3] at first.
 
         At each time the tilt is that at which the rest, without the film on the wall, has the flow.
         The times are those of Chebyshev's points and the ends.
@@ -77,4 +103,4 @@ class RatePlan:
             out = self.poured(t)
             film = film_after(out, held - out, t, liquid, cup) if t > 0.0 else 0.0
             tilts.append(tilt_for(self.flow(t), max(held - out - film, 0.0), liquid, cup))
-        return times, np.array(tilts)
+        return RatedTilt(self.duration, times, np.array(tilts))

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial.polynomial import polyfit, polyval
+from numpy.polynomial.polynomial import polyval
 
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject
@@ -22,14 +22,15 @@ from katana450.extensions.programs.drain import Drain
 from katana450.extensions.programs.expression import PLAIN
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.pour_rate import RatePlan
+from katana450.extensions.programs.pour_rate import RatedTilt, RatePlan
 from katana450.extensions.programs.pour_tilt import film_after, tilt_for
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.extensions.programs.tilting import EMPTY_TILT, Tilting, about_the_lip
 from katana450.extensions.programs.tool_curves import ToolTurn
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.extensions.programs.tool_planning import AnyCurve
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.flow import Water
 from katana450.maths.water.units import FEMTOLITRE, ML, counted
@@ -60,9 +61,6 @@ PART_FLOW = 0.5 * ML
 
 LAST_FRACTION = 0.1
 """[1] Fraction of all that is not poured at a given rate: so little flows as it can."""
-
-ROLL_DEGREE = 14
-"""Degree of the polynomial that gives the roll over time for a rate."""
 
 RATE_UNIT = "ml/s"
 """Unit of a rate in a script."""
@@ -133,9 +131,9 @@ class Pour:
             )
         try:
             if isinstance(level, ToolTarget):
-                turn = self._turn(builder, level, rest)
+                turn, rated = self._turn(builder, level, rest), self._rated(builder, rest)
                 builder.first(
-                    (turn, -turn), lambda turn: self._pour(builder, basin, level, turn, rest)
+                    (turn, -turn), lambda turn: self._pour(builder, basin, level, turn, rated, rest)
                 )
             else:
                 self._pour_about_the_lip(builder, cup, basin, rest)
@@ -178,48 +176,40 @@ class Pour:
         self, builder: PlanBuilder, cup: SceneObject, basin: SceneObject, rest: float
     ) -> None:
         """Plan the pour of an arm outside the five-axis family. Raises InputError if it cannot."""
+        tilt, rated = self._tilt(builder, rest), self._rated(builder, rest)
         environment = builder.plan_context.session.environment
         T = environment.pose(cup, builder.state.x_setpoint)
         rim = builder.point(T[:3, 3] + cup.height * T[:3, 2], in_base=True)
         over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height), in_base=True)
-        tilt, size = self._tilt(builder, rest), (cup.size[0], cup.height)
-        ways = about_the_lip(builder, rim, size, over)
-        builder.first(ways, lambda way: self._tilted(builder, way, tilt, rest))
+        ways = about_the_lip(builder, rim, (cup.size[0], cup.height), over)
+        builder.first(ways, lambda way: self._tilted(builder, way, tilt, rated, rest))
 
-    def _tilted(self, builder: PlanBuilder, way: Tilting, tilt: float, rest: float) -> None:
+    def _tilted(
+        self,
+        builder: PlanBuilder,
+        way: Tilting,
+        tilt: float,
+        rated: RatedTilt | None,
+        rest: float,
+    ) -> None:
         """Append the motions of ``way`` with their pace, and the draining."""
         carry(builder, way.at, f"over {self.into}")
         pace = POUR_PACE if self.volume is None else PART_PACE
         builder.note("slowly", SetSpeed(pace), builder.state)
-        if self.rate is None:
+        if rated is None:
             builder.lead([way.arc(tilt, 0.0, tilt)], POURING)
         else:
-            tilt = self._tilted_at_rate(builder, self.rate, way, tilt, rest)
+            fitted = rated.fitted(rated.tilts)
+            first, last = (float(polyval(end, fitted)) for end in (-1, 1))
+            start, end = way.arc(first, 0.0, first), way.arc(tilt - last, last, tilt)
+            self._pour_at_rate(builder, rated.duration, start, way.by(fitted), end)
+            tilt = tilt if self.volume is None else last
         if self.shake:
             up = tilt - SHAKE_ANGLE
             shake = way.arc(-SHAKE_ANGLE, tilt, up), way.arc(SHAKE_ANGLE, up, tilt)
             builder.lead([*shake] * self.shake, "shake")
         self._drain(builder, rest)
         builder.lead([way.arc(-tilt, tilt, 0.0)], "turn back")
-
-    def _tilted_at_rate(
-        self, builder: PlanBuilder, rate: float, way: Tilting, tilt: float, rest: float
-    ) -> float:
-        """Tilt the cup about its lip so that it pours at ``rate`` [m^3/s]; return the last tilt.
-
-        ``tilt``: of a cup that is emptied [rad].
-        """
-        plan, times, tilts = self._at_rate(builder, rate, rest)
-        fitted = polyfit(2.0 * times / plan.duration - 1.0, tilts, ROLL_DEGREE)
-        first, last = (float(polyval(end, fitted)) for end in (-1, 1))
-        builder.lead([way.arc(first, 0.0, first)], POURING)
-        builder.note("at the rate", SetSpeed(1.0), builder.state)
-        builder.pace(way.by(frozen(fitted)), plan.duration, "pour at the rate")
-        if self.volume is not None:
-            return last
-        builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
-        builder.lead([way.arc(tilt - last, last, tilt)], "pour the last")
-        return tilt
 
     def _drain(self, builder: PlanBuilder, rest: float) -> None:
         """Append the wait until the last water, or the part, has run out."""
@@ -231,41 +221,36 @@ class Pour:
         builder.note("full speed", SetSpeed(1.0), builder.state)
 
     def _pour_at_rate(
-        self, builder: PlanBuilder, rate: float, at: ToolTarget, turn: float, rest: float
-    ) -> ToolTarget:
-        """Turn the cup from ``at`` so that it pours at ``rate`` [m^3/s]; return the last target."""
-        plan, times, tilts = self._at_rate(builder, rate, rest)
-        rolls = _roll_of(tilts, at.pitch)
-        if rolls.max() > abs(turn) and rolls.max() >= POUR_TURN:
-            raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
-        s = 2.0 * times / plan.duration - 1.0
-        fitted = polyfit(s, at.roll + math.copysign(1.0, turn) * rolls, ROLL_DEGREE)
-        first, last = (replace(at, roll=float(polyval(end, fitted))) for end in (-1, 1))
-        builder.lead([ToolLine(at, first)], POURING)
+        self, builder: PlanBuilder, duration: float, start: AnyCurve, turn: AnyCurve, end: AnyCurve
+    ) -> None:
+        """Append ``start``, ``turn`` in ``duration`` [s], and ``end`` if all is poured."""
+        builder.lead([start], POURING)
         builder.note("at the rate", SetSpeed(1.0), builder.state)
-        builder.pace(ToolTurn(at, frozen(fitted)), plan.duration, "pour at the rate")
-        if self.volume is not None:
-            return last
-        builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
-        down = replace(at, roll=at.roll + turn)
-        builder.lead([ToolLine(last, down)], "pour the last")
-        return down
+        builder.pace(turn, duration, "pour at the rate")
+        if self.volume is None:
+            builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
+            builder.lead([end], "pour the last")
 
-    def _at_rate(
-        self, builder: PlanBuilder, rate: float, rest: float
-    ) -> tuple[RatePlan, FloatArray, FloatArray]:
-        """Return the plan for ``rate`` [m^3/s], and times (N,) [s] and tilts (N,) [rad] of it."""
+    def _rated(self, builder: PlanBuilder, rest: float) -> RatedTilt | None:
+        """Return the tilt over time for the rate; None if none is given."""
+        if self.rate is None:
+            return None
         pouring, poured = builder.plan_context.session.pouring, builder.state.poured
         assert pouring is not None
         assert poured is not None
         inside = pouring.water_environment(builder.state.objects).cup.inside
         held = poured.water.kept * FEMTOLITRE
         out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
-        plan = RatePlan.of(out, rate)
-        return plan, *plan.tilts(held, poured.water.liquid, inside)
+        return RatePlan.of(out, self.rate).tilts(held, poured.water.liquid, inside)
 
     def _pour(
-        self, builder: PlanBuilder, basin: SceneObject, level: ToolTarget, turn: float, rest: float
+        self,
+        builder: PlanBuilder,
+        basin: SceneObject,
+        level: ToolTarget,
+        turn: float,
+        rated: RatedTilt | None,
+        rest: float,
     ) -> None:
         chain = builder.chain
         # The turn is limited to the range of the wrist.
@@ -285,10 +270,17 @@ class Pour:
         pace = POUR_PACE if self.volume is None else PART_PACE
         builder.note("slowly", SetSpeed(pace), builder.state)
         down = replace(at, roll=level.roll + turn)
-        if self.rate is None:
+        if rated is None:
             builder.lead([ToolLine(at, down)], POURING)
         else:
-            down = self._pour_at_rate(builder, self.rate, at, turn, rest)
+            rolls = _roll_of(rated.tilts, at.pitch)
+            if rolls.max() > abs(turn) and rolls.max() >= POUR_TURN:
+                raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
+            fitted = rated.fitted(at.roll + math.copysign(1.0, turn) * rolls)
+            first, last = (replace(at, roll=float(polyval(end, fitted))) for end in (-1, 1))
+            start, end = ToolLine(at, first), ToolLine(last, down)
+            self._pour_at_rate(builder, rated.duration, start, ToolTurn(at, fitted), end)
+            down = down if self.volume is None else last
         back = replace(at, roll=level.roll + turn - math.copysign(SHAKE_ANGLE, turn))
         if self.shake:
             builder.lead([ToolLine(down, back), ToolLine(back, down)] * self.shake, "shake")
