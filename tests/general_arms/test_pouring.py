@@ -39,12 +39,13 @@ MICROMETRE = 1e-6
 
 
 class Setting(NamedTuple):
-    """Places of cup and basin on the table [mm], the lift [mm], and the water in the cup [ml]."""
+    """Places of cup and basin on the table [mm], the lift [mm], and the liquid in the cup [ml]."""
 
     cup: tuple[float, float] = (450.0, -150.0)
     basin: tuple[float, float] = (450.0, 200.0)
     lift: float = 140.0
     water: float = 200.0
+    liquid: str = "water"
 
 
 SETTINGS = {
@@ -82,7 +83,7 @@ def planned(tmp_path: Path, name: str, pour: str) -> Planned:
     steps = (
         "put: {{object: cup, x: {:g}, y: {:g}}}".format(*at.cup),
         "put: {{object: basin, x: {:g}, y: {:g}}}".format(*at.basin),
-        f"fill: {at.water:g}",
+        f"fill: {{ml: {at.water:g}, of: {at.liquid}}}",
         "grasp: cup",
         f"line: {{by: {{z: {at.lift:g}}}}}",
         f"pour: {pour}",
@@ -172,6 +173,25 @@ def test_cup_that_cannot_be_turned_over_is_not_emptied(tmp_path: Path) -> None:
     why = "The cup cannot be emptied into basin: The path leaves the reach of the arm"
     with pytest.raises(ScriptError, match=why):
         planned(tmp_path, "four axes", "{into: basin, shake: 0}")
+
+
+@pytest.mark.parametrize("name", ["UR5e", "four axes"])
+@pytest.mark.parametrize(
+    ("pour", "why"),
+    [
+        ("ml: {:g}", "No tilt of the cup pours this part; pour all of it, or less"),
+        ("ml: {:g}, rate: 5", "No tilt of the cup gives this rate; lower it, or pour less"),
+        ("rate: 50", "No tilt of the cup gives this rate; lower it, or pour less"),
+    ],
+)
+def test_flow_that_no_tilt_gives_is_refused(
+    name: str, pour: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last millilitre of honey is a film, and a tenth of it is too little for 50 ml/s."""
+    at = SETTINGS.get(name, Setting())._replace(liquid="honey")
+    monkeypatch.setitem(SETTINGS, name, at)
+    with pytest.raises(ScriptError, match=f"The cup cannot be emptied into basin: {why}"):
+        planned(tmp_path, name, f"{{into: basin, {pour.format(at.water - 1.0)}}}")
 
 
 def test_basin_too_near_to_axis_1_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,6 +65,9 @@ LAST_FRACTION = 0.1
 RATE_UNIT = "ml/s"
 """Unit of a rate in a script."""
 
+MAX_TILT = EMPTY_TILT
+"""[rad] Maximum tilt about the lip, for a part and for a rate."""
+
 REACTION_TIME = 0.25
 """[s] Time in which a cup that turns back still pours at the same flow."""
 
@@ -177,6 +180,10 @@ class Pour:
     ) -> None:
         """Plan the pour of an arm outside the five-axis family. Raises InputError if it cannot."""
         tilt, rated = self._tilt(builder, rest), self._rated(builder, rest)
+        if rated is None and tilt > MAX_TILT:
+            raise InputError("No tilt of the cup pours this part; pour all of it, or less.")
+        if rated is not None and rated.tilts.max() > MAX_TILT:
+            raise InputError("No tilt of the cup gives this rate; lower it, or pour less.")
         environment = builder.plan_context.session.environment
         T = environment.pose(cup, builder.state.x_setpoint)
         rim = builder.point(T[:3, 3] + cup.height * T[:3, 2], in_base=True)
