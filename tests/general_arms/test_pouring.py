@@ -187,11 +187,11 @@ def test_cup_that_cannot_be_turned_over_is_not_emptied(tmp_path: Path) -> None:
 def test_flow_that_no_tilt_gives_is_refused(
     name: str, pour: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The last millilitre of honey is a film, and a tenth of it is too little for 50 ml/s."""
+    """A film of honey stays in the cup, and the last tenth is too little for 50 ml/s."""
     at = SETTINGS.get(name, Setting())._replace(liquid="honey")
     monkeypatch.setitem(SETTINGS, name, at)
     with pytest.raises(ScriptError, match=f"The cup cannot be emptied into basin: {why}"):
-        planned(tmp_path, name, f"{{into: basin, {pour.format(at.water - 1.0)}}}")
+        planned(tmp_path, name, f"{{into: basin, {pour.format(at.water)}}}")
 
 
 def test_basin_too_near_to_axis_1_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -146,15 +146,16 @@ class Pour:
 
     def _rest(self, water: Water) -> float:
         """Return the volume [m^3] that stays in the cup. Raises InputError for too little water."""
-        held = water.kept * FEMTOLITRE
         if self.volume is None:
             return 0.0
-        if self.volume > held:
+        held = water.kept * FEMTOLITRE
+        # The water is counted in whole femtolitres.
+        if counted(self.volume) > water.kept:
             raise InputError(
                 f"The cup holds {held / ML:.1f} ml at this step, which is less than "
                 f"{self.volume / ML:g} ml."
             )
-        return held - self.volume
+        return max(held - self.volume, 0.0)
 
     def _turn(self, builder: PlanBuilder, level: ToolTarget, rest: float) -> float:
         """Return the roll [rad] of the tilted cup; ``rest`` [m^3] is what stays in it."""
