@@ -131,13 +131,16 @@ def test_grip_without_an_object_is_refused_and_fails_at_run_time(
     assert "closed on nothing instead of part" in run.why
 
 
-def test_object_that_is_too_thin_at_run_time_ends_it_at_once(stage: Stage, holding: State) -> None:
+@pytest.mark.parametrize("room", [1e-3, 0.0])
+def test_object_that_is_too_thin_at_run_time_ends_it_at_once(
+    stage: Stage, holding: State, room: float
+) -> None:
     program = compiled(parse("steps:\n- grip: {until: 9 N}\n"), stage.plan_context, holding)
     (action,) = (task.action for task in program.tasks if isinstance(task.action, CloseUntil))
     assert action.correction(holding)
-    # As if the fingers had closed on it near the end of their range.
+    # As if the fingers had closed on it near the end of their range, or there.
     assert holding.grip is not None
-    end = replace(action, closed=holding.grip - 1e-3)
+    end = replace(action, gripper=replace(action.gripper, closed=holding.grip - room))
     with pytest.raises(InputError, match=r"part is too thin: .* before they press with 9 N"):
         end.correction(holding)
 

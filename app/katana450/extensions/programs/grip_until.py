@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Self
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
@@ -35,12 +35,12 @@ class CloseUntil(MoveFingers):
     Attributes:
         force: [N].
         model: the forces of the fingers.
-        closed: end of the range of the finger joint [rad].
+        gripper: the finger joint.
     """
 
     force: float
     model: TouchModel
-    closed: float
+    gripper: GripperModel
 
     def done(self, state: State, waited: float) -> bool:
         """Return whether the fingers press with the force.
@@ -58,19 +58,19 @@ class CloseUntil(MoveFingers):
         """
         if state.held is None or state.grip is None:
             return ()
-        return (cmd.SetGripper(_angle_for(self.force, self.model, state, self.closed)),)
+        return (cmd.SetGripper(_angle_for(self.force, self.model, state, self.gripper)),)
 
 
-def _angle_for(force: float, model: TouchModel, state: State, closed: float) -> float:
+def _angle_for(force: float, model: TouchModel, state: State, gripper: GripperModel) -> float:
     """Return the finger joint [rad] at which ``force`` [N] acts on what the fingers hold.
 
-    Raises InputError for a force that they cannot have there, also beyond ``closed`` [rad].
+    Raises InputError for a force that they cannot have there, also beyond their range.
     """
     squeeze = model.squeeze_for(state, force)
     assert state.grip is not None
     assert state.held is not None
-    angle = state.grip - math.copysign(squeeze, state.grip - closed)
-    if (angle - closed) * (state.grip - closed) < 0.0:
+    angle = gripper.wider(state.grip, -squeeze)
+    if gripper.is_wider(gripper.closed, angle):
         raise InputError(
             f"{state.held.name} is too thin: the fingers reach the end of their range before they "
             f"press with {force:g} N."
@@ -124,10 +124,8 @@ class GripUntil:
                 f"The fingers would hold {closed.held.name} instead of {self.holding}, which has "
                 "to stand where they close."
             )
-        angle = _angle_for(self.force, model, closed, fingers.closed)
-        action = CloseUntil(
-            angle, closed.held.name, force=self.force, model=model, closed=fingers.closed
-        )
+        angle = _angle_for(self.force, model, closed, fingers)
+        action = CloseUntil(angle, closed.held.name, force=self.force, model=model, gripper=fingers)
         builder.state = closed
         builder.note(f"grip until {self.force:g} N", action, builder.after(cmd.SetGripper(angle)))
 
