@@ -20,9 +20,11 @@ from katana450.assembly.robot_session import find_robot
 from katana450.extensions.export.ros2.srdf import srdf_text
 from katana450.extensions.hands.sides import with_sides
 from katana450.extensions.programs.clocked_run import Planned, run_by_clock
+from katana450.maths.geometry import se3
 from katana450.server.service import serialize
 from katana450.settings import Settings
 from tests.general_arms.published_hands import (
+    HOOK,
     RADIAL,
     ROBOTIQ_2F_85,
     closing_upwards,
@@ -182,6 +184,30 @@ def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> 
     assert hand is not None
     assert hand.sides == (("digit_1",), ("digit_2",), ("digit_3",))
     assert robot.require_arm().gripper.closed == 0.0
+
+
+def test_hand_with_one_moving_link_holds_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(hand_urdf("UR5e", HOOK), encoding="utf-8")
+    _, session, _ = find_robot(Settings(), path, None)
+    hand = session.environment.hand
+    assert hand is not None
+    assert hand.sides == (("hook",),)
+    start = session.begin(session.ready, 0.0, 0.0)
+    (*_, opened) = run(session, start, cmd.SetGripper(0.12))
+    palm = hand.T_palm_tool @ se3.from_rotation_translation(np.eye(3), (0.09, 0.0, -0.025))
+    T = session.environment.pose(
+        SceneObject("part", Shape.BOX, (0.02, 0.02, 0.05), palm, fixed=True), opened.x_setpoint
+    )
+    part = SceneObject("part", Shape.BOX, (0.02, 0.02, 0.05), T, can_be_held=True)
+    (*_, closed) = run(session, replace(opened, objects=(part,)), cmd.SetGripper(0.05))
+    assert closed.held is None
+    assert closed.grip is None
+    (contact,) = closed.findings
+    assert contact.reason is Reason.CONTACT
+    assert contact.parts == ("hook", "part")
+    # It keeps the distance of all other parts.
+    assert 0.005 <= contact.amount < 0.0052
 
 
 def test_katana_has_the_sides_and_ends_of_its_file() -> None:

@@ -26,7 +26,7 @@ def gripped(
 ) -> State:
     """Return ``state`` after the motion of the fingers in this tick of ``dt`` [s]."""
     hand = environment.hand
-    if world is None or hand is None or not (hand.fingers and state.objects):
+    if world is None or hand is None or not (hand.can_hold and state.objects):
         return state
     gripper = hand.gripper
     if (grip := state.grip) is not None:

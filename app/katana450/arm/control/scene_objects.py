@@ -246,6 +246,11 @@ class Hand:
     standing_jaw: StandingJaw | None = None
     grip_model: GripModel | None = None
 
+    @property
+    def can_hold(self) -> bool:
+        """True if it has two sides, between which objects are held."""
+        return len(self.sides) + (self.standing_jaw is not None) >= 2
+
 
 class Environment:
     """Collision world of the arm with any objects, and the poses of these objects."""
@@ -296,12 +301,8 @@ class Environment:
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
         """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m]."""
-        holdable = {
-            scene_object.name
-            for scene_object in objects
-            if scene_object.can_be_held and not scene_object.carried
-        }
-        fingers = set(() if self.hand is None else self.hand.fingers)
+        holdable = {each.name for each in objects if each.can_be_held and not each.carried}
+        fingers = set(self.hand.fingers if self.hand is not None and self.hand.can_hold else ())
         names = [world.parts[number].name for number in world.part_of.tolist()]
         touching = [
             bool({names[a], names[b]} & holdable and {names[a], names[b]} & fingers)
