@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.messages import REASONS
 from katana450.arm.control.modes import IDLE
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
@@ -18,15 +19,17 @@ from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.export.ros2.srdf import srdf_text
+from katana450.extensions.hands.palm_jaw import PalmJaw
 from katana450.extensions.hands.sides import with_sides
 from katana450.extensions.programs.clocked_run import Planned, run_by_clock
-from katana450.maths.geometry import se3
+from katana450.maths.geometry import se3, so3
 from katana450.server.service import serialize
 from katana450.settings import Settings
 from tests.general_arms.published_hands import (
     HOOK,
     RADIAL,
     ROBOTIQ_2F_85,
+    SO101_BOXES,
     closing_upwards,
     hand_urdf,
     px150_urdf,
@@ -139,6 +142,67 @@ def test_part_is_not_pushed_into_another_object(plan: Planned, before: State) ->
     assert lopsided.amount > 3e-3
     moved = next(each for each in closed.objects if each.name == "part").T[:2, 3] - part.T[:2, 3]
     assert 2e-3 < np.linalg.norm(moved) <= 3.1e-3
+
+
+def test_part_is_pushed_on_the_object_that_carries_it(plan: Planned, before: State) -> None:
+    T = before.objects[0].T.copy()
+    support = SceneObject("support", Shape.BOX, (0.02, 0.02, 0.02), T)
+    T = T.copy()
+    T[2, 3] = support.height
+    stack = replace(before.objects[0], T=T), support
+    closed = run(plan.session, replace(before, objects=stack), CLOSED)[-1]
+    assert closed.held is not None
+    assert closed.held.name == "part"
+    assert not closed.findings
+    assert plan.session.environment.pose(closed.held, closed.x_setpoint)[2, 3] == pytest.approx(
+        support.height, abs=1e-12
+    )
+
+
+def test_part_beside_the_face_of_the_jaw_is_at_a_finite_distance(
+    plan: Planned, before: State
+) -> None:
+    world = plan.session.world_at(before)
+    assert world is not None
+    (jaw,) = (part for part in world.parts if part.name == "moving_jaw")
+    blade = SO101_BOXES[-1]
+    T = se3.from_rotation_translation(so3.rotation_z(blade.rpy[2]), blade.at)
+    # Near the tip of the jaw, on the side to which it closes.
+    T = T @ se3.from_rotation_translation(np.eye(3), (-0.015, -0.028, -0.004))
+    T = world.linkage.poses(before.x_setpoint)[jaw.mover] @ T
+    chip = SceneObject("part", Shape.BOX, (0.008, 0.008, 0.008), T, can_be_held=True)
+    closed = run(plan.session, replace(before, objects=(chip,)), CLOSED)[-1]
+    assert closed.held is None
+    (lopsided,) = (f for f in closed.findings if f.reason is Reason.LOPSIDED)
+    assert lopsided.parts == ("gripper_link", "part")
+    assert lopsided.amount == 0.05
+    assert "is 50 mm from" in REASONS[Reason.LOPSIDED](lopsided)
+
+
+def test_distance_is_that_of_the_named_part_of_the_palm(tmp_path: Path) -> None:
+    bumper = (
+        '<link name="bumper"><collision><origin xyz="-0.0059 0 -0.05"/><geometry>'
+        '<box size="0.004 0.03 0.02"/></geometry></collision></link><joint name="bumper_joint" '
+        'type="fixed"><parent link="gripper_link"/><child link="bumper"/></joint></robot>'
+    )
+    path = tmp_path / "arm.urdf"
+    path.write_text(so101_urdf().replace("</robot>", bumper), encoding="utf-8")
+    _, session, _ = find_robot(Settings(), path, None)
+    state, hand = session.begin(session.ready, 1.7, 0.0), session.environment.hand
+    assert hand is not None
+    assert isinstance(hand.standing_jaw, PalmJaw)
+    assert hand.standing_jaw.name == "gripper_link"
+    for along, wanted in ((-0.055, "bumper"), (-0.085, "gripper_link")):
+        at = se3.from_rotation_translation(np.eye(3), (0.01, 0.0, along))
+        fixed = SceneObject("part", Shape.BOX, (0.01, 0.01, 0.01), at, fixed=True)
+        T = session.environment.pose(fixed, state.x_setpoint)
+        chip = replace(fixed, T=T, fixed=False, can_be_held=True)
+        around = session.environment.world((chip,))
+        assert around is not None
+        name, distance, _ = hand.standing_jaw.met(around, state, chip)
+        assert name == wanted
+        assert distance == pytest.approx(around.gap(state.x_setpoint, "part", name))
+        assert distance < 0.05
 
 
 def test_opened_jaw_leaves_the_part_standing(plan: Planned, before: State) -> None:

@@ -23,6 +23,9 @@ FACING: Final = np.cos(np.radians(45.0))
 LEVEL: Final = np.sin(np.radians(6.0))
 """[1] Sine of the slope of the closing direction up to which an object slides on its support."""
 
+OVERLAP_TOLERANCE: Final = 1e-6
+"""[m] Depth by which an object that is pushed may enter another: the rounding of distances."""
+
 
 @dataclass(frozen=True, eq=False)
 class PalmJaw:
@@ -43,42 +46,57 @@ class PalmJaw:
     ) -> tuple[str, float, SceneObject | None]:
         """Return name and distance [m] of the jaw, and the object pushed towards it.
 
-        None in place of the object if it is there, or not before the face of the jaw, or would
-        slide uphill or into another object.
+        The name is that of the part of the palm that is nearest to the object, and the distance is
+        at least MAX_PUSH if the object is not before its face. The pushed object is in the base
+        frame. It is None if it touches the jaw already, is not before its face, or cannot be
+        pushed: uphill, or into another object.
         """
         y = np.asarray(world.linkage.poses(state.x_setpoint)[self.palm, :3, :3] @ self.y)
-        distance = self._distance(world, state.x_setpoint, item.name, y)
+        distance, name = self._nearest(world, state.x_setpoint, item.name, y)
         if not TOUCH_DISTANCE < distance < MAX_PUSH or abs(float(y[2])) > LEVEL:
-            return self.name, distance, None
+            return name, distance, None
         T = item.T.copy()
-        T[:2, 3] -= min(distance, TOUCH_DISTANCE) * y[:2]
+        T[:2, 3] -= TOUCH_DISTANCE * y[:2]
         pushed = replace(item, T=frozen(T))
         others = [each for each in state.objects if each is not item and not each.carried]
-        met = any(_overlap(pushed, each) for each in others)
-        return self.name, distance, None if met else pushed
+        met = any(_is_nearer(pushed, item, each) for each in others)
+        return name, distance, None if met else pushed
 
-    def _distance(self, world: CollisionWorld, x: FloatArray, name: str, y: FloatArray) -> float:
-        """Return the distance [m] of an object from the face of the jaw; infinite beside it.
+    def _nearest(
+        self, world: CollisionWorld, x: FloatArray, name: str, y: FloatArray
+    ) -> tuple[float, str]:
+        """Return the distance [m] of an object from the face of the jaw, and the nearest part.
+
+        It is at least MAX_PUSH if the object is not before the face.
 
         y: (3,) as ``y`` of this jaw, in the base frame.
         """
         number, placed = [part.name for part in world.parts].index(name), world.at(x)
-        found = np.inf
+        found = MAX_PUSH, self.name
         for pair in placed.nearer_than(MAX_PUSH)[0].tolist():
             one, other = (int(world.part_of[each[pair]]) for each in (world.first, world.second))
             if other == number and world.parts[one].mover == self.palm:
                 contact = placed.contact(pair)
                 if float(contact.normal @ y) >= FACING:
-                    found = min(found, contact.distance)
+                    found = min(found, (contact.distance, contact.parts[0]))
         return found
 
 
-def _overlap(one: SceneObject, other: SceneObject) -> bool:
-    """Return whether two standing objects overlap."""
+def _is_nearer(pushed: SceneObject, item: SceneObject, other: SceneObject) -> bool:
+    """Return whether ``item`` overlaps ``other`` more once it is ``pushed``.
+
+    Objects that stand on each other overlap by rounding.
+    """
+    gap = _gap(pushed, other)
+    return gap < -OVERLAP_TOLERANCE and gap < _gap(item, other) - OVERLAP_TOLERANCE
+
+
+def _gap(one: SceneObject, other: SceneObject) -> float:
+    """Return the distance [m] of two objects that are not held; negative if they overlap."""
     measure = engine()
     placed = (
         (each.collision_shape.geometry, measure.transform(each.T_collision_shape))
         for each in (one, other)
     )
     (first, T_first), (second, T_second) = placed
-    return measure.distance(first, T_first, second, T_second) < 0.0
+    return measure.distance(first, T_first, second, T_second)
