@@ -19,7 +19,7 @@ from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.export.ros2.srdf import srdf_text
-from katana450.extensions.hands.palm_jaw import PalmJaw
+from katana450.extensions.hands.fixed_jaw import FixedJaw
 from katana450.extensions.hands.sides import with_sides
 from katana450.extensions.programs.clocked_run import Planned, run_by_clock
 from katana450.maths.geometry import se3, so3
@@ -92,7 +92,7 @@ def test_one_jaw_pushes_the_part_and_takes_it_between_two_faces(
     standing = [before, *states[:first]]
     away = [gaps(plan.session, state, state.objects[0])[1] for state in standing]
     assert away[0] == pytest.approx(0.007, abs=2e-4)
-    # It moves only towards the jaw that stands, and only while the other one touches it.
+    # It moves only towards the fixed jaw, and only while the other one touches it.
     assert (np.diff(away) <= 1e-9).all()
     pushed = [n for n in range(len(away) - 1) if away[n + 1] < away[n] - 1e-9]
     assert len(pushed) > 15
@@ -131,7 +131,7 @@ def test_part_is_not_pushed_into_another_object(plan: Planned, before: State) ->
     along = last.objects[0].T[:2, 3] - part.T[:2, 3]
     along = along / np.linalg.norm(along)
     T = part.T.copy()
-    # A low plate under the jaw that stands, 3 mm beside the part.
+    # A low plate under the fixed jaw, 3 mm beside the part.
     T[:2, 3] += (0.5e-3 * BOX[0] + 0.003 + 0.01) * along
     plate = SceneObject("plate", Shape.BOX, (0.02, 0.02, 0.003), T)
     state = run(plan.session, before, cmd.PlaceObject(plate))[-1]
@@ -190,8 +190,8 @@ def test_distance_is_that_of_the_named_part_of_the_palm(tmp_path: Path) -> None:
     _, session, _ = find_robot(Settings(), path, None)
     state, hand = session.begin(session.ready, 1.7, 0.0), session.environment.hand
     assert hand is not None
-    assert isinstance(hand.standing_jaw, PalmJaw)
-    assert hand.standing_jaw.name == "gripper_link"
+    assert isinstance(hand.fixed_jaw, FixedJaw)
+    assert hand.fixed_jaw.name == "gripper_link"
     for along, wanted in ((-0.055, "bumper"), (-0.085, "gripper_link")):
         at = se3.from_rotation_translation(np.eye(3), (0.01, 0.0, along))
         fixed = SceneObject("part", Shape.BOX, (0.01, 0.01, 0.01), at, fixed=True)
@@ -199,7 +199,7 @@ def test_distance_is_that_of_the_named_part_of_the_palm(tmp_path: Path) -> None:
         chip = replace(fixed, T=T, fixed=False, can_be_held=True)
         around = session.environment.world((chip,))
         assert around is not None
-        name, distance, _ = hand.standing_jaw.met(around, state, chip)
+        name, distance, _ = hand.fixed_jaw.met(around, state, chip)
         assert name == wanted
         assert distance == pytest.approx(around.gap(state.x_setpoint, "part", name))
         assert distance < 0.05
@@ -284,4 +284,4 @@ def test_katana_has_the_sides_and_ends_of_its_file() -> None:
     assert found.gripper.closed == hand.gripper.lower
     assert found.fingers == hand.fingers == ("finger_right_link", "finger_left_link")
     assert found.sides == hand.sides == (("finger_right_link",), ("finger_left_link",))
-    assert found.standing_jaw is None
+    assert found.fixed_jaw is None

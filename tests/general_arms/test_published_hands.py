@@ -48,7 +48,7 @@ class Kind(NamedTuple):
         box: its size [mm].
         ends: the closed and the open end of the finger joint [rad or m].
         sides: the fingers on each side, the tips first.
-        jaw: the part that stands; "" if both sides move.
+        jaw: the part with the fixed jaw; "" if both sides move.
     """
 
     urdf: str
@@ -106,16 +106,16 @@ EVERY = [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for 
 def gaps(plan: Planned, before: State, held: State, jaw: str) -> list[float]:
     """Return the gap [m] between the object and each side at ``held``, before it was taken.
 
-    jaw: the part that stands; "" if both sides move.
+    jaw: the part with the fixed jaw; "" if both sides move.
     """
     world, hand = plan.session.world_at(before), plan.session.environment.hand
     assert world is not None
     assert hand is not None
     sides = [world.gap(held.x_setpoint, "part", *side) for side in hand.sides]
-    if hand.standing_jaw is None:
+    if hand.fixed_jaw is None:
         assert not jaw
         return sides
-    name, distance, moved = hand.standing_jaw.met(world, held, before.objects[0])
+    name, distance, moved = hand.fixed_jaw.met(world, held, before.objects[0])
     assert moved is None
     assert name == jaw
     assert distance == pytest.approx(world.gap(held.x_setpoint, "part", name))
@@ -145,5 +145,5 @@ def test_box_is_picked_and_placed(name: str, tmp_path: Path) -> None:
     assert max(T[2, 3] for T in lifted) > 0.05
     assert min(T[2, 2] for T in lifted) > 1.0 - 1e-5
     moved = np.linalg.norm(states[first - 1].objects[0].T[:2, 3] - 1e-3 * np.array(kind.at))
-    # The moving jaw pushes the box to the one that stands; two fingers leave it in its place.
+    # The moving jaw pushes the box to the fixed one; two fingers leave it in its place.
     assert moved == pytest.approx(0.007 if kind.jaw else 0.0, abs=5e-4)

@@ -57,7 +57,7 @@ def gripped(
         if scene_object.can_be_held and not scene_object.fixed:
             felt = {side[0]: world.gap(x, scene_object.name, *side) for side in hand.sides}
             if min(felt.values()) <= TOUCH_DISTANCE:
-                if (jaw := hand.standing_jaw) is not None:
+                if (jaw := hand.fixed_jaw) is not None:
                     name, felt[name], moved = jaw.met(world, state, scene_object)
                     if moved is not None:
                         return replace(state, objects=placed(state.objects, moved), blocked=False)

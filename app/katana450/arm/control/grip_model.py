@@ -27,13 +27,15 @@ class GripModel(Protocol):
         """Return forces, pressures and sensor values of ``state`` for the answer to a query."""
 
 
-class StandingJaw(Protocol):
-    """A jaw that stands while the other one pushes objects against it. Its method is pure."""
+class FixedJawModel(Protocol):
+    """A fixed jaw, against which the moving jaw pushes objects. Its method is pure."""
 
     def met(
         self, world: CollisionWorld, state: State, item: SceneObject
     ) -> tuple[str, float, SceneObject | None]:
-        """Return the name of the jaw, and its distance [m] from an object that the other touches.
+        """Return the name of the fixed jaw, its distance [m] from ``item``, and the pushed object.
 
-        The last value is the object moved towards the jaw; None if it is there or cannot be moved.
+        ``item`` touches the moving jaw. The pushed object is in the base frame, nearer to the fixed
+        jaw. It is None if it touches the jaw already, is not before its face, or cannot be pushed:
+        uphill, or into another object.
         """

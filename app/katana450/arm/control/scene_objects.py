@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from katana450.arm.control.grip_model import GripModel, StandingJaw
+from katana450.arm.control.grip_model import FixedJawModel, GripModel
 from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.solid import PLAIN, ObjectAppearance, Solid
 from katana450.errors import InputError, digits_beyond
@@ -234,7 +234,7 @@ class Hand:
         T_palm_tool: (4, 4) the frame of the default tool in the frame of the palm.
         gripper: the finger joint.
         sides: names of the fingers on each side of an object, those at the tips first.
-        standing_jaw: the body of the palm against which a single side closes; None for two.
+        fixed_jaw: the body of the palm against which a single side closes; None for two.
         grip_model: the forces in the hand; None if they are not modelled, and objects never slip.
     """
 
@@ -243,13 +243,13 @@ class Hand:
     T_palm_tool: FloatArray
     gripper: GripperModel
     sides: tuple[tuple[str, ...], ...]
-    standing_jaw: StandingJaw | None = None
+    fixed_jaw: FixedJawModel | None = None
     grip_model: GripModel | None = None
 
     @property
     def can_hold(self) -> bool:
         """True if it has two sides, between which objects are held."""
-        return len(self.sides) + (self.standing_jaw is not None) >= 2
+        return len(self.sides) + (self.fixed_jaw is not None) >= 2
 
 
 class Environment:

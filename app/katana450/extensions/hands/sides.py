@@ -3,7 +3,7 @@
 Links that one joint moves rigidly together form a group. The two groups that move most against each
 other are the fingertips. Every other group belongs to the side with which it moves and on which it
 stands, such as the bars of a linkage; one that does neither, or hardly moves, belongs to the palm.
-If all groups move the same way, they are one jaw, and a body of the palm stands on the other side.
+If all groups move the same way, they are the moving jaw, and a body of the palm is the fixed one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.scene_objects import Hand
 from katana450.errors import InputError
-from katana450.extensions.hands.palm_jaw import PalmJaw
+from katana450.extensions.hands.fixed_jaw import FixedJaw
 from katana450.extensions.hands.placed_bodies import PlacedBodies
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
@@ -55,12 +55,12 @@ Motions = Mapping[int, FloatArray]
 
 
 class JawPlaces(NamedTuple):
-    """Places of one jaw and of what it closes against, in the frame of the palm [m].
+    """Places of the moving and the fixed jaw, in the frame of the palm [m].
 
     Attributes:
-        name: of the part that stands.
-        face: where it stands, along y of `Sides`.
-        closed, opened: (3,) tip of the jaw at both ends of its range.
+        name: of the part with the fixed jaw.
+        face: its position along y of `Sides`.
+        closed, opened: (3,) tip of the moving jaw at both ends of its range.
     """
 
     name: str
@@ -75,11 +75,11 @@ class Sides:
 
     Attributes:
         parts: the parts of the fingers on either side, those at the tips first. The first is empty
-            if a body of the palm stands there.
+            if the fixed jaw is there.
         tips: the parts of these that move rigidly with the fingertip.
         y: (3,) unit vector in the frame of the palm.
         gripper: that of the hand, with its closed end.
-        jaw: the places of one jaw; None if both sides move.
+        jaw: the places of both jaws if one is fixed; None if both sides move.
     """
 
     parts: tuple[tuple[Part, ...], tuple[Part, ...]]
@@ -102,7 +102,7 @@ def with_sides(world: CollisionWorld, hand: Hand) -> Hand:
         hand,
         gripper=sides.gripper,
         sides=tuple(tuple(part.name for part in each) for each in sides.parts if each),
-        standing_jaw=None if jaw is None else PalmJaw(jaw.name, hand.palm, sides.y),
+        fixed_jaw=None if jaw is None else FixedJaw(jaw.name, hand.palm, sides.y),
     )
 
 
@@ -176,18 +176,18 @@ def _of_one_jaw(world: CollisionWorld, hand: Hand, groups: Groups, moved: Motion
     palm = [part for part in world.parts if part.mover == hand.palm]
     if main is None or not palm or any(_astray(each, moved[main]) for each in moved.values()):
         raise refusal
-    standing = PlacedBodies(world, palm, hand.palm, hand.gripper.lower)
+    fixed = PlacedBodies(world, palm, hand.palm, hand.gripper.lower)
 
     def tip(value: float) -> FloatArray:
-        return _tip(world, hand, groups[main], moved[main], value, standing.middle)
+        return _tip(world, hand, groups[main], moved[main], value, fixed.middle)
 
     def apart(value: float) -> float:
-        return standing.nearest(tip(value)).distance
+        return fixed.nearest(tip(value)).distance
 
     gripper = _closed_where(hand.gripper, apart)
     closed, opened = gripper.closed, gripper.opened
     facing = (
-        standing.nearest(tip(closed + fraction * (opened - closed))) for fraction in NEARLY_CLOSED
+        fixed.nearest(tip(closed + fraction * (opened - closed))) for fraction in NEARLY_CLOSED
     )
     found = next((each for each in facing if each.distance >= FACING), None)
     if found is None or apart(closed) > MAX_FACE_GAP or apart(opened) - apart(closed) < MIN_STROKE:

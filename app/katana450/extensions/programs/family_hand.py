@@ -40,7 +40,7 @@ class FamilyHand(FiveAxisHand):
     Attributes:
         T_tool_grasp: (4, 4) pose of the grasp frame in that of the tool [m].
         opening: distance between the open fingers [m].
-        one_jaw: whether one jaw closes against another that stands.
+        one_jaw: whether one jaw closes against a fixed one.
         roll: roll of the tool at which the fingers close horizontally [rad].
     """
 
@@ -90,7 +90,7 @@ class FamilyHand(FiveAxisHand):
         self, pitches: Sequence[float], scene_object: SceneObject, at: FloatArray, side: FloatArray
     ) -> Mapping[str, Sequence[Approach]]:
         options = widths(pitches, scene_object, at, side)
-        # The jaw that stands may be on either side.
+        # The fixed jaw may be on either side.
         rolls = (0.0, math.pi) if self.one_jaw else (0.0,)
         options[FRONT] = [
             (Approach(approach.pitch, roll), width)
@@ -115,7 +115,7 @@ class FamilyHand(FiveAxisHand):
         return at.moved(frozen(at.position - away * R[:, 0]))
 
     def retreat(self, q: FloatArray, away: float) -> ToolTarget:
-        """Return ``drawn_back``, with a jaw that stands beside the object."""
+        """Return ``drawn_back``, with a fixed jaw beside the object."""
         back = self.drawn_back(q, away)
         return back.moved(back.position - JAW_ROOM * self._R(q)[:, 1]) if self.one_jaw else back
 

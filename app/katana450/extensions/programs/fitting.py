@@ -26,7 +26,7 @@ ROUND_ROLLS: Final = tuple(np.radians((0.0, 60.0, -60.0)).tolist())
 """[rad] Turns of the hand over an object that is round, tried in this order."""
 
 JAW_ROOM: Final = MARGIN + 1e-3
-"""[m] Distance of an object from a jaw that stands, before the other one pushes it there."""
+"""[m] Distance of an object from a fixed jaw, before the moving one pushes it there."""
 
 Widths = Mapping[str, Sequence[tuple[Approach, float]]]
 """Approaches by side, each with the width [m] of the object between the fingers."""
@@ -67,8 +67,8 @@ def widths(
 def fitting(options: Widths, opening: float, *, one_jaw: bool) -> Mapping[str, Sequence[Approach]]:
     """Return the approaches of ``options`` between whose fingers the object fits.
 
-    opening: distance between the open fingers [m]. one_jaw: whether one of them stands; the object
-    is beside it then. Raises InputError, with the widths, if there is none.
+    opening: distance between the open fingers [m]. one_jaw: whether one jaw is fixed; the object is
+    beside it then. Raises InputError, with the widths, if there is none.
     """
     rooms = (JAW_ROOM if one_jaw else MARGIN) + MARGIN
     most = opening - rooms

@@ -39,10 +39,10 @@ class GraspFrame:
 
     Attributes:
         T_palm_grasp: (4, 4) pose in the frame of the palm [m]. The origin is half-way between the
-            open fingers, a little behind their tips, or on the face of a jaw that stands. x points
-            from the palm to the tips, and the fingers close along y; a jaw that stands is at -y.
+            open fingers, a little behind their tips, or on the face of a fixed jaw. x points
+            from the palm to the tips, and the fingers close along y; a fixed jaw is at -y.
         opening: distance between the open fingers [m].
-        one_jaw: whether one jaw closes against another that stands.
+        one_jaw: whether one jaw closes against a fixed one.
     """
 
     T_palm_grasp: FloatArray

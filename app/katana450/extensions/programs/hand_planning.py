@@ -60,7 +60,7 @@ class HandPlanning(Protocol):
         """Return the tool at `q`, drawn back by ``away`` [m] along its own axis."""
 
     def retreat(self, q: FloatArray, away: float) -> DragTarget:
-        """Return ``drawn_back``, with a jaw that stands beside the object that was released."""
+        """Return ``drawn_back``, with a fixed jaw beside the object that was released."""
 
     def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
         """Return the branches on which a grasp at ``target`` is tried, that of `q` first.

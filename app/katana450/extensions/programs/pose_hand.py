@@ -65,7 +65,7 @@ class PoseHand:
         T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
         T_tool_grasp: (4, 4) pose of the grasp frame in that of the tool [m].
         opening: distance between the open fingers [m].
-        one_jaw: whether one jaw closes against another that stands.
+        one_jaw: whether one jaw closes against a fixed one.
     """
 
     kinematics: DrivenTool
@@ -133,7 +133,7 @@ class PoseHand:
         return at.moved(frozen(at.position - away * x))
 
     def retreat(self, q: FloatArray, away: float) -> DragTarget:
-        """Return ``drawn_back``, with a jaw that stands beside the object."""
+        """Return ``drawn_back``, with a fixed jaw beside the object."""
         back, R = self.drawn_back(q, away), forward(self.kinematics.chain, q)[:3, :3]
         aside = JAW_ROOM * R @ self.T_tool_grasp[:3, 1]
         return back.moved(frozen(back.position - aside)) if self.one_jaw else back

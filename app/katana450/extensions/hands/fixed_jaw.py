@@ -1,4 +1,4 @@
-"""The jaw of a hand that stands, while the other one pushes objects against it."""
+"""The fixed jaw of a hand, against which the moving jaw pushes objects."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ OVERLAP_TOLERANCE: Final = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class PalmJaw:
-    """A body of the palm, as `StandingJaw`.
+class FixedJaw:
+    """A body of the palm, as `FixedJawModel`.
 
     Attributes:
         name: of the part.
         palm: index of the group of the palm in the linkage.
-        y: (3,) unit vector in the frame of the palm, from this jaw to the one that moves.
+        y: (3,) unit vector in the frame of the palm, from this jaw to the moving one.
     """
 
     name: str
@@ -59,8 +59,8 @@ class PalmJaw:
         T[:2, 3] -= TOUCH_DISTANCE * y[:2]
         pushed = replace(item, T=frozen(T))
         others = [each for each in state.objects if each is not item and not each.carried]
-        met = any(_is_nearer(pushed, item, each) for each in others)
-        return name, distance, None if met else pushed
+        blocked = any(_is_nearer(pushed, item, each) for each in others)
+        return name, distance, None if blocked else pushed
 
     def _nearest(
         self, world: CollisionWorld, x: FloatArray, name: str, y: FloatArray
