@@ -17,10 +17,10 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 MAX_PUSH: Final = 0.05
 """[m] Maximum distance of the jaw from an object that is pushed against it."""
 
-FACING: Final = np.cos(np.radians(45.0))
+MIN_FACE_COSINE: Final = np.cos(np.radians(45.0))
 """[1] Cosine of the angle up to which a contact lies on the face of the jaw."""
 
-LEVEL: Final = np.sin(np.radians(6.0))
+MAX_SLOPE_SINE: Final = np.sin(np.radians(6.0))
 """[1] Sine of the slope of the closing direction up to which an object slides on its support."""
 
 OVERLAP_TOLERANCE: Final = 1e-6
@@ -53,7 +53,7 @@ class FixedJaw:
         """
         y = np.asarray(world.linkage.poses(state.x_setpoint)[self.palm, :3, :3] @ self.y)
         distance, name = self._nearest(world, state.x_setpoint, item.name, y)
-        if not TOUCH_DISTANCE < distance < MAX_PUSH or abs(float(y[2])) > LEVEL:
+        if not TOUCH_DISTANCE < distance < MAX_PUSH or abs(float(y[2])) > MAX_SLOPE_SINE:
             return name, distance, None
         T = item.T.copy()
         T[:2, 3] -= TOUCH_DISTANCE * y[:2]
@@ -77,7 +77,7 @@ class FixedJaw:
             one, other = (int(world.part_of[each[pair]]) for each in (world.first, world.second))
             if other == number and world.parts[one].mover == self.palm:
                 contact = placed.contact(pair)
-                if float(contact.normal @ y) >= FACING:
+                if float(contact.normal @ y) >= MIN_FACE_COSINE:
                     found = min(found, (contact.distance, contact.parts[0]))
         return found
 

@@ -14,10 +14,10 @@ from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 
-FAR: Final = 10.0
+PLANE_DISTANCE: Final = 10.0
 """[m] Distance of the planes from which the extent of bodies is measured."""
 
-PROBE: Final = 1e-5
+PROBE_RADIUS: Final = 1e-5
 """[m] Radius of the ball that stands for a point."""
 
 
@@ -55,7 +55,7 @@ class PlacedBodies:
     def reach(self, u: FloatArray) -> float:
         """Return how far the bodies reach along the unit vector `u` (3,) [m]."""
         plane, beyond = self._plane(u), half_space().geometry
-        return FAR - min(
+        return PLANE_DISTANCE - min(
             self._world.engine.distance(geometry, T, beyond, plane) for geometry, T in self._placed
         )
 
@@ -67,7 +67,7 @@ class PlacedBodies:
 
     def nearest(self, point: FloatArray) -> Witness:
         """Return the nearest point of the bodies to ``point`` (3,) [m], which comes first."""
-        ball = sphere(PROBE).geometry
+        ball = sphere(PROBE_RADIUS).geometry
         at = self._world.engine.transform(se3.from_rotation_translation(np.eye(3), point))
         found = [self._world.engine.witness(ball, at, *placed) for placed in self._placed]
         return min(found, key=lambda each: each.distance)
@@ -77,7 +77,9 @@ class PlacedBodies:
         return np.asarray(self._T_palm_base @ self._T[group])
 
     def _plane(self, u: FloatArray) -> Any:
-        return self._world.engine.transform(se3.from_rotation_translation(_with_z(-u), FAR * u))
+        return self._world.engine.transform(
+            se3.from_rotation_translation(_with_z(-u), PLANE_DISTANCE * u)
+        )
 
 
 def _with_z(u: FloatArray) -> FloatArray:

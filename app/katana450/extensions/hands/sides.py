@@ -29,22 +29,22 @@ MIN_STROKE: Final = 2e-3
 MIN_MOTION: Final = 1e-3
 """[m] Motion of its middle below which a group belongs to the palm."""
 
-ASTRAY: Final = 0.5
+MIN_ALIGNMENT: Final = 0.5
 """[1] Cosine of the angle up to which a group moves with the fingertip of its side."""
 
-SNAP: Final = np.cos(np.radians(30.0))
+SNAP_COSINE: Final = np.cos(np.radians(30.0))
 """[1] Cosine of the angle up to which an axis of the tool or the palm stands for a direction."""
 
-ALONG: Final = np.cos(np.radians(5.0))
-"""[1] The same for the direction in which two fingers close."""
+CLOSING_SNAP_COSINE: Final = np.cos(np.radians(5.0))
+"""[1] Cosine of the angle up to which an axis stands for the closing direction of two fingers."""
 
 MAX_FACE_GAP: Final = 0.02
 """[m] Maximum distance of the tip of a closed jaw from what it closes against."""
 
-NEARLY_CLOSED: Final = (0.02, 0.05, 0.1, 0.2, 0.3)
+FACE_FRACTIONS: Final = (0.02, 0.05, 0.1, 0.2, 0.3)
 """[1] Fractions of the range at which the direction from a jaw to the palm is measured."""
 
-FACING: Final = 2e-3
+MIN_TIP_DISTANCE: Final = 2e-3
 """[m] Distance of the tip from the palm from which on that direction is certain."""
 
 Groups = Mapping[int, Sequence[Part]]
@@ -147,14 +147,14 @@ def _of_two_fingers(
 
     gripper = _closed_where(hand.gripper, apart)
     sign = 1.0 if gripper.opened > gripper.closed else -1.0
-    y = snapped(sign * stroke, frames_of(hand), float(ALONG), None)
+    y = snapped(sign * stroke, frames_of(hand), float(CLOSING_SNAP_COSINE), None)
     between = 0.5 * float((middle(one, gripper.opened) + middle(other, gripper.opened)) @ y)
     sides: tuple[list[Part], list[Part]] = ([*one], [*other])
     for mover, motion in moved.items():
         if mover in tips:
             continue
         along = sign * float(motion @ y)
-        if abs(along) < ASTRAY * float(np.linalg.norm(motion)):
+        if abs(along) < MIN_ALIGNMENT * float(np.linalg.norm(motion)):
             raise InputError(
                 f"The gripper moves {_listed(groups[mover])} across the direction in which "
                 f"{_listed(one)} and {_listed(other)} close, and objects are held between two "
@@ -187,12 +187,12 @@ def _of_one_jaw(world: CollisionWorld, hand: Hand, groups: Groups, moved: Motion
     gripper = _closed_where(hand.gripper, apart)
     closed, opened = gripper.closed, gripper.opened
     facing = (
-        fixed.nearest(tip(closed + fraction * (opened - closed))) for fraction in NEARLY_CLOSED
+        fixed.nearest(tip(closed + fraction * (opened - closed))) for fraction in FACE_FRACTIONS
     )
-    found = next((each for each in facing if each.distance >= FACING), None)
+    found = next((each for each in facing if each.distance >= MIN_TIP_DISTANCE), None)
     if found is None or apart(closed) > MAX_FACE_GAP or apart(opened) - apart(closed) < MIN_STROKE:
         raise refusal
-    y = snapped(found.points[0] - found.points[1], frames_of(hand), float(SNAP), None)
+    y = snapped(found.points[0] - found.points[1], frames_of(hand), float(SNAP_COSINE), None)
     moving = [*groups[main], *(part for m in moved if m != main for part in groups[m])]
 
     def far(part: Part) -> float:
@@ -215,7 +215,7 @@ def _closed_where(gripper: GripperModel, apart: Callable[[float], float]) -> Gri
 def _astray(motion: FloatArray, other: FloatArray) -> bool:
     """Return whether two groups do not move the same way."""
     size = float(np.linalg.norm(motion) * np.linalg.norm(other))
-    return float(motion @ other) < ASTRAY * size
+    return float(motion @ other) < MIN_ALIGNMENT * size
 
 
 def _tip(

@@ -12,16 +12,18 @@ from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.scene_objects import Hand
 from katana450.errors import InputError
 from katana450.extensions.hands.placed_bodies import PlacedBodies
-from katana450.extensions.hands.sides import MIN_STROKE, SNAP, frames_of, sides_of, snapped
+from katana450.extensions.hands.sides import MIN_STROKE, SNAP_COSINE, frames_of, sides_of, snapped
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 DEPTH: Final = 0.01
-"""[m] Distance of the grasp frame behind the fingertips, at most."""
+"""[m] Maximum distance of the grasp frame behind the fingertips."""
 
 DEPTH_FRACTION: Final = 0.25
-"""[1] The same as a fraction of the length of the fingers, at most."""
+"""[1] Maximum distance of the grasp frame behind the fingertips, as a fraction of the length of the
+fingers.
+"""
 
 NO_FINGERS: Final = (
     "This arm has no gripper: its description has no finger joints behind the last axis. Steps "
@@ -87,7 +89,7 @@ def grasp_frame(
         raise InputError(
             f"The fingers {names} do not stand off the palm, so no direction of a grasp is known."
         )
-    x = snapped(ahead, frames_of(hand), float(SNAP), y)
+    x = snapped(ahead, frames_of(hand), float(SNAP_COSINE), y)
     z = np.cross(x, y)
     if outside - inside < MIN_STROKE:
         raise InputError(f"The fingers {names} leave no room between them when they are open.")
