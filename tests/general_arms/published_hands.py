@@ -154,6 +154,18 @@ HOOK: list[J | Box] = [
 ]
 """One finger that closes on nothing."""
 
+VICE: list[J | Box] = [
+    J("mount", "fixed", "tool0", "palm"),
+    Box("palm", (0.04, 0.04, 0.1396), (0.0, 0.0, 0.0698)),
+    J(
+        *("slide", "prismatic", "palm", "cheek", (0.0, 0.0, 0.01), ZERO, X, (0.025, 0.08)),
+        speed=0.1,
+    ),
+    Box("cheek", (0.01, 0.04, 0.02)),
+    J("tip", "fixed", "palm", "tcp", (0.0, 0.0, 0.02)),
+]
+"""One jaw that slides towards the middle of the palm and of the flange of a UR5e."""
+
 
 def hand_urdf(arm: str, hand: list[J | Box]) -> str:
     """Return the URDF of an arm of ``gripping_arms.HANDS`` with another hand on its flange."""

@@ -10,7 +10,7 @@ from katana450.extensions.programs.source import ScriptError
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import HANDS, gripping_urdf
 from tests.general_arms.published_arms import SKEWED_6
-from tests.general_arms.published_hands import HOOK, RADIAL, hand_urdf
+from tests.general_arms.published_hands import HOOK, RADIAL, VICE, hand_urdf
 from tests.general_arms.test_grasping import item, planned
 
 PART = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
@@ -88,6 +88,10 @@ HANDS_THAT_CANNOT = {
     "nothing opposite": (
         hand_urdf("UR5e", HOOK),
         "moves hook, which closes neither on another finger nor on a body of the palm",
+    ),
+    "no tip": (
+        hand_urdf("UR5e", VICE),
+        "middle of cheek is on a line along its motion through the middle of the palm",
     ),
     "five axes": (
         chain_urdf("arm", HANDS["UR5e"][0]).replace("revolute", "fixed", 1),

@@ -29,6 +29,9 @@ MIN_STROKE: Final = 2e-3
 MIN_MOTION: Final = 1e-3
 """[m] Motion of its middle below which a group belongs to the palm."""
 
+MIN_OFFSET: Final = 1e-3
+"""[m] Minimum distance of the middle of a jaw from its axis: it gives the direction to the tip."""
+
 MIN_ALIGNMENT: Final = 0.5
 """[1] Cosine of the angle up to which a group moves with the fingertip of its side."""
 
@@ -138,12 +141,13 @@ def _of_two_fingers(
     """Return the sides of fingers whose tips are those of the groups ``tips``."""
     one, other = (groups[mover] for mover in tips)
     stroke = moved[tips[1]] - moved[tips[0]]
+    direction = stroke / np.linalg.norm(stroke)
 
     def middle(parts: Sequence[Part], value: float) -> FloatArray:
         return PlacedBodies(world, parts, hand.palm, value).middle
 
     def apart(value: float) -> float:
-        return abs(float((middle(other, value) - middle(one, value)) @ stroke))
+        return abs(float((middle(other, value) - middle(one, value)) @ direction))
 
     gripper = _closed_where(hand.gripper, apart)
     sign = 1.0 if gripper.opened > gripper.closed else -1.0
@@ -228,18 +232,26 @@ def _tip(
 ) -> FloatArray:
     """Return the tip (3,) [m] of a jaw with the finger joint at ``value`` [rad or m].
 
-    It is the point that is farthest from the joint of the jaw, or from the middle of the palm
-    ``behind`` (3,) [m] if the jaw slides.
+    It is the point farthest in the direction from the joint axis to the middle of the jaw. If the
+    jaw slides, the axis is the line along its motion through ``behind`` (3,) [m], the middle of the
+    palm. Raises InputError if the middle of the jaw is on the axis.
     """
     placed = PlacedBodies(world, parts, hand.palm, value)
     linkage, mover = world.linkage, parts[0].mover
     root, axis = behind, motion / np.linalg.norm(motion)
+    line = "a line along its motion through the middle of the palm"
     if mover not in linkage.sliding:
         T = placed.T_palm_group(mover)
-        root, axis = T[:3, 3], T[:3, :3] @ linkage.axis[mover]
+        root, axis, line = T[:3, 3], T[:3, :3] @ linkage.axis[mover], "the axis of its joint"
     out = placed.middle - root
     out = out - (out @ axis) * axis
-    return placed.farthest(out / max(float(np.linalg.norm(out)), MIN_MOTION))
+    length = float(np.linalg.norm(out))
+    if length < MIN_OFFSET:
+        raise InputError(
+            f"The middle of {_listed(parts)} is on {line}, so the direction to its tip is not "
+            "known. Give it collision shapes that reach off this line."
+        )
+    return placed.farthest(out / length)
 
 
 def snapped(
