@@ -74,7 +74,7 @@ class SceneObject:
         name: unique among objects and links.
         shape, size: see ``Shape``.
         T: (4, 4) its pose in the base frame; in the frame of the hand while it is carried.
-        can_be_held: whether the fingers may touch it, and take it when both do.
+        can_be_held: whether the fingers may touch it, and hold it between both sides.
         held: whether the fingers hold it.
         solid: the solid of a mesh; None for other shapes.
         scale: factor on ``size``.

@@ -1,8 +1,8 @@
 """The two sides of a hand, and the end of the range of its joint at which they are closed.
 
 Links that one joint moves rigidly together form a group. The two groups that move most against each
-other are the fingertips. Every other group belongs to the side with which it moves and on which it
-stands, such as the bars of a linkage; one that does neither, or hardly moves, belongs to the palm.
+other are the fingertips. A group that stands on one side and moves with its fingertip, such as the
+bars of a linkage, belongs to that side. All others belong to neither side.
 If all groups move the same way, they are the moving jaw, and a body of the palm is the fixed one.
 """
 
@@ -27,7 +27,7 @@ MIN_STROKE: Final = 2e-3
 """[m] Minimum change of the distance of two fingers that can grasp."""
 
 MIN_MOTION: Final = 1e-3
-"""[m] Motion of its middle below which a group belongs to the palm."""
+"""[m] Motion of its middle below which a group belongs to neither side."""
 
 MIN_OFFSET: Final = 1e-3
 """[m] Minimum distance of the middle of a jaw from its axis: it gives the direction to the tip."""

@@ -77,7 +77,7 @@ class _Room:
 
 @dataclass(frozen=True)
 class Grasp:
-    """Grasp an object: open the fingers, approach it, close until both fingers touch.
+    """Grasp an object: open the fingers, approach it, close until both sides touch.
 
     Attributes:
         name: name of the object.

@@ -128,7 +128,7 @@ class State(Answer, frozen=True, kw_only=True):
         touching: Fingers that touch an object that can be held.
         touch: Forces, pressures and sensors of the gripper, see the documentation of touch; null
             for a gripper whose pads are not known.
-        held: Object that both fingers hold; null with an empty hand.
+        held: Object held between both sides of the hand; null with an empty hand.
         branch: Shoulder and elbow; for an arm outside the five-axis family, the words of the name
             of its branch.
         priority: Part of a target that is kept when the arm cannot satisfy all of it.
