@@ -150,6 +150,7 @@ def test_part_is_pushed_on_the_object_that_carries_it(plan: Planned, before: Sta
     T = T.copy()
     T[2, 3] = support.height
     stack = replace(before.objects[0], T=T), support
+    # By rounding, the distance between the two is a little below zero.
     closed = run(plan.session, replace(before, objects=stack), CLOSED)[-1]
     assert closed.held is not None
     assert closed.held.name == "part"

@@ -32,7 +32,7 @@ class FixedJaw:
     """A body of the palm, as `FixedJawModel`.
 
     Attributes:
-        name: of the part.
+        name: of the part whose face is nearest to the moving jaw.
         palm: index of the group of the palm in the linkage.
         y: (3,) unit vector in the frame of the palm, from this jaw to the moving one.
     """
@@ -59,7 +59,7 @@ class FixedJaw:
         T[:2, 3] -= TOUCH_DISTANCE * y[:2]
         pushed = replace(item, T=frozen(T))
         others = [each for each in state.objects if each is not item and not each.carried]
-        blocked = any(_is_nearer(pushed, item, each) for each in others)
+        blocked = any(_overlaps_more(pushed, item, each) for each in others)
         return name, distance, None if blocked else pushed
 
     def _nearest(
@@ -82,7 +82,7 @@ class FixedJaw:
         return found
 
 
-def _is_nearer(pushed: SceneObject, item: SceneObject, other: SceneObject) -> bool:
+def _overlaps_more(pushed: SceneObject, item: SceneObject, other: SceneObject) -> bool:
     """Return whether ``item`` overlaps ``other`` more once it is ``pushed``.
 
     Objects that stand on each other overlap by rounding.
