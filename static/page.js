@@ -452,7 +452,7 @@
   let episodes = null;
   window.addEventListener("status", async ({ detail }) => {
     if (!episodes && !detail.episodes) return;
-    await shown;
+    await restMayLoad;
     const { Episodes } = await import("./episodes/episodes.js");
     episodes ??= new Episodes(byId("stage"), { page, toast });
     episodes.draw(status);
