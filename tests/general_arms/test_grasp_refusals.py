@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from katana450.extensions.programs.approach import Approach
+from katana450.extensions.programs.family_hand import FamilyHand
+from katana450.extensions.programs.hand_choice import hand_of
 from katana450.extensions.programs.source import ScriptError
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import HANDS, gripping_urdf
 from tests.general_arms.published_arms import SKEWED_6
-from tests.general_arms.published_hands import HOOK, RADIAL, VICE, hand_urdf
+from tests.general_arms.published_hands import HOOK, RADIAL, VICE, hand_urdf, so101_urdf
 from tests.general_arms.test_grasping import item, planned
 
 PART = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
@@ -111,3 +117,18 @@ def test_skewed_arm_without_a_closed_form_is_refused_in_time(tmp_path: Path) -> 
     """It has no gripper either, and no posture is searched before that is reported."""
     with pytest.raises(ScriptError, match="has no gripper"):
         planned(tmp_path, chain_urdf("arm", SKEWED_6), ["pick: part"], PART)
+
+
+def test_fixed_jaw_on_the_other_side_is_not_out_of_reach(tmp_path: Path) -> None:
+    """A hand that is mounted half a turn farther reaches its jaw's other side by a turn back."""
+    plan = planned(tmp_path, so101_urdf(), ["gripper: open"], PART)
+    arm, session = plan.session.require_arm(), plan.session
+    hand = hand_of(session, plan.robot.require_arm().T_base_shoulder, arm.default_tool)
+    assert isinstance(hand, FamilyHand)
+    middle = np.array((0.23, 0.06, 0.03))
+    at = hand.before(middle, Approach(0.5), 0.01)
+    farther = replace(hand, roll=hand.roll + math.pi)
+    other = farther.before(middle, Approach(0.5, math.pi), 0.01)
+    assert other.roll == pytest.approx(at.roll, abs=1e-12)
+    np.testing.assert_allclose(other.position, at.position, atol=1e-12)
+    assert farther.branches_to(session.ready, other)

@@ -28,6 +28,7 @@ from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.turns import wrapped
 
 MAX_BEND: Final = math.radians(10.0)
 """[rad] Maximum angle between the fingers and the roll axis, along which the hand approaches."""
@@ -105,7 +106,7 @@ class FamilyHand(FiveAxisHand):
         inside = np.array((back, approach.shift, 0.0))
         T = self.T_tool_grasp @ se3.from_rotation_translation(np.eye(3), inside)
         chain = self.chain.with_tool(self.chain.M @ T)
-        at = ToolTarget(middle, approach.pitch, approach.roll + self.roll)
+        at = ToolTarget(middle, approach.pitch, wrapped(approach.roll + self.roll))
         pose = at.pose(chain, at.facing(chain, BRANCHES[0], 0.0)) @ se3.inverse(T)
         return at.moved(frozen(pose[:3, 3]))
 
