@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,6 +72,16 @@ def test_six_axes_give_the_reason(steps: list[str], thing: str, why: str, tmp_pa
 def test_four_axes_give_the_reason(steps: list[str], thing: str, why: str, tmp_path: Path) -> None:
     with pytest.raises(ScriptError, match=why):
         planned(tmp_path, gripping_urdf("OpenMANIPULATOR-X"), steps, thing)
+
+
+def test_room_of_both_jaws_is_stated(tmp_path: Path) -> None:
+    wide = item("part", "box", (150.0, 150.0, 50.0), (260.0, 0.0))
+    why = r"150 mm wide, .* need 6 mm of room beside the moving jaw and 7 mm beside the fixed one"
+    with pytest.raises(ScriptError, match=why) as refused:
+        planned(tmp_path, so101_urdf(), ["pick: part"], wide)
+    numbers = re.search(r"are (\d+) mm apart .* may have (\d+) mm", str(refused.value))
+    assert numbers is not None
+    assert int(numbers[1]) - int(numbers[2]) == 6 + 7
 
 
 def without_bodies(text: str) -> str:

@@ -67,11 +67,10 @@ def widths(
 def fitting(options: Widths, opening: float, *, one_jaw: bool) -> Mapping[str, Sequence[Approach]]:
     """Return the approaches of ``options`` between whose fingers the object fits.
 
-    opening: distance between the open fingers [m]. one_jaw: whether one jaw is fixed; the object is
-    beside it then. Raises InputError, with the widths, if there is none.
+    opening: distance between the open fingers [m]. one_jaw: whether one of them is a fixed jaw; the
+    object is beside it then. Raises InputError, with the widths, if there is none.
     """
-    rooms = (JAW_ROOM if one_jaw else MARGIN) + MARGIN
-    most = opening - rooms
+    most = opening - ((JAW_ROOM if one_jaw else MARGIN) + MARGIN)
     found = {
         name: tuple(
             approach._replace(shift=JAW_ROOM + 0.5 * width) if one_jaw else approach
@@ -81,11 +80,14 @@ def fitting(options: Widths, opening: float, *, one_jaw: bool) -> Mapping[str, S
         for name, each in options.items()
     }
     if not any(found.values()):
-        width = min((width for each in options.values() for _, width in each), default=0.0)
+        width = min(width for each in options.values() for _, width in each)
+        beside = "on either side"
+        if one_jaw:
+            beside = f"beside the moving jaw and {1e3 * JAW_ROOM:.0f} mm beside the fixed one"
         raise InputError(
             f"it is {1e3 * width:.0f} mm wide, which is too wide: the open fingers are "
-            f"{1e3 * opening:.0f} mm apart and need {500.0 * rooms:.0f} mm of room on "
-            f"either side, so an object may have {1e3 * most:.0f} mm."
+            f"{1e3 * opening:.0f} mm apart and need {1e3 * MARGIN:.0f} mm of room {beside}, so an "
+            f"object may have {1e3 * most:.0f} mm."
         )
     return found
 
