@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.errors import InputError
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.actions import FollowPlan
@@ -26,6 +27,8 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.simulation import Simulation
 from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.tilting import UNDERSIDES
+from katana450.extensions.recording.codec import Codec
+from katana450.extensions.recording.form_error import FormError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
@@ -241,16 +244,63 @@ def test_all_is_poured_at_a_rate(tmp_path: Path) -> None:
     assert state.poured.water.spilled == 0
 
 
+START = ToolPose.of(
+    se3.from_rotation_translation(so3.from_rpy(0.3, 0.2, 0.1), np.array((0.5, 0.1, 0.4)))
+)
+TURN = PoseTurn(
+    START,
+    np.array((0.4, 0.2, 0.3)),
+    so3.rotation_z(0.7)[:, 0],
+    np.array((0.5, 0.3, 0.1, -0.05)),
+    so3.rotation_z(0.2)[:, 0],
+)
+
+
 def test_turn_by_a_polynomial_keeps_the_lip_in_its_place() -> None:
-    start = ToolPose.of(
-        se3.from_rotation_translation(so3.from_rpy(0.3, 0.2, 0.1), np.array((0.5, 0.1, 0.4)))
-    )
-    point, axis = np.array((0.4, 0.2, 0.3)), so3.rotation_z(0.7)[:, 0]
-    angles = np.array((0.5, 0.3, 0.1, -0.05))
+    turn = replace(TURN, axis_in_pose=None)
     sigma = np.linspace(0.0, 1.0, 11)
-    T = PoseTurn(start, point, axis, axis, angles).at(Jet.variable(sigma)).T
-    before = se3.from_rotation_translation(start.R, start.position)
+    T = turn.at(Jet.variable(sigma)).T
+    before = se3.from_rotation_translation(START.R, START.position)
     for place, pose in zip(sigma.tolist(), T, strict=True):
-        R = so3.exp(np.polynomial.polynomial.polyval(2.0 * place - 1.0, angles) * axis)
-        turn = se3.from_rotation_translation(R, point - R @ point)
-        np.testing.assert_allclose(pose, turn @ before, atol=1e-12)
+        angle = np.polynomial.polynomial.polyval(2.0 * place - 1.0, turn.angles)
+        R = so3.exp(angle * turn.axis)
+        moved = se3.from_rotation_translation(R, turn.point - R @ turn.point)
+        np.testing.assert_allclose(pose, moved @ before, atol=1e-12)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_turn_is_read_from_recordings(kept: bool) -> None:
+    """Older recordings have no `axis_in_pose`: it is the axis then."""
+    codec = Codec()
+    form = codec.encoded(PoseTurn, TURN)
+    if not kept:
+        del form["axis_in_pose"]
+    read = codec.decoded(PoseTurn, form)
+    wanted = replace(TURN, axis_in_pose=TURN.axis_in_pose if kept else TURN.axis)
+    sigma = Jet.variable(np.linspace(0.0, 1.0, 5))
+    np.testing.assert_array_equal(read.at(sigma).T, wanted.at(sigma).T)
+
+
+@pytest.mark.parametrize("name", ["point", "axis", "angles", "axis_in_pose"])
+@pytest.mark.parametrize(
+    "wrong", [np.zeros(0), np.ones(2), np.ones((3, 3)), np.array((np.nan, 0.0, 1.0))]
+)
+def test_turn_of_wrong_numbers_is_refused(name: str, wrong: FloatArray) -> None:
+    if name == "angles" and wrong.shape == (2,):
+        wrong = np.array(0.0)
+    changed: dict[str, Any] = {name: wrong}
+    why = f"The {name} of a turn has"
+    with pytest.raises(InputError, match=why):
+        replace(TURN, **changed)
+    codec = Codec()
+    form = codec.encoded(PoseTurn, TURN)
+    form[name] = codec.encoded(FloatArray, wrong)
+    with pytest.raises(FormError, match=f"these fields are no PoseTurn: {why}"):
+        codec.decoded(PoseTurn, form)
+
+
+@pytest.mark.parametrize("name", ["axis", "axis_in_pose"])
+def test_turn_about_an_axis_of_another_length_is_refused(name: str) -> None:
+    changed: dict[str, Any] = {name: np.array((0.0, 0.0, 2.0))}
+    with pytest.raises(InputError, match=f"The {name} of a turn is not a unit vector"):
+        replace(TURN, **changed)

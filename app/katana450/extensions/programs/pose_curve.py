@@ -11,10 +11,11 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
+from katana450.errors import InputError
 from katana450.extensions.general_arms.pose_equations import PoseJets
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.curve import Curve
@@ -23,6 +24,9 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.planning.jet import Jet, sin_cos, sqrt
 from katana450.maths.planning.polyline import Polyline
+
+UNIT: Final = 1e-9
+"""[1] Maximum error of the length of a unit vector."""
 
 
 class PoseCurve(Protocol):
@@ -92,19 +96,26 @@ class PoseTurn:
     Attributes:
         start: the pose from which the angle counts.
         point, axis: (3,) [m] and unit vector (3,) of the axis.
-        axis_in_pose: the same axis in the frame of the rotation of ``start``.
         angles: coefficients (n,) of the angle [rad], of the powers of 2 sigma - 1.
+        axis_in_pose: the axis in the frame of the rotation of ``start``; None if it is the same.
     """
 
     start: ToolPose
     point: FloatArray
     axis: FloatArray
-    axis_in_pose: FloatArray
     angles: FloatArray
+    axis_in_pose: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        angles = finite_array(self.angles, (np.size(self.angles),), "The coefficients of an angle")
-        object.__setattr__(self, "angles", frozen(angles))
+        # At least one coefficient is needed.
+        sizes = {"point": 3, "axis": 3, "angles": max(np.size(self.angles), 1)}
+        if self.axis_in_pose is not None:
+            sizes["axis_in_pose"] = 3
+        for name, size in sizes.items():
+            value = finite_array(getattr(self, name), (size,), f"The {name} of a turn")
+            if name.startswith("axis") and abs(math.hypot(*value) - 1.0) > UNIT:
+                raise InputError(f"The {name} of a turn is not a unit vector.")
+            object.__setattr__(self, name, frozen(value))
 
     @property
     def joins(self) -> tuple[float, ...]:
@@ -125,7 +136,8 @@ class PoseTurn:
                 self.point.tolist(), _turned(beside, self.axis, sine, cosine), strict=True
             )
         )
-        turned = (_turned(c, self.axis_in_pose, sine, cosine) for c in self.start.R.T)
+        axis = self.axis if self.axis_in_pose is None else self.axis_in_pose
+        turned = (_turned(c, axis, sine, cosine) for c in self.start.R.T)
         return PoseJets(x, y, z, tuple(turned))  # type: ignore[arg-type]
 
 

@@ -49,7 +49,7 @@ class Tilting:
     def by(self, tilts: FloatArray) -> AnyCurve:
         """Return the turn by a polynomial; ``tilts``: see `PoseTurn`."""
         lip = self.lip
-        return PoseTurn(self.at, lip.point, lip.axis, lip.axis_in_pose, tilts)
+        return PoseTurn(self.at, lip.point, lip.axis, tilts, lip.axis_in_pose)
 
 
 @dataclass(frozen=True, eq=False)
