@@ -28,6 +28,9 @@ from katana450.maths.planning.polyline import Polyline
 UNIT: Final = 1e-9
 """[1] Maximum error of the length of a unit vector."""
 
+Terms = list[list[float]]
+"""For x, y and z of a turned vector the terms with the cosine, with the sine, and without both."""
+
 
 class PoseCurve(Protocol):
     """The pose of the tool along a path."""
@@ -74,19 +77,15 @@ class TurnedCurve:
             one, two, three = (tuple(map(Jet.constant, column)) for column in self.R.T.tolist())
         else:
             s, c = sin_cos(angle * sigma)
-            one, two, three = (tuple(c * u + s * v + f for u, v, f in rows) for rows in terms)
+            one, two, three = (_turned(each, s, c) for each in terms)
         return PoseJets(x, y, z, (one, two, three))  # type: ignore[arg-type]
 
     @cached_property
-    def _terms(self) -> tuple[float, list[list[list[float]]]]:
-        """The angle, and for each column the terms of x, y, z: with cosine, with sine, constant."""
+    def _terms(self) -> tuple[float, list[Terms]]:
+        """The angle [rad], and the terms of each column."""
         angle = math.hypot(*self.turn)
         axis = self.turn / (angle or 1.0)
-        rows = []
-        for column in self.R.T:
-            along = (axis @ column) * axis
-            rows.append(np.stack((column - along, np.cross(axis, column), along), axis=1).tolist())
-        return angle, rows
+        return angle, [_terms(column, axis) for column in self.R.T]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,18 +132,23 @@ class PoseTurn:
         x, y, z = (
             place + each
             for place, each in zip(
-                self.point.tolist(), _turned(beside, self.axis, sine, cosine), strict=True
+                self.point.tolist(), _turned(_terms(beside, self.axis), sine, cosine), strict=True
             )
         )
         axis = self.axis if self.axis_in_pose is None else self.axis_in_pose
-        turned = (_turned(c, axis, sine, cosine) for c in self.start.R.T)
+        turned = (_turned(_terms(c, axis), sine, cosine) for c in self.start.R.T)
         return PoseJets(x, y, z, tuple(turned))  # type: ignore[arg-type]
 
 
-def _turned(v: FloatArray, axis: FloatArray, sine: Jet, cosine: Jet) -> tuple[Jet, ...]:
-    """Return the vector ``v`` (3,) turned by an angle about the unit vector ``axis`` (3,)."""
+def _terms(v: FloatArray, axis: FloatArray) -> Terms:
+    """Return the terms of a turn of the vector ``v`` (3,) about the unit vector ``axis`` (3,)."""
     along = (axis @ v) * axis
-    terms = np.stack((v - along, np.cross(axis, v), along), axis=1).tolist()
+    terms: Terms = np.stack((v - along, np.cross(axis, v), along), axis=1).tolist()
+    return terms
+
+
+def _turned(terms: Terms, sine: Jet, cosine: Jet) -> tuple[Jet, ...]:
+    """Return the vector of ``terms``, turned by an angle."""
     return tuple(cosine * c + sine * s + f for c, s, f in terms)
 
 
