@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -12,15 +12,15 @@ import numpy as np
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.approach import FRONT, Approach
-from katana450.extensions.programs.fitting import JAW_ROOM, fitting, widths, with_pitch
+from katana450.extensions.programs.fitting import Widths, widths
 from katana450.extensions.programs.five_axis_hand import (
     MAX_SKEW,
     PITCHES,
     STEEP_PITCHES,
     FiveAxisHand,
 )
+from katana450.extensions.programs.frame_hand import FrameHand
 from katana450.extensions.programs.grasp_frame import GraspFrame
-from katana450.extensions.programs.pose_hand import TIP_DISTANCES
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -35,7 +35,7 @@ MAX_BEND: Final = math.radians(10.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FamilyHand(FiveAxisHand):
+class FamilyHand(FrameHand, FiveAxisHand):
     """The hand of one chain as `HandPlanning`, which grasps by the frame of its fingers.
 
     Attributes:
@@ -50,8 +50,7 @@ class FamilyHand(FiveAxisHand):
     one_jaw: bool
     roll: float
 
-    tool: ClassVar[str] = ""
-    tip_distances: ClassVar[Sequence[float]] = TIP_DISTANCES
+    pitches: ClassVar[Sequence[float]] = (*PITCHES, *STEEP_PITCHES)
 
     @staticmethod
     def of(
@@ -75,21 +74,10 @@ class FamilyHand(FiveAxisHand):
             roll=-math.atan2(R[2, 1], R[1, 1]),
         )
 
-    def approaches(
-        self, scene_object: SceneObject, at: FloatArray, side: FloatArray
-    ) -> Mapping[str, Sequence[Approach]]:
-        """Return those between whose fingers the object fits: yaw and roll follow from the arm."""
-        return self._fitting((*PITCHES, *STEEP_PITCHES), scene_object, at, side)
-
-    def with_pitch(
-        self, pitch: float, scene_object: SceneObject, at: FloatArray, side: FloatArray
-    ) -> Sequence[Approach]:
-        """Return the approaches with ``pitch``."""
-        return with_pitch(self._fitting((pitch,), scene_object, at, side), pitch)
-
-    def _fitting(
+    def _options(
         self, pitches: Sequence[float], scene_object: SceneObject, at: FloatArray, side: FloatArray
-    ) -> Mapping[str, Sequence[Approach]]:
+    ) -> Widths:
+        """Return those of which yaw and roll follow from the arm."""
         options = widths(pitches, scene_object, at, side)
         # The fixed jaw may be on either side.
         rolls = (0.0, math.pi) if self.one_jaw else (0.0,)
@@ -99,7 +87,7 @@ class FamilyHand(FiveAxisHand):
             for roll in rolls
             if abs(approach.aside) <= MAX_SKEW
         ]
-        return fitting(options, self.opening, one_jaw=self.one_jaw)
+        return options
 
     def before(self, middle: FloatArray, approach: Approach, back: float) -> ToolTarget:
         """Return the tool with the grasp frame before ``middle``, in the plane of the arm."""
@@ -110,15 +98,9 @@ class FamilyHand(FiveAxisHand):
         pose = at.pose(chain, at.facing(chain, BRANCHES[0], 0.0)) @ se3.inverse(T)
         return at.moved(frozen(pose[:3, 3]))
 
-    def drawn_back(self, q: FloatArray, away: float) -> ToolTarget:
-        """Return the tool at `q`, drawn back along the fingers."""
-        at, R = ToolTarget.at(self.chain, q), self._R(q)
-        return at.moved(frozen(at.position - away * R[:, 0]))
-
-    def retreat(self, q: FloatArray, away: float) -> ToolTarget:
-        """Return ``drawn_back``, with a fixed jaw beside the object."""
-        back = self.drawn_back(q, away)
-        return back.moved(back.position - JAW_ROOM * self._R(q)[:, 1]) if self.one_jaw else back
+    def _at(self, q: FloatArray) -> ToolTarget:
+        """Return the target of the tool at `q` (5,) [rad]."""
+        return ToolTarget.at(self.chain, q)
 
     def _R(self, q: FloatArray) -> FloatArray:
         """Return the rotation (3, 3) of the grasp frame in {S} at `q` (5,) [rad]."""

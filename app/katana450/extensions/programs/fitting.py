@@ -11,7 +11,7 @@ import numpy as np
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.errors import InputError
-from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, YAW_TOLERANCE, Approach
+from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, Approach
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.turns import wrapped
 from katana450.maths.planning.plan import MARGIN
@@ -90,8 +90,3 @@ def fitting(options: Widths, opening: float, *, one_jaw: bool) -> Mapping[str, S
             f"object may have {1e3 * most:.0f} mm."
         )
     return found
-
-
-def with_pitch(found: Mapping[str, Sequence[Approach]], pitch: float) -> Sequence[Approach]:
-    """Return those of ``found`` on the side of a hand with ``pitch`` [rad]."""
-    return found.get(ABOVE if abs(pitch - DOWN) <= YAW_TOLERANCE else FRONT, ())

@@ -107,12 +107,12 @@ class FiveAxisHand:
         along = math.cos(pitch) * out - math.sin(pitch) * UP
         return ToolTarget(middle - back * along, pitch, roll)
 
-    def drawn_back(self, q: FloatArray, away: float) -> ToolTarget:
+    def drawn_back(self, q: FloatArray, away: float) -> DragTarget:
         """Return the tool at `q`, drawn back radially and along its pitch."""
         at = ToolTarget.at(self.chain, q)
         return self.before(at.position, Approach(at.pitch, at.roll), away)
 
-    def retreat(self, q: FloatArray, away: float) -> ToolTarget:
+    def retreat(self, q: FloatArray, away: float) -> DragTarget:
         """Return ``drawn_back``."""
         return self.drawn_back(q, away)
 

@@ -14,6 +14,7 @@ from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP, YAW_TOLERANCE, Approach, symmetry
+from katana450.extensions.programs.fitting import Widths
 from katana450.extensions.programs.grasp_frame import GraspFrame
 from katana450.extensions.programs.pose_hand import PoseHand, Tilt
 from katana450.maths.geometry import se3, so3
@@ -97,7 +98,7 @@ class PlanarHand(PoseHand):
         scene_object: SceneObject,
         at: FloatArray,
         side: FloatArray,
-    ) -> dict[str, list[tuple[Approach, float]]]:
+    ) -> Widths:
         """Return those options that need no turn about the hand's own axis or the vertical."""
         options = super()._options(pitches, scene_object, at, side)
         found = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final, NamedTuple, cast
 
@@ -13,7 +13,7 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import Approach, symmetry
-from katana450.extensions.programs.fitting import JAW_ROOM, fitting, widths, with_pitch
+from katana450.extensions.programs.frame_hand import FrameHand
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -23,9 +23,6 @@ from katana450.maths.kinematics.turns import wrapped
 
 PITCHES: Final = tuple(np.radians((45.0, 25.0, 65.0)).tolist())
 """[rad] Pitches of the hand for a grasp from the front, tried in this order."""
-
-TIP_DISTANCES: Final = tuple(np.arange(0.0, 0.056, 0.002).tolist())
-"""[m] Distances of the hand before the middle of a low object, tried from the smallest."""
 
 SWINGS: Final = tuple(np.radians((-30.0, 30.0, -60.0, 60.0)).tolist())
 """[rad] Turns of the swivel of seven axes with which a pose is tried."""
@@ -57,7 +54,7 @@ class Tilt(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class PoseHand:
+class PoseHand(FrameHand):
     """The hand of one arm as `HandPlanning`.
 
     Attributes:
@@ -74,46 +71,12 @@ class PoseHand:
     opening: float
     one_jaw: bool = False
 
-    tool: ClassVar[str] = ""
-    tip_distances: ClassVar[Sequence[float]] = TIP_DISTANCES
+    pitches: ClassVar[Sequence[float]] = PITCHES
 
     @property
     def is_redundant(self) -> bool:
         """True if it has more than six axes."""
         return self.kinematics.chain.n > 6
-
-    def approaches(
-        self, scene_object: SceneObject, at: FloatArray, side: FloatArray
-    ) -> Mapping[str, Sequence[Approach]]:
-        """Return the approaches with the fingers on two opposite sides of a box or mesh."""
-        return self._fitting(PITCHES, scene_object, at, side)
-
-    def with_pitch(
-        self, pitch: float, scene_object: SceneObject, at: FloatArray, side: FloatArray
-    ) -> Sequence[Approach]:
-        """Return the approaches with ``pitch``."""
-        return with_pitch(self._fitting((pitch,), scene_object, at, side), pitch)
-
-    def _fitting(
-        self,
-        pitches: Sequence[float],
-        scene_object: SceneObject,
-        at: FloatArray,
-        side: FloatArray,
-    ) -> Mapping[str, Sequence[Approach]]:
-        """Return all approaches between whose fingers the object fits, or raise InputError."""
-        options = self._options(pitches, scene_object, at, side)
-        return fitting(options, self.opening, one_jaw=self.one_jaw)
-
-    def _options(
-        self,
-        pitches: Sequence[float],
-        scene_object: SceneObject,
-        at: FloatArray,
-        side: FloatArray,
-    ) -> dict[str, list[tuple[Approach, float]]]:
-        """Return approaches by side, each with the width [m] of the object between the fingers."""
-        return widths(pitches, scene_object, at, side)
 
     def before(self, middle: FloatArray, approach: Approach, back: float) -> DragTarget:
         """Return the tool with the grasp frame before ``middle``, on its own x axis."""
@@ -126,17 +89,13 @@ class PoseHand:
         T = se3.from_rotation_translation(R, p) @ se3.inverse(self.T_tool_grasp)
         return ToolPose.of(T)
 
-    def drawn_back(self, q: FloatArray, away: float) -> DragTarget:
-        """Return the tool, drawn back along the x axis of the grasp frame."""
-        at = self.kinematics.target_at(q)
-        x = forward(self.kinematics.chain, q)[:3, :3] @ self.T_tool_grasp[:3, 0]
-        return at.moved(frozen(at.position - away * x))
+    def _at(self, q: FloatArray) -> ToolPose:
+        """Return the pose of the tool at `q`."""
+        return self.kinematics.target_at(q)
 
-    def retreat(self, q: FloatArray, away: float) -> DragTarget:
-        """Return ``drawn_back``, with a fixed jaw beside the object."""
-        back, R = self.drawn_back(q, away), forward(self.kinematics.chain, q)[:3, :3]
-        aside = JAW_ROOM * R @ self.T_tool_grasp[:3, 1]
-        return back.moved(frozen(back.position - aside)) if self.one_jaw else back
+    def _R(self, q: FloatArray) -> FloatArray:
+        """Return the rotation (3, 3) of the grasp frame in {S} at `q`."""
+        return np.asarray(forward(self.kinematics.chain, q)[:3, :3] @ self.T_tool_grasp[:3, :3])
 
     def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
         """Return those with a posture inside the limits that takes the pose."""
@@ -174,7 +133,7 @@ class PoseHand:
         """
         here, there = (math.atan2(p[1], p[0]) for p in (cup, over))
         turn = self.way_round(here, there)
-        x, y, _ = self.kinematics.target_at(q).position - self.drawn_back(q, 1.0).position
+        x, y, _ = self._R(q)[:, 0]
         for aside in TILTS:
             toward = so3.rotation_z(math.atan2(y, x) + turn + aside)[:, 0]
             yield Tilt(turn, toward, toward)
