@@ -16,7 +16,7 @@ from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP, YAW_TOLERANCE, Approach, symmetry
 from katana450.extensions.programs.fitting import Widths
 from katana450.extensions.programs.grasp_frame import GraspFrame
-from katana450.extensions.programs.pose_hand import PoseHand, Tilt
+from katana450.extensions.programs.pose_hand import PoseHand, TiltDirection
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -143,12 +143,15 @@ class PlanarHand(PoseHand):
         R = so3.rotation_z(self._turn(pose.position, self.beside[0])) @ pose.R
         return self._branches_to(q, se3.from_rotation_translation(R, pose.position))
 
-    def tilts(self, q: FloatArray, cup: FloatArray, over: FloatArray) -> Iterable[Tilt]:
+    def tilt_directions(
+        self, q: FloatArray, cup: FloatArray, over: FloatArray
+    ) -> Iterable[TiltDirection]:
         """Yield the two directions in the plane of the arm, that away from axis 1 first."""
         present = self._present(q)
         turn = self._turn(over, float(self.across @ so3.rotation_z(-present) @ cup))
         for outward in (self.outward, -self.outward):
-            yield Tilt(wrapped(turn - present), so3.rotation_z(turn) @ outward, outward)
+            toward = so3.rotation_z(turn) @ outward
+            yield TiltDirection(wrapped(turn - present), toward, outward)
 
     def _present(self, q: FloatArray) -> float:
         """Return the turn [rad] of the plane of the arm about the vertical at `q` (4,) [rad]."""

@@ -30,7 +30,7 @@ SWINGS: Final = tuple(np.radians((-30.0, 30.0, -60.0, 60.0)).tolist())
 MAX_BRANCHES: Final = 4
 """Maximum number of branches on which a grasp is tried."""
 
-TILTS: Final = tuple(np.radians((90.0, -90.0, 45.0, -45.0, 0.0)).tolist())
+TILT_DIRECTIONS: Final = tuple(np.radians((90.0, -90.0, 45.0, -45.0, 0.0)).tolist())
 """[rad] Directions in which a cup is tilted, seen from above, from that in which the hand points.
 Beside the hand the wrist does most of the turn.
 """
@@ -39,7 +39,7 @@ TURNS: Final = tuple(np.radians((45.0, -45.0, 90.0, -90.0, 180.0)).tolist())
 """[rad] Further turns of an object over its new place, beside those with the arm and without."""
 
 
-class Tilt(NamedTuple):
+class TiltDirection(NamedTuple):
     """A direction in which a held cup is tilted over a place.
 
     Attributes:
@@ -123,7 +123,9 @@ class PoseHand(FrameHand):
         """Return the shorter way."""
         return wrapped(there - here)
 
-    def tilts(self, q: FloatArray, cup: FloatArray, over: FloatArray) -> Iterable[Tilt]:
+    def tilt_directions(
+        self, q: FloatArray, cup: FloatArray, over: FloatArray
+    ) -> Iterable[TiltDirection]:
         """Yield the directions in which a cup can be tilted with its lip over a place.
 
         Args:
@@ -134,9 +136,9 @@ class PoseHand(FrameHand):
         here, there = (math.atan2(p[1], p[0]) for p in (cup, over))
         turn = self.way_round(here, there)
         x, y, _ = self._R(q)[:, 0]
-        for aside in TILTS:
+        for aside in TILT_DIRECTIONS:
             toward = so3.rotation_z(math.atan2(y, x) + turn + aside)[:, 0]
-            yield Tilt(turn, toward, toward)
+            yield TiltDirection(turn, toward, toward)
 
     def turned(self, target: DragTarget, position: FloatArray, angle: float) -> DragTarget:
         """Return the pose, turned as one rigid body."""

@@ -46,10 +46,10 @@ class Tilting:
         )
         return self.planning.arc(self.lip.point, self.lip.axis, angle, 0.0, one, other)
 
-    def by(self, tilts: FloatArray) -> AnyCurve:
-        """Return the turn by a polynomial; ``tilts``: see `PoseTurn`."""
+    def by(self, coefficients: FloatArray) -> AnyCurve:
+        """Return the turn whose tilt is a polynomial of ``coefficients`` (n,); see `PoseTurn`."""
         lip = self.lip
-        return PoseTurn(self.at, lip.point, lip.axis, tilts, lip.axis_in_pose)
+        return PoseTurn(self.at, lip.point, lip.axis, coefficients, lip.axis_in_pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +91,10 @@ def about_the_lip(
     radius, tall = size
     for height in UNDERSIDES:
         point = over + (tall + height) * UP
-        for tilt in hand.tilts(builder.q, cup, point):
-            lip = Lip(
-                frozen(point), *(frozen(np.cross(UP, d)) for d in (tilt.toward, tilt.in_pose))
-            )
+        for turn, toward, in_pose in hand.tilt_directions(builder.q, cup, point):
+            lip = Lip(frozen(point), *(frozen(np.cross(UP, d)) for d in (toward, in_pose)))
             # The cup turns with the arm on the way to the basin.
-            moved = so3.rotation_z(tilt.turn) @ (level.position - cup)
-            at = hand.turned(level, point - radius * tilt.toward + moved, tilt.turn)
+            moved = so3.rotation_z(turn) @ (level.position - cup)
+            at = hand.turned(level, point - radius * toward + moved, turn)
             assert isinstance(at, ToolPose)
             yield Tilting(at, lip, builder.planning)
