@@ -20,13 +20,13 @@ MAX_ASIDE: Final = math.radians(100.0)
 """[rad] Maximum angle between the hand and the direction away from axis 1, seen from above."""
 
 ASIDE: Final = tuple(np.radians((0.0, 40.0, -40.0)).tolist())
-"""[rad] Those of an object that is round, tried in this order."""
+"""[rad] Angles of the hand beside that direction for round objects, in the order of trial."""
 
 ROUND_ROLLS: Final = tuple(np.radians((0.0, 60.0, -60.0)).tolist())
-"""[rad] Turns of the hand over an object that is round, tried in this order."""
+"""[rad] Turns of the hand over a round object, in the order of trial."""
 
 JAW_ROOM: Final = MARGIN + 1e-3
-"""[m] Distance of an object from a fixed jaw, before the moving one pushes it there."""
+"""[m] Distance of an object from a fixed jaw, before the other one pushes it there."""
 
 Widths = Mapping[str, Sequence[tuple[Approach, float]]]
 """Approaches by side, each with the width [m] of the object between the fingers."""

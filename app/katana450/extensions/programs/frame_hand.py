@@ -55,7 +55,10 @@ class FrameHand(ABC):
         return at.moved(frozen(at.position - away * self._R(q)[:, 0]))
 
     def retreat(self, q: FloatArray, away: float) -> DragTarget:
-        """Return ``drawn_back``, for a fixed jaw also moved by JAW_ROOM along -y of that frame."""
+        """Return the tool, drawn back by ``away`` [m] and, for a fixed jaw, moved by JAW_ROOM.
+
+        It moves along -y of the grasp frame, so that this jaw leaves the object.
+        """
         back = self.drawn_back(q, away)
         aside = JAW_ROOM * self._R(q)[:, 1]
         return back.moved(frozen(back.position - aside)) if self.one_jaw else back

@@ -2,7 +2,7 @@
 
 A step is written once, in terms of this interface. `FiveAxisHand` gives it pitch and roll of the
 five-axis family, `FamilyHand` the same for the grasp frame of its fingers, `PoseHand` and
-`PlanarHand` poses of the grasp frame of any other hand.
+`PlanarHand` poses of the grasp frame of any other hand. `FrameHand` is what these three share.
 """
 
 from __future__ import annotations
@@ -60,7 +60,11 @@ class HandPlanning(Protocol):
         """Return the tool at `q`, drawn back by ``away`` [m] along its own axis."""
 
     def retreat(self, q: FloatArray, away: float) -> DragTarget:
-        """Return ``drawn_back``, with a fixed jaw beside the object that was released."""
+        """Return the tool with which the hand leaves an object that it released at `q`.
+
+        It is drawn back by ``away`` [m] and, for a fixed jaw, moved by JAW_ROOM along -y of the
+        grasp frame, so that this jaw leaves the object.
+        """
 
     def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
         """Return the branches on which a grasp at ``target`` is tried, that of `q` first.

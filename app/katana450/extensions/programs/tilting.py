@@ -1,4 +1,4 @@
-"""The turn of a held cup over a basin: about the axis of the tool, or about the lip of the cup."""
+"""The turn of a held cup about its lip, over a basin."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UNDERSIDES: Final = (0.02, 0.05, 0.09)
 
 @dataclass(frozen=True, eq=False)
 class Tilting:
-    """The motions that empty a cup.
+    """The motions that tilt a cup about its lip.
 
     Attributes:
         at: the tool with the cup upright over the basin.
