@@ -37,7 +37,7 @@ class Place(Request, frozen=True, kw_only=True):
         size: Size of the shape [m]: box (x, y, z), cylinder (radius, height), sphere (radius). The
             size of a mesh is that of its file.
         mesh: Key of the mesh, from the answer to its upload.
-        can_be_held: Whether the fingers may touch the object; they hold it when both touch it.
+        can_be_held: Whether the fingers may touch the object; they hold it between both sides.
         scale: Factor on the size.
         colour: Colour such as "#94a3b8", or "own" for the colour of the file.
         opacity: Opacity, 1 for an opaque object.
