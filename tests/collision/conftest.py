@@ -25,7 +25,9 @@ def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
         if request.param == "fcl":
             patch.setattr(engines, "find_spec", lambda _: None)
         engines.engine.cache_clear()
-        yield engines.engine()
+        found = engines.engine()
+        assert request.param in type(found).__module__
+        yield found
     engines.engine.cache_clear()
 
 

@@ -57,7 +57,6 @@ class Engine(Protocol):
         """Return the corners (m, 3, 3) of the triangles of the hull of ``points`` (n, 3)."""
 
 
-@cache
 def library() -> str:
     """Return the name of the library, which need not be loaded for it."""
     return "fcl" if find_spec("coal") is None else "coal"
