@@ -15,6 +15,7 @@
   const RUMBLE_RATE = 20; // Hz
   const TRY_AFTER = 2000; // ms without a drawn scene after which the page checks whether it can be drawn
   const REST_AFTER = 100; // ms after the first frame in which the rest of the page waits
+  const OFFLINE = "No connection to the arm.";
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
@@ -269,6 +270,7 @@
     if (same) same.focus();
   }
 
+  const GROUPS = ["acts", "orders", "clear-stop"]; // what can be pressed only with a connection
   let [drawnActs, drawnOrders] = ["", ""];
   function draw() {
     // A press is complete when the arm's state shows the stop.
@@ -315,14 +317,17 @@
     More.draw(status.name);
     const simulated = status.silence_profile === "simulation";
     text("on-silence", simulated ? SIMULATION : "stops after a quarter of a second");
+    for (const id of GROUPS) byId(id).inert = !up;
     if (!up) unknown();
   }
 
-  // Without a connection the state of the arm is unknown.
+  // Without a connection the state of the arm is unknown, and its driver too.
   function unknown() {
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : "starting";
     byId("go").hidden = true;
+    for (const id of GROUPS) byId(id).inert = true;
+    text("holder", "Driver unknown");
     Pace.draw(null);
     head(proven ? "Stopped" : "No connection");
     text("why", proven ?? "");
@@ -341,11 +346,13 @@
     const missing = status?.stop_path;
     banner.hidden = !(lost || bad || missing) || (lost && !status);
     banner.className = lost ? "lost" : "";
+    // Beside the panel, whose head says which arm it is.
+    banner.style.width = `${scene.contentWindow.katanaScene?.viewer()?.canvas?.clientWidth ?? scene.clientWidth}px`;
     const stale = "The picture is old.";
     let words = "The picture is old, although the connection is fast: this device may draw too slowly.";
     if (!lost && !bad) words = missing;
     else if (proven) words = `The arm has confirmed the stop on another path. ${stale}`;
-    else if (lost) words = `No connection to the arm. ${asking ? "Your STOP is sent as soon as it is back." : `${stale} Reconnecting.`}`;
+    else if (lost) words = `${OFFLINE} ${asking ? "Your STOP is sent as soon as it is back." : `${stale} Reconnecting.`}`;
     else if (silent > QUIET) words = `The arm does not answer. ${stale}`;
     else if (trip > SLOW) words = `The connection is slow. ${stale}`;
     if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
@@ -374,6 +381,7 @@
     } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
+    else if (data.unsaid) data.id === QUIETLY || toast(OFFLINE);
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
     else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard) || timeline?.hear(data.heard) || Jog.hear(data.heard))) return drawLink();

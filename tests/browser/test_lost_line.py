@@ -43,6 +43,18 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         page.page.keyboard.press("Control+z")
         assert bar(page, "toast") == "No connection to the arm."
         assert noticed < 1.0
+        # Nothing that needs the arm can be pressed, or it says why nothing happens.
+        assert bar(page, "holder") == "Driver unknown"
+        assert page.page.locator("#acts[inert] button").all_inner_texts() == ["Take"]
+        page.page.evaluate("document.querySelector('#toast').textContent = ''")
+        page.page.locator("#go").dispatch_event("click")
+        page.page.wait_for_function("document.querySelector('#toast').textContent")
+        assert bar(page, "toast") == "No connection to the arm."
+        banner = page.page.locator("#banner").bounding_box()
+        panel = page.frame.evaluate("document.querySelector('[role=tablist]').getBoundingClientRect().x")
+        assert banner
+        assert banner["width"] > 600
+        assert banner["x"] + banner["width"] <= panel + 1
         robot.since = time.time()
         server.restart()
         back = time.monotonic()
@@ -51,6 +63,8 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
         print(f"noticed after {noticed:.2f} s, back after {time.monotonic() - back:.2f} s")
         page.wait_ready(("/arm", MOVE))
+        assert page.page.locator("#acts:not([inert]) button").all_inner_texts() == ["Take"]
+        assert bar(page, "holder") == "Nobody drives"
         robot.settle()
         # viser starts with its first view; then the camera is restored.
         page.wait_until(lambda: np.allclose(camera(page), looked, atol=2e-3), "the old view")
