@@ -51,7 +51,9 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         page.page.wait_for_function("document.querySelector('#toast').textContent")
         assert bar(page, "toast") == "No connection to the arm."
         banner = page.page.locator("#banner").bounding_box()
-        panel = page.frame.evaluate("document.querySelector('[role=tablist]').getBoundingClientRect().x")
+        panel = page.frame.evaluate(
+            "document.querySelector('[role=tablist]').getBoundingClientRect().x"
+        )
         assert banner
         assert banner["width"] > 600
         assert banner["x"] + banner["width"] <= panel + 1
