@@ -24,16 +24,18 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import zstandard
+from starlette.applications import Starlette
 from websockets.asyncio.client import ClientConnection, connect
 
 from benchmarks.start_and_idle import cpu_seconds
-from katana450.assembly.routes import application
+from katana450.assembly.routes import control_routes
 from katana450.assembly.web_server import WebServer
 from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import SUBPROTOCOL, Proxy
 from katana450.server.viser_bridge.viser_server import KEY_HEADER, open_server
+from katana450.server.web.admission import Admission
 from katana450.server.web.listen import listen
 from katana450.settings import Settings
 from tests.gateway.client import enter, page_name, websocket
@@ -58,9 +60,9 @@ def serve() -> None:
     web.start()
     hub = Hub(time.monotonic)
     proxy = Proxy(hub, web.authenticator, Guard(server), server.get_port(), KEY)
-    proxy.complete.set()
-    app = application(hub, Budgets(hub.clock), proxy, web)
-    web.loop.call_soon_threadsafe(web.complete, app)
+    routes = control_routes(hub, Budgets(hub.clock), web.authenticator, proxy)
+    app = Admission(Starlette(routes=[*web.routes, *routes]), hub, web.authenticator, web.acceptor)
+    web.loop.call_soon_threadsafe(web.show, app)
     print(json.dumps({"viser": server.get_port(), "gateway": port}), flush=True)
     due = time.perf_counter()
     while True:

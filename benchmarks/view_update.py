@@ -130,6 +130,7 @@ def drive(commands: Callable[[int, Session, State], Command | None]) -> None:
         settings.frame_rate,
         ViewOptions(layers(Namespace(workspace=None))),
     )
+    view.add_panel(lambda _: ())
     nodes = BareNodes(bare, robot.require_arm().chain.n)
     ours: list[float] = []
     floor: list[float] = []

@@ -119,7 +119,9 @@ class Table:
 
     def __init__(self, state: State, runner: Callable[[Hub], Runner] | None = None) -> None:
         self.t = 100.0
-        self.hub = Hub(lambda: self.t, runner=runner)
+        self.hub = Hub(lambda: self.t)
+        if runner is not None:
+            self.hub.use_runner(runner(self.hub))
         self.arm = FakeArm(state)
         self.hub.gate.arm = cast(Any, self.arm)
         self.notices_of: dict[str, list[dict[str, Any]]] = {}

@@ -52,7 +52,20 @@ def test_other_requests_wait_for_the_application(web: WebServer) -> None:
         with pytest.raises(FutureTimeoutError):
             asked.result(0.3)
         answer = PlainTextResponse("ok", 203)
-        web.loop.call_soon_threadsafe(web.complete, answer)
+        web.loop.call_soon_threadsafe(web.show, answer)
+        with pytest.raises(FutureTimeoutError):
+            asked.result(0.3)
+        web.loop.call_soon_threadsafe(web.complete)
+        assert asked.result(10.0) == 203
+
+
+@pytest.mark.parametrize("path", ["/control", "/stop", "/leave"])
+def test_our_page_waits_only_for_the_scene(web: WebServer, path: str) -> None:
+    with ThreadPoolExecutor(1) as pool:
+        asked: Future[int] = pool.submit(lambda: ask(f"{url_of(web)}{path}")[0])
+        with pytest.raises(FutureTimeoutError):
+            asked.result(0.3)
+        web.loop.call_soon_threadsafe(web.show, PlainTextResponse("ok", 203))
         assert asked.result(10.0) == 203
 
 

@@ -126,6 +126,7 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
     )
     gestures = RecordedGestures()
     view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, ViewOptions())
+    view.add_panel(lambda _: ())
     floor: Any = internals.nodes(server)["/floor"]
     assert floor.position[2] == pytest.approx(-0.3, abs=1e-3)
     state = session.step(publisher.snapshot.state, (cmd.PlaceObject(block(-0.3)),), 0.0)
@@ -163,8 +164,9 @@ def machine_view(
             if folder is not None:
                 yield folder
 
-    given = ViewOptions(folders=folders)
-    return MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, given), session
+    view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, ViewOptions())
+    view.add_panel(folders)
+    return view, session
 
 
 def test_extensions_add_what_needs_no_tool(server: viser.ViserServer, robot: Robot) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from threading import Event
 
@@ -17,7 +17,7 @@ from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
 from katana450.assembly.gateway import Gateway
-from katana450.assembly.robot_session import DescribedRobot, find_robot
+from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
 from katana450.extension import extensions, serve_extensions
 from katana450.server.service.arm_handle import ArmHandle
@@ -31,56 +31,95 @@ from katana450.server.view.view import View, ViewOptions
 from katana450.server.view.view_updater import ViewUpdater
 
 
-def build_frontend(
-    gateway: Gateway, config: FrontendConfig, meshes: Meshes, ended: Event
-) -> tuple[FrontEnd, ViewUpdater, DetourPlanner | None]:
-    """Connect ``gateway`` to the arm; return the pipe to its process, the view, and the planner.
+class Frontend:
+    """The view, and the arm as the gateway sees it: first the scene, then all the rest.
 
-    The planner of detours is None for a robot without a tool. The pipe is served when this function
-    returns, so no answer contains a state older than this call. The view is not started.
-
-    Args:
-        gateway: the server of the page.
-        config: settings and options of the front end.
-        meshes: the meshes of scene objects.
-        ended: set when the server ends.
-
-    Raises:
-        ConfigurationError: an option needs an arm, but the robot has none.
-        EOFError: the server ends, or the arm's process has closed the pipe.
+    Attributes:
+        pipe: the pipe to the arm's process.
+        view: the view.
     """
-    settings, added = config.settings, layers(config.options)
-    found = find_robot(settings, config.urdf, config.tool)
-    robot, session, _ = found
-    address = config.address
-    front_end = FrontEnd(
-        connect_when_ready(address, Greeting(FRONT), ended),
-        session.check,
-        lambda number: connect(address, Greeting(FRONT, number)),
-    )
-    nodes = _nodes(config.options, robot, session.environment)
-    front_end.on_stop_change = partial(gateway.soon, gateway.hub.follow_stop)
-    front_end.on_command_at_rest = partial(gateway.soon, gateway.watch_closely)
-    folders = partial(_folders, gateway, config.options, robot, front_end)
-    if robot.arm is None:
-        for layer in added:
-            if layer.what:
-                raise ConfigurationError(f"{layer.what} {robot.why}")
-        front_end.start()
-        gateway.attach(ArmHandle(robot, session, front_end, None, nodes))
-        joint_options = ViewOptions(meshes=meshes, folders=folders)
-        return front_end, _joint_view(gateway, config, found, front_end, joint_options), None
-    planning_worker = PlanningWorker(session, front_end.state_publisher, front_end)
-    options = ViewOptions(added, meshes, folders, find_gizmo(robot.arm.kinematics.freedoms))
-    view = _view(gateway, config, found, front_end, options)
-    go = partial(gateway.hub.gate.submit, cmd.Go()) if settings.go_on_release else None
-    detours = DetourPlanner(session, front_end.state_publisher, planning_worker, go)
-    planning_worker.notify = gateway.announce
-    planning_worker.redirected = guarded(gateway.hub.runner.redirected)
-    front_end.start()
-    gateway.attach(ArmHandle(robot, session, front_end, planning_worker, nodes))
-    detours.start()
-    return front_end, view, detours
+
+    def __init__(
+        self, gateway: Gateway, config: FrontendConfig, meshes: Meshes, ended: Event
+    ) -> None:
+        """Connect to the arm, and build the scene.
+
+        Args:
+            gateway: the server of the page.
+            config: settings and options of the front end.
+            meshes: the meshes of scene objects.
+            ended: set when the server ends.
+
+        Raises:
+            ConfigurationError: an option needs an arm, but the robot has none.
+            EOFError: the server ends, or the arm's process has closed the pipe.
+        """
+        self._gateway, self._config = gateway, config
+        settings, added = config.settings, layers(config.options)
+        self._found = find_robot(settings, config.urdf, config.tool)
+        robot, session, _ = self._found
+        address = config.address
+        self.pipe = FrontEnd(
+            connect_when_ready(address, Greeting(FRONT), ended),
+            session.check,
+            lambda number: connect(address, Greeting(FRONT, number)),
+        )
+        self.pipe.on_stop_change = partial(gateway.soon, gateway.hub.follow_stop)
+        self.pipe.on_command_at_rest = partial(gateway.soon, gateway.watch_closely)
+        if robot.arm is None:
+            for layer in added:
+                if layer.what:
+                    raise ConfigurationError(f"{layer.what} {robot.why}")
+            make, options = _joint_view(), ViewOptions(meshes=meshes)
+        else:
+            gizmo = find_gizmo(robot.arm.kinematics.freedoms)
+            make, options = View, ViewOptions(added, meshes, gizmo)
+        self.view: ViewUpdater = make(
+            gateway.viser,
+            robot,
+            self.pipe.state_publisher,
+            gateway.gestures,
+            lambda: self.pipe.last_ticket,
+            session,
+            settings.frame_rate,
+            options,
+        )
+        self._detours: DetourPlanner | None = None
+
+    def attach(self) -> None:
+        """Attach the arm to the gateway.
+
+        The pipe is served when this function returns, so no answer contains a state older than this
+        call.
+        """
+        gateway, hub, pipe = self._gateway, self._gateway.hub, self.pipe
+        robot, session, _ = self._found
+        nodes = _nodes(self._config.options, robot, session.environment)
+        planning_worker = None
+        if robot.arm is not None:
+            planning_worker = PlanningWorker(session, pipe.state_publisher, pipe)
+            planning_worker.notify = gateway.announce
+            # The runner comes later.
+            planning_worker.redirected = guarded(lambda: hub.runner.redirected())  # noqa: PLW0108
+            on_release = self._config.settings.go_on_release
+            go = partial(hub.gate.submit, cmd.Go()) if on_release else None
+            self._detours = DetourPlanner(session, pipe.state_publisher, planning_worker, go)
+        pipe.start()
+        gateway.attach(ArmHandle(robot, session, pipe, planning_worker, nodes))
+        if self._detours is not None:
+            self._detours.start()
+
+    def start(self) -> None:
+        """Add the panel, and start the view. Raises KatanaError."""
+        robot, options = self._found.robot, self._config.options
+        self.view.add_panel(partial(_folders, self._gateway, options, robot, self.pipe))
+        self.view.start()
+
+    def stop(self) -> None:
+        """End the view and the planner."""
+        self.view.stop()
+        if self._detours is not None:
+            self._detours.stop()
 
 
 def find_gizmo(freedoms: int) -> type[Gizmo] | None:
@@ -105,25 +144,6 @@ def _nodes(options: Namespace | None, robot: Robot, environment: Environment) ->
     return Nodes(robot)
 
 
-def _view(
-    gateway: Gateway,
-    config: FrontendConfig,
-    found: DescribedRobot,
-    front_end: FrontEnd,
-    view_options: ViewOptions,
-) -> View:
-    return View(
-        gateway.viser,
-        found.robot,
-        front_end.state_publisher,
-        gateway.gestures,
-        lambda: front_end.last_ticket,
-        found.session,
-        config.settings.frame_rate,
-        view_options,
-    )
-
-
 def _folders(
     gateway: Gateway, options: Namespace | None, robot: Robot, front_end: FrontEnd, tabs: PanelTabs
 ) -> Iterator[PanelFolder]:
@@ -146,19 +166,7 @@ def _folders(
             yield folder
 
 
-def _joint_view(
-    gateway: Gateway,
-    config: FrontendConfig,
-    found: DescribedRobot,
-    front_end: FrontEnd,
-    view_options: ViewOptions,
-) -> ViewUpdater:
+def _joint_view() -> Callable[..., ViewUpdater]:
     """Return the view of a robot without a tool; without an extension, one that shows nothing."""
-    publisher, rate = front_end.state_publisher, config.settings.frame_rate
-    for each in extensions():
-        if each.joint_view is not None:
-            gestures, last_ticket = gateway.gestures, lambda: front_end.last_ticket
-            view, (robot, session, _) = each.joint_view(), found
-            shown = gateway.viser, robot, publisher, gestures, last_ticket, session, rate
-            return view(*shown, view_options)
-    return ViewUpdater(gateway.viser, publisher, rate)
+    found = (each.joint_view() for each in extensions() if each.joint_view is not None)
+    return next(found, lambda server, _robot, publisher, *_: ViewUpdater(server, publisher, 1.0))

@@ -8,8 +8,8 @@ from __future__ import annotations
 import gc
 import socket
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,54 +90,35 @@ def _run(
     from katana450.server.viser_bridge.viser_server import close_server
 
     meshes = Meshes(config.folder)
-    options = config.options
-    parts = () if options is None else serve_extensions()
-    routes = [
-        lambda context, given=part.routes: given(context._replace(options=options))
-        for part in parts
-        if part.routes is not None
-    ]
-    runners = [part.runner() for part in parts if part.runner is not None]
-    gateway = Gateway(
-        config.settings,
-        web,
-        config.lines,
-        meshes,
-        routes,
-        partial(runners[0], options=options) if runners and options is not None else None,
-        [partial(part.handler(), options=options) for part in parts if part.handler is not None]
-        if options is not None
-        else [],
-    )
+    gateway = Gateway(config.settings, web, config.lines, meshes)
     gateway.hub.supervisor_problem = lambda: supervisor.problem
     supervisor.notify = gateway.announce
-    senders = [
-        part.send_records(options, web.recorder, records)
-        for part in parts
-        if part.send_records is not None and options is not None
-    ]
-    # Without a reader, notes would only take memory.
-    web.recorder.enabled = any(senders)
-    gateway.start()
-    supervisor.prove(lambda: gateway.hub.held_up < HANG_SECONDS)
+    senders: list[Callable[[], None] | None] = []
     try:
-        from katana450.assembly.frontend import build_frontend
+        from katana450.assembly.frontend import Frontend
 
-        front_end, view, detours = build_frontend(gateway, config, meshes, supervisor.ended)
+        frontend = Frontend(gateway, config, meshes, supervisor.ended)
         gateway.show()
-        view.start()
+        frontend.attach()
+        # Browsers draw the scene meanwhile.
+        options = config.options
+        for part in serve_extensions():
+            if options is not None and part.send_records is not None:
+                senders.append(part.send_records(options, web.recorder, records))
+        # Without a reader, notes would only take memory.
+        web.recorder.enabled = any(senders)
+        gateway.start(options)
+        supervisor.prove(lambda: gateway.hub.held_up < HANG_SECONDS)
+        frontend.start()
         supervisor.report(READY)
-        while not supervisor.ended.wait(WAKE_INTERVAL) and not front_end.cut.is_set():
-            if view.failed.is_set():
+        while not supervisor.ended.wait(WAKE_INTERVAL) and not frontend.pipe.cut.is_set():
+            if frontend.view.failed.is_set():
                 raise SystemExit(1)
-        front_end.close()
+        frontend.pipe.close()
         web.stop()
-        view.stop()
-        if detours is not None:
-            detours.stop()
+        frontend.stop()
     finally:
         web.stop()
-        for close in senders:
-            if close is not None:
-                close()
+        for close in filter(None, senders):
+            close()
         close_server(gateway.viser)

@@ -1,4 +1,7 @@
-"""The gateway: the application behind the web server, with viser behind it."""
+"""The gateway: the application behind the web server, with viser behind it.
+
+The scene is served first. What only requests need is imported when browsers have got it.
+"""
 
 from __future__ import annotations
 
@@ -8,30 +11,34 @@ import math
 import secrets
 import socket
 import time
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from argparse import Namespace
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any
 
 import viser
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
 
 from katana450.arm.robot.object_meshes import Meshes
-from katana450.assembly.routes import application
+from katana450.assembly.routes import control_routes, health_route
 from katana450.assembly.web_server import WebServer
 from katana450.errors import LeaseError
+from katana450.extension import serve_extensions
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import keep_alive
 from katana450.server.service.hub import TICK, Hub
-from katana450.server.service.request_handler import RequestHandler
-from katana450.server.service.runner import Runner
+from katana450.server.service.mutes import MutedError
 from katana450.server.service.stop_state import ClearBy
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
-from katana450.server.web.http_api import RouteProvider
-from katana450.server.web.program_socket import LineServer
+from katana450.server.web.admission import Admission
+from katana450.server.web.bodies import TOO_MANY
 from katana450.server.web.stop_monitor import watch_stop_path
 from katana450.settings import Settings
 
@@ -53,20 +60,14 @@ class Gateway:
         web: WebServer,
         lines: socket.socket | None = None,
         meshes: Meshes | None = None,
-        routes: Sequence[RouteProvider] = (),
-        runner: Callable[[Hub], Runner] | None = None,
-        handlers: Sequence[Callable[[Hub], RequestHandler]] = (),
     ) -> None:
-        """Set up the application; ``start`` gives it to the server.
+        """Set up the application; ``show`` and ``start`` give it to the server.
 
         Args:
             settings: settings of the server.
             web: the web server, which is started.
             lines: the socket for programs that send JSON lines.
             meshes: the meshes of scene objects, to which uploaded ones are added.
-            routes: routes of the extensions.
-            runner: see ``Hub``.
-            handlers: further handlers of requests.
         """
         self._settings, self._web = settings, web
         self._lines_socket = lines
@@ -74,23 +75,44 @@ class Gateway:
             keep_alive(lines)
         key = secrets.token_urlsafe(32)
         self.viser: viser.ViserServer = open_server(key)
-        self.hub = Hub(time.monotonic, settings.silence, meshes, runner, ClearBy(settings.clear_by))
+        self.hub = Hub(time.monotonic, settings.silence, meshes, ClearBy(settings.clear_by))
         self.hub.people, self.hub.stop_path = web.people, web.stop_path
         self.hub.gate.recorder = web.recorder
-        for handler in handlers:
-            self.hub.add_handler(handler(self.hub))
         guard = Guard(self.viser)
         self.gestures = Gestures(self.viser, guard, self.hub)
-        self._proxy = Proxy(self.hub, web.authenticator, guard, self.viser.get_port(), key)
-        budgets = Budgets(self.hub.clock)
-        self._app = application(self.hub, budgets, self._proxy, web, routes)
-        self._lines = LineServer(self.hub, web.authenticator, budgets)
+        proxy = Proxy(self.hub, web.authenticator, guard, self.viser.get_port(), key)
+        self._budgets = Budgets(self.hub.clock)
+        own = control_routes(self.hub, self._budgets, web.authenticator, proxy)
+        self._app = Starlette(routes=[*web.routes, *own], exception_handlers={MutedError: _muted})
         self._moves = asyncio.Event()
         self._close_until = -math.inf
 
-    def start(self) -> None:
-        """Let the server answer every request."""
-        self.soon(self._web.complete, self._app, *self._watches())
+    def show(self) -> None:
+        """Let browsers have the scene, which is complete."""
+        web = self._web
+        self.soon(web.show, Admission(self._app, self.hub, web.authenticator, web.acceptor))
+
+    def start(self, options: Namespace | None) -> None:
+        """Let the server answer every request, also those of the extensions.
+
+        ``options``: options of the extensions; None if no extension takes part.
+        """
+        from katana450.server.web.http_api import Api
+        from katana450.server.web.program_socket import LineServer
+
+        hub, who = self.hub, self._web.authenticator
+        parts = () if options is None else serve_extensions()
+        runners = [part.runner for part in parts if part.runner is not None]
+        handlers = [part.handler for part in parts if part.handler is not None]
+        provided = [part.routes for part in parts if part.routes is not None]
+        if runners:
+            hub.use_runner(runners[0]()(hub, options or Namespace()))
+        for handler in handlers:
+            hub.add_handler(handler()(hub, options or Namespace()))
+        api = Api(hub, who, self._budgets, options, provided)
+        self._app.router.routes.extend([health_route(hub), *api.routes()])
+        lines = LineServer(hub, who, self._budgets).run(self._lines_socket)
+        self.soon(self._web.complete, lines, *self._watches())
 
     def attach(self, arm: ArmHandle) -> None:
         """Let clients drive ``arm`` from now on."""
@@ -102,10 +124,6 @@ class Gateway:
             self.hub.follow_stop()
 
         self.soon(attach)
-
-    def show(self) -> None:
-        """Let browsers have the scene, which is complete."""
-        self.soon(self._proxy.complete.set)
 
     def announce(self, why: str) -> None:
         """Notify all clients why a request is not executed. Can be called in any thread."""
@@ -139,9 +157,8 @@ class Gateway:
             raise LeaseError("The server does not answer. Check the state of the arm.") from error
 
     def _watches(self) -> Iterator[Coroutine[Any, Any, None]]:
-        """Yield the watchdogs of this process, and the server of JSON lines."""
+        """Yield the watchdogs of this process."""
         yield self._watch()
-        yield self._lines.run(self._lines_socket)
         port, host = self._settings.stop_port, self._web.host
         if port is not None:
             secure = self._settings.tls_cert is not None
@@ -175,3 +192,10 @@ class Gateway:
             with suppress(TimeoutError):
                 async with asyncio.timeout(pause):
                     await self._moves.wait()
+
+
+async def _muted(_request: Request, error: Exception) -> Response:
+    """Answer a STOP that does not count, because its sender is muted."""
+    assert isinstance(error, MutedError)
+    retry = {"Retry-After": str(math.ceil(error.retry))}
+    return PlainTextResponse(str(error), TOO_MANY, retry)

@@ -1,7 +1,8 @@
 """The web server: a thread with the only port that other machines can reach.
 
-It serves the pages at once. Other requests wait until the application is complete: its imports take
-longer than a browser needs for the pages.
+It serves the pages at once, and the scene as soon as it is complete: a page that gets it in parts
+draws every part. Other requests wait until the application is complete. Its imports take longer
+than a browser needs for the pages.
 """
 
 from __future__ import annotations
@@ -34,6 +35,10 @@ from katana450.settings import Settings
 
 PAGES, FILES = ("/", "/enter"), ("/static/", "/viser/")
 """Paths, and prefixes of paths, that are served before the application is complete."""
+
+OF_PAGE = ("/viser", "/control", "/stop", "/leave")
+"""Paths that are served when the scene is complete: the websockets of our page, and its STOP. A
+browser opens one websocket after the other, so a page whose second one waited would not draw."""
 
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
@@ -84,7 +89,7 @@ class WebServer:
         self.routes = page_routes(self.authenticator, self.stop_path, self.recorder)
         self._app: ASGIApp = Starlette(routes=self.routes)
         self._beside: list[asyncio.Task[None]] = []
-        self._complete = asyncio.Event()
+        self._shown, self._complete = asyncio.Event(), asyncio.Event()
         self._server = _Server(
             self.acceptor,
             uvicorn.Config(
@@ -113,9 +118,14 @@ class WebServer:
         if not self._server.begun.wait(START_SECONDS) or not self._thread.is_alive():
             raise ConfigurationError("The gateway did not start; see the log above.")
 
-    def complete(self, app: ASGIApp, *beside: Coroutine[Any, Any, None]) -> None:
-        """Serve all by ``app``, and run ``beside`` as long. Call it in the server's thread."""
-        self._app, self._beside = app, [asyncio.create_task(each) for each in beside]
+    def show(self, app: ASGIApp) -> None:
+        """Serve our page and the scene by ``app``. Call it in the server's thread."""
+        self._app = app
+        self._shown.set()
+
+    def complete(self, *beside: Coroutine[Any, Any, None]) -> None:
+        """Serve all by that app, and run ``beside`` as long. Call it in the server's thread."""
+        self._beside = [asyncio.create_task(each) for each in beside]
         self._complete.set()
 
     def stop(self) -> None:
@@ -136,7 +146,7 @@ class WebServer:
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         if not (scope["path"] in PAGES or scope["path"].startswith(FILES)):
-            await self._complete.wait()
+            await (self._shown if scope["path"] in OF_PAGE else self._complete).wait()
         await self._app(scope, receive, send)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from html import escape
 
 import viser
@@ -16,7 +16,7 @@ from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.objects.handles import HANDLES
 from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
-from katana450.server.view.panel_folder import PanelFolder
+from katana450.server.view.panel_folder import AddFolders
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.scene_tab import LogProblem
@@ -41,7 +41,7 @@ class MachinePanel:
         robot: Robot,
         gestures: GestureGate,
         state: State,
-        folders: Callable[[PanelTabs], Iterable[PanelFolder]],
+        folders: AddFolders,
     ) -> None:
         """Add the tabs to the panel.
 

@@ -18,6 +18,7 @@ from katana450.extensions.joint_view.machine_panel import MachinePanel
 from katana450.extensions.objects.handles import ObjectHandles
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.paint import PaintNodes
+from katana450.server.view.panel_folder import AddFolders
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.tint import Tint
@@ -45,7 +46,7 @@ class MachineView(ViewUpdater):
         frame_rate: float,
         view_options: ViewOptions,
     ) -> None:
-        """Build the scene and the panel.
+        """Build the scene.
 
         Args:
             server: viser's server.
@@ -55,13 +56,10 @@ class MachineView(ViewUpdater):
             last_ticket: Returns the ticket of the newest command.
             session: The session, which has the environment of objects.
             frame_rate: Maximum number of updates per second [Hz].
-            view_options: The meshes of scene objects, and the controls of extensions.
-
-        Raises:
-            KatanaError: The controls of an extension cannot be shown.
+            view_options: The meshes of scene objects.
         """
         super().__init__(server, state_publisher, frame_rate)
-        self._robot = robot
+        self._robot, self._gestures = robot, gestures
         self._last_ticket = last_ticket
         environment = session.environment
         set_up_room(server, environment.table_height - FLOOR_GAP)
@@ -74,10 +72,13 @@ class MachineView(ViewUpdater):
         self._tint = Tint(server, robot, self._nodes.path)
         self._objects = SceneObjectNodes(server, load_props(), environment, view_options.meshes)
         self._handles = ObjectHandles(server, environment, gestures)
-        state = state_publisher.snapshot.state
-        self._panel = MachinePanel(server.gui, robot, gestures, state, view_options.folders)
-        self._panel.handles.on_update(lambda _: self._handles.show(self._panel.handles.value))
         self.show(state_publisher.snapshot)
+
+    def add_panel(self, folders: AddFolders) -> None:
+        """Add the panel, with the controls of extensions. Raises KatanaError."""
+        state, gui = self._state_publisher.snapshot.state, self._server.gui
+        self._panel = MachinePanel(gui, self._robot, self._gestures, state, folders)
+        self._panel.handles.on_update(lambda _: self._handles.show(self._panel.handles.value))
 
     def show(self, snapshot: Snapshot) -> None:
         """Send the changes in ``snapshot`` to every browser."""
@@ -88,9 +89,10 @@ class MachineView(ViewUpdater):
             self._handles.follow(state)
             self._paint.follow(state)
             self._tint.follow(state)
-            self._panel.follow(
-                state,
-                time.perf_counter(),
-                caught_up=snapshot.ticket == self._last_ticket(),
-            )
         self._server.flush()
+
+    def show_panel(self, snapshot: Snapshot) -> None:
+        """Send the changes of the panel in ``snapshot`` to every browser."""
+        with self._server.atomic():
+            caught_up = snapshot.ticket == self._last_ticket()
+            self._panel.follow(snapshot.state, time.perf_counter(), caught_up=caught_up)

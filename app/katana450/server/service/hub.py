@@ -58,14 +58,13 @@ class Hub:
         clock: Callable[[], float],
         hold_after: float = Settings.silence,
         meshes: Meshes | None = None,
-        runner: Callable[[Hub], Runner] | None = None,
         clear_by: ClearBy = ClearBy.DRIVER,
     ) -> None:
         """Create a hub without participants.
 
         ``hold_after``: heartbeat timeout of the driver [s] after which a moving arm stops, or
-        pauses if it is simulated. ``meshes``: initial meshes. ``runner``: factory of the
-        ``Runner``; None for one that never drives. ``clear_by``: persons who may clear a stop.
+        pauses if it is simulated. ``meshes``: initial meshes. ``clear_by``: persons who may clear a
+        stop.
         """
         self.clock = clock
         self._hold_after = hold_after
@@ -74,10 +73,8 @@ class Hub:
         self.stop_path, self.stop_news = StopPath(), StopNews()
         self.event_log = EventLog()
         self.people = People(clock)
-        self.runner = Runner(self, Namespace()) if runner is None else runner(self)
         self.handlers: list[RequestHandler] = []
-        self.add_handler(self.runner)
-        self.gate.on_stop = guarded(self.runner.stopped)
+        self.use_runner(Runner(self, Namespace()))
         self.meshes = Meshes() if meshes is None else meshes
         self._participants: dict[str, Participant] = {}
         self.pictures = ShownPictures()
@@ -89,6 +86,12 @@ class Hub:
         """Returns what is wrong with the supervisor of this process, in words."""
         self.shown: dict[str, Any] = {}
         """Entries of extensions in the status of all pages. It is replaced, never changed."""
+
+    def use_runner(self, runner: Runner) -> None:
+        """Let ``runner`` drive the arm over time, in place of one that never does."""
+        self.runner = runner
+        self.add_handler(runner)
+        self.gate.on_stop = guarded(runner.stopped)
 
     def add_handler(self, handler: RequestHandler) -> None:
         """Let ``handler`` answer its requests."""

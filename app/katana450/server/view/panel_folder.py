@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple, Protocol
 
 import viser
@@ -20,6 +20,10 @@ class PanelFolder(Protocol):
 
     def follow(self) -> None:
         """Show changes. Called in the view's thread for each state that is shown."""
+
+
+AddFolders = Callable[[PanelTabs], Iterable[PanelFolder]]
+"""Function that adds the controls of extensions to the tabs. Raises KatanaError."""
 
 
 class FolderContext(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +27,7 @@ from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import Panel
-from katana450.server.view.panel_folder import PanelFolder
+from katana450.server.view.panel_folder import AddFolders
 from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
@@ -63,13 +63,11 @@ class ViewOptions:
     Attributes:
         layers: layers of extensions.
         meshes: the meshes of scene objects.
-        folders: adds the controls of extensions to the tabs of the panel. Raises KatanaError.
         gizmo: the class of the gizmo of an arm outside the five-axis family.
     """
 
     layers: tuple[ViewLayer, ...] = ()
     meshes: Meshes = field(default_factory=Meshes)
-    folders: Callable[[PanelTabs], Iterable[PanelFolder]] = lambda _: ()
     gizmo: type[Gizmo] | None = None
 
 
@@ -87,7 +85,7 @@ class View(ViewUpdater):
         frame_rate: float,
         view_options: ViewOptions | None = None,
     ) -> None:
-        """Build the scene and the panel.
+        """Build the scene.
 
         Args:
             server: viser's server.
@@ -106,12 +104,12 @@ class View(ViewUpdater):
         view_options = ViewOptions() if view_options is None else view_options
         server.gui.set_panel_label(title(robot.name))
         self._robot, self._arm = robot, robot.require_arm()
+        self._gestures, self._choices = gestures, session.choices
         self._last_ticket = last_ticket
         props = load_props()
         self._scenery = Scenery(
             server, robot, session, props, gestures, view_options.meshes, view_options.layers
         )
-        state = state_publisher.snapshot.state
         self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, robot, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, robot, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
@@ -124,20 +122,25 @@ class View(ViewUpdater):
         if view_options.gizmo is not None:
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
-        shows = DisplayOptions(self._look_from, view_options.layers)
+        self._layers = view_options.layers
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
+        self.show(state_publisher.snapshot)
+
+    def add_panel(self, folders: AddFolders) -> None:
+        """Add the panel, with the controls of extensions. Raises KatanaError."""
+        snapshot, server, gestures = self._state_publisher.snapshot, self._server, self._gestures
         tabs = PanelTabs(server.gui)
         with tabs.tab(DRIVE):
-            self._panel = Panel(server, robot, gestures, session.choices, state)
-        self._folders = tuple(view_options.folders(tabs))
+            self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
+        self._folders = tuple(folders(tabs))
         with tabs.tab(SCENE):
+            shows = DisplayOptions(self._look_from, self._layers)
             self._log_problem = add_scene_tab(server.gui, gestures, shows)
         # At the end of the panel, because the element takes an empty line.
         server.gui.add_html(style())
-        self.show(state_publisher.snapshot)
-        self.show_panel(state_publisher.snapshot)
+        self.show_panel(snapshot)
 
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
         self._cameras.give(client, preset, self._state_publisher.snapshot.state)

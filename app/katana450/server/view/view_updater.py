@@ -9,6 +9,7 @@ import time
 import viser
 
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.server.view.panel_folder import AddFolders
 
 READOUT_INTERVAL = 0.1
 """Time [s] between two updates of numbers and sliders; people cannot read faster changes."""
@@ -34,8 +35,11 @@ class ViewUpdater:
         self.failed = threading.Event()
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
 
+    def add_panel(self, folders: AddFolders) -> None:
+        """Add the panel, with the controls of extensions. Raises KatanaError."""
+
     def start(self) -> None:
-        """Start to follow the control loop."""
+        """Start to follow the control loop, with the panel."""
         self._thread.start()
 
     def stop(self) -> None:

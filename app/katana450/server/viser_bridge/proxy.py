@@ -45,9 +45,6 @@ MAX_BROWSERS, MAX_BROWSERS_EACH, RESERVED_BROWSERS = 64, 16, 2
 """Maximum number of browsers with the scene at one time, in total and per identity, and number
 reserved for the driver and for each admin."""
 
-SCENE_TIMEOUT = 4.0
-"""Timeout [s] of a browser for the scene of a new server. viser's page tries again after 5 s."""
-
 DRAWN_TIMEOUT = 1.0
 """Maximum time [s] for which the panel waits until the scene is drawn."""
 
@@ -56,12 +53,7 @@ REFUSAL_INTERVAL = 0.5
 
 
 class Proxy:
-    """Connects each browser to viser by a connection of its own.
-
-    Attributes:
-        complete: set in the server's thread when the scene is complete. Before, browsers wait: a
-            page that gets the scene in parts draws every part.
-    """
+    """Connects each browser to viser by a connection of its own."""
 
     def __init__(
         self, hub: Hub, authenticator: Authenticator, guard: Guard, port: int, key: str
@@ -72,7 +64,6 @@ class Proxy:
         self._guard = guard
         self._port = port
         self._key = key
-        self.complete = asyncio.Event()
         self._places = ConnectionLimit(MAX_BROWSERS, MAX_BROWSERS_EACH)
 
     async def serve(self, browser: WebSocket) -> None:
@@ -96,9 +87,6 @@ class Proxy:
         # Without our page around it, viser's page can only show the scene.
         key = key_of(identity, page) if PAGE.fullmatch(page) else ""
         line = _Line(self._hub, self._guard, browser, key)
-        with suppress(TimeoutError):
-            async with asyncio.timeout(SCENE_TIMEOUT):
-                await self.complete.wait()
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",

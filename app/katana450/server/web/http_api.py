@@ -92,6 +92,7 @@ class Api:
         hub: Hub,
         authenticator: Authenticator,
         budgets: Budgets,
+        options: Namespace | None = None,
         provided: Sequence[RouteProvider] = (),
     ) -> None:
         """Serve ``hub``. ``provided``: functions that return the routes of extensions."""
@@ -99,7 +100,7 @@ class Api:
         self._budgets = budgets
         self._authenticator = authenticator
         self._dispatcher = Dispatcher(hub)
-        context = RouteContext(hub, authenticator, self._identity, budgets)
+        context = RouteContext(hub, authenticator, self._identity, budgets, options)
         self._provided = [route for provider in provided for route in provider(context)]
         self._programs: dict[str, _HttpProgram] = {}
 
