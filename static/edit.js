@@ -63,11 +63,11 @@ const Edit = (() => {
     listen(window);
     window.addEventListener("status", note);
     byId("undo").addEventListener("click", undo);
-    scene.addEventListener("load", () => {
-      // A page that could not be loaded gives no access.
-      if (!scene.contentDocument) return;
-      listen(scene.contentWindow);
-    });
+    // A page that could not be loaded gives no access.
+    const enter = () => scene.contentDocument && listen(scene.contentWindow);
+    scene.addEventListener("load", enter);
+    // It may be loaded already.
+    enter();
   }
 
   return { begin, key };

@@ -10,7 +10,7 @@ const Fit = (() => {
   const TRIES = 100;
   const NODES = ["/arm", "/target/move"];
 
-  const given = new URLSearchParams(location.search).has("initialCameraPosition");
+  const given = () => new URLSearchParams(location.search).has("initialCameraPosition");
   let base = null; // requested {position, look_at}; m, in viser's world
   let put = null; //  the same, fitted
   let chosen = false;
@@ -101,7 +101,7 @@ const Fit = (() => {
     hear(messages) {
       const [position, target] = Viser.viewsIn(messages);
       if (position?.initial ?? target?.initial) {
-        if (chosen || given) return;
+        if (chosen || given()) return;
         if (position) base = { ...base, position: position.position };
         if (target) base = { ...base, look_at: target.look_at };
       } else if (position && target && !riding) {

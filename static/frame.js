@@ -9,7 +9,6 @@
   const STEADY = 1000; // ms for which viser must keep the restored camera
   // The properties of the floor and the file of the sky, for each theme.
   const ROOMS = JSON.parse(document.currentScript.dataset.rooms);
-  const page = new URLSearchParams(location.search).get("page");
   const outer = window.parent === window ? null : window.parent;
 
   document.documentElement.dataset.loading = "";
@@ -116,6 +115,7 @@
   Viser.tap({
     server(address, line) {
       Theme.follow(() => redress(line));
+      const page = new URLSearchParams(location.search).get("page");
       return page ? `${address}?page=${page}` : address;
     },
     sends(message) {
@@ -156,8 +156,15 @@
     },
   });
 
+  // This page loads at once. Its parameters come from the surrounding page, when the person has signed in there.
+  async function entered() {
+    if (!outer) return;
+    if (!outer.katana) await new Promise((done) => outer.addEventListener("DOMContentLoaded", done));
+    history.replaceState(null, "", `?${await outer.katana.entered}`);
+  }
+
   window.katanaScene = { ...Viser, ...Fit };
-  Viser.start();
+  Viser.start(entered());
   Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

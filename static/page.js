@@ -32,6 +32,8 @@
     // Only now: an error of the drawing must keep no request.
     timeline?.said(message);
   };
+  // What viser's page offers; nothing before its scripts have run, or if it could not be loaded.
+  const inner = () => scene.contentDocument && scene.contentWindow.katanaScene;
   let status = null;
   let up = false;
   let since = performance.now(); // time of the last loss of the connection
@@ -347,7 +349,7 @@
     banner.hidden = !(lost || bad || missing) || (lost && !status);
     banner.className = lost ? "lost" : "";
     // Beside the panel, whose head says which arm it is.
-    banner.style.width = `${scene.contentWindow.katanaScene?.viewer()?.canvas?.clientWidth ?? scene.clientWidth}px`;
+    banner.style.width = `${inner()?.viewer()?.canvas?.clientWidth ?? scene.clientWidth}px`;
     const stale = "The picture is old.";
     let words = "The picture is old, although the connection is fast: this device may draw too slowly.";
     if (!lost && !bad) words = missing;
@@ -423,7 +425,7 @@
     byId(id).hidden = !shown;
     byId(`${id}-button`).setAttribute("aria-expanded", String(shown));
     if (id === "jog") Jog.show(shown);
-    if (shown) scene.contentWindow.katanaScene?.fold?.();
+    if (shown) inner()?.fold?.();
     if (id === "teach") teach.show(shown);
   }
   // The sheets lie in the same corner. On a high screen Teach or Episodes have room above Jog.
@@ -567,11 +569,16 @@
     return answer.ok;
   }
 
+  // The parameters for viser's page, which loads meanwhile; resolved when the person has signed in.
+  /** @type {(parameters: URLSearchParams) => void} */
+  let resolve;
+  window.katana.entered = new Promise((done) => (resolve = done));
+
   enter().then((mayEnter) => {
     if (!mayEnter) return;
     // Pass on no other parameters: some parameters of viser's page could harm the server.
     const query = [...new URLSearchParams(location.search)].filter(([key]) => Viser.PARAMETER.test(key));
-    scene.src = `viser/?${new URLSearchParams([["page", page], ...query])}`;
+    resolve(new URLSearchParams([["page", page], ...query]));
     const { protocol, host } = location;
     worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });
     if (kept?.getItem(OPEN) === "yes") showInstruments(true);

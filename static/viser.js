@@ -53,12 +53,13 @@ const Viser = (() => {
     );
   }
 
-  // Start viser's program as soon as the decoder of its messages, which it expects, is compiled, and
-  // the document is there.
-  async function start() {
+  // Start viser's program as soon as the decoder of its messages, which it expects, is compiled, the
+  // document is there, and `ready` is resolved.
+  async function start(ready) {
     const decoder = WebAssembly.compileStreaming(fetch("zstd.wasm"));
     if (document.readyState === "loading")
       await new Promise((done) => document.addEventListener("DOMContentLoaded", done));
+    await ready;
     window.__viserZstdWasm = await decoder;
     // By a name that the check of types does not look up: the server makes this file.
     const program = "../viser/program.js";

@@ -13,10 +13,12 @@ import pytest
 from playwright.sync_api import Page
 
 from katana450.arm.control.lease import Role
+from katana450.assembly import page_files
 from katana450.client import connect
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.resources import STATIC
 from katana450.server.api import requests
+from katana450.server.viser_bridge.viser_page import SCRIPTS
 from katana450.server.web import static_files
 from katana450.server.web.access_links import AccessFile
 from tests.browser.conftest import OpenPage
@@ -295,7 +297,7 @@ def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None
 
 def test_scripts_are_sent_without_comments_at_the_same_lines() -> None:
     written = (STATIC / "viser.js").read_text(encoding="utf-8")
-    sent = static_files.load()["viser.js"].content.decode()
+    sent = static_files.contents()["viser.js"].decode()
     assert written.count("\n") == sent.count("\n")
     code = [line for line in written.splitlines() if line and not line.lstrip().startswith("//")]
     assert [line for line in sent.splitlines() if line] == code
@@ -303,9 +305,12 @@ def test_scripts_are_sent_without_comments_at_the_same_lines() -> None:
 
 
 def test_the_page_is_small() -> None:
-    sent = {name: len(file.packed) for name, file in static_files.load().items()}
-    # The files in folders are loaded on first use.
-    assert sum(size for name, size in sent.items() if "/" not in name) < 42_000
+    sent = {name: len(file.packed) for name, file in page_files.load().items()}
+    # The scripts of each document are sent in one file. Those in folders are loaded on first use.
+    first = ("index.html", "page.css", page_files.PAGE_SCRIPTS, SCRIPTS, "link.js", "icon.svg")
+    assert sum(sent[name] for name in first) < 42_000
+    # Each of them is also there alone, for people.
+    sent = {name: size for name, size in sent.items() if "/" in name or name in first}
     # The timeline and Teach are only for those who open them, files of objects for those who add
     # one, episodes for servers that record, touch for those who open the instruments or let a
     # device vibrate, and the leader and the arm for those who have one.
@@ -319,6 +324,45 @@ def test_the_page_is_small() -> None:
     assert max(folders.values()) < 15_000
     assert sum(sent.values()) - sum(folders.values()) < 100_000
     assert sum(path.stat().st_size for path in (STATIC / "instruments").iterdir()) < 70_000
+
+
+def test_scripts_of_each_document_are_sent_in_one_file_in_their_order() -> None:
+    written, sent = static_files.contents(), page_files.load()
+    names = re.findall(r'<script src="static/([^"]+)" defer>', written["index.html"].decode())
+    assert names[0] == "viser.js"
+    assert names[-1] == "page.js"
+    page = sent["index.html"].content.decode()
+    assert re.findall(r'<script src="([^"]+)"', page) == [f"static/{page_files.PAGE_SCRIPTS}"]
+    assert sent[page_files.PAGE_SCRIPTS].content == b"\n".join(written[each] for each in names)
+    assert sent[SCRIPTS].content.endswith(written["frame.js"])
+    inline = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert [each.encode() for each in inline] == [written["theme.js"]]
+
+
+def test_viser_connects_only_when_the_person_has_signed_in(browser: Any, tmp_path: Path) -> None:
+    file = AccessFile.create(tmp_path / "access.json")
+    token = file.give("Anna", Role.OPERATOR, time.time() + 600.0)
+    with AppServer((*APP, "--access", str(file.path))) as server:
+        context = browser.new_context()
+        page, opened, started = context.new_page(), [], []
+        page.on("websocket", lambda socket: opened.append(socket.url))
+        page.on("request", lambda request: started.append(request.url))
+        page.goto(server.url)
+        page.wait_for_selector("#gate:not([hidden])")
+        page.wait_for_timeout(1500)
+        assert not opened
+        frame = page.frames[1]
+        assert frame.evaluate("!window.__viserMutable && Boolean(window.katanaScene)")
+        page.goto("about:blank")
+        page.goto(f"{server.url}/#{token}")
+        page.locator("#name", has_text="Anna").wait_for()
+        page.wait_for_function("document.querySelector('#poster.done')")
+        assert sorted(each.partition("?")[0].rpartition("/")[2] for each in opened) == [
+            "control",
+            "viser",
+        ]
+        assert sum(each.endswith("/viser/") for each in started) == 2
+        context.close()
 
 
 @pytest.mark.long

@@ -58,7 +58,7 @@ def test_visitor_without_a_link_gets_the_explaining_page(guarded: tuple[AppServe
         status, headers, _ = ask(f"{server.url}/enter", data=body, Origin=server.url)
         assert status == 401
         assert "set-cookie" not in headers
-    for path in ("/viser/", "/api/v1/state", "/api/v1/event_log", "/api/v1/phone"):
+    for path in ("/api/v1/state", "/api/v1/event_log", "/api/v1/phone"):
         assert ask(server.url + path, Cookie=f"katana450-{server.port}={'a' * 22}")[0] == 401
 
 

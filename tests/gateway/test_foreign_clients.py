@@ -65,7 +65,6 @@ def test_foreign_host_name_is_refused(server: AppServer, host: str) -> None:
 def test_client_without_a_session_gets_no_scene(server: AppServer) -> None:
     opening = websocket(server.url, f"/viser?page={page_name()}", subprotocols=[SUBPROTOCOL])
     assert refusal(opening) == 403
-    assert ask(f"{server.url}/viser/")[0] == 401
     assert ask(f"{server.url}/stop", data=b"", Origin=server.url)[0] == 401
 
     async def knock() -> int | None:

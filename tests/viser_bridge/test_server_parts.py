@@ -348,7 +348,7 @@ def test_frames_are_built_as_ours_and_the_scene_ends_with_a_mark(server: viser.V
 def test_page_is_packed_as_its_loader_unpacks_it() -> None:
     with part("client/build/index.html"):
         page = viser_page.load()
-        assert page.html.content.count(b"<script") == len(viser_page.OUR_SCRIPTS)
+        assert page.html.content.count(b"<script") == 1
         program, decoder = (
             page.files[name] for name in (viser_page.PROGRAM, viser_page.DECODER_FILE)
         )

@@ -16,12 +16,13 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from katana450.arm.control.actor import CommandChannel
+from katana450.assembly import page_files
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import actor_of
 from katana450.server.service.recorder import ACCEPTED, REFUSED, Recorder, stranger
 from katana450.server.service.stop_path import StopPath
 from katana450.server.viser_bridge import viser_page
-from katana450.server.web import security, static_files
+from katana450.server.web import security
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import body_of
@@ -47,14 +48,15 @@ def page_routes(
     authenticator: Authenticator, stop_path: StopPath, recorder: Recorder
 ) -> list[Route]:
     """Return the routes that need no arm."""
-    static = static_files.load()
+    static = page_files.load()
     index = static.pop("index.html")
-    policy = security.page_policy()
+    inline = page_files.source(static[page_files.THEME])
+    policy = security.page_policy(inline)
     bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, time.monotonic())
 
     async def page(request: Request) -> Response:
         origin = stop_path.origin_beside(request.headers["host"])
-        return security.with_serial(index.answer(request, security.page_policy(origin)))
+        return security.with_serial(index.answer(request, security.page_policy(inline, origin)))
 
     async def file(request: Request) -> Response:
         found = static.get(request.path_params["name"])
@@ -105,7 +107,6 @@ def _viser_routes(authenticator: Authenticator) -> list[Route]:
     viser, policy = viser_page.load(), viser_page.policy()
 
     async def page(request: Request) -> Response:
-        signed_in(authenticator, request)
         scheme = "wss" if authenticator.address.cookies_are_secure else "ws"
         origin = f"{scheme}://{request.headers['host']}"
         why = viser_page.objection(request.query_params, origin)

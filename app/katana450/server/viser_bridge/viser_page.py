@@ -46,8 +46,12 @@ LOADING = f"""<link rel="modulepreload" href="{PROGRAM}">
 <link rel="preload" href="{DECODER_FILE}" as="fetch" crossorigin>"""
 """Elements that load the files before ``static/viser.js`` needs them."""
 
+
 OUR_SCRIPTS = ("theme", "viser", "fields", "fit", "sheet", "names", "frame")
-"""Names of our files in the order in which they run. The last one gets the themes."""
+"""Names of our files in the order in which they run."""
+
+SCRIPTS = "viser-scripts.js"
+"""Name of the file with all of these. Its element gets the themes."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ def load() -> ViserPage:
 
     def page() -> ViserPage:
         head, rest, files = _unpacked(data.decode())
-        html = f"{head}{LOADING}{_our_scripts()}{rest}".encode()
+        html = f"{head}{LOADING}{_our_script()}{rest}".encode()
         return ViserPage(File.of(html, "text/html; charset=utf-8"), files)
 
     # Computing it imports numpy and viser.
@@ -125,8 +129,8 @@ def objection(query: QueryParams, origin: str) -> str | None:
     return None
 
 
-def _our_scripts() -> str:
-    """Return the script elements, with the colours of each theme as in viser's messages."""
+def _our_script() -> str:
+    """Return the script element, with the colours of each theme as in viser's messages."""
     from katana450.server.viser_bridge.themes import THEMES, sky
 
     rooms = {
@@ -140,9 +144,7 @@ def _our_scripts() -> str:
         }
         for name, theme in THEMES.items()
     }
-    *first, last = (f'src="../static/{name}.js"' for name in OUR_SCRIPTS)
-    last += f' data-rooms="{escape(json.dumps(rooms))}"'
-    return "".join(f"<script {each}></script>" for each in (*first, last))
+    return f'<script src="../static/{SCRIPTS}" data-rooms="{escape(json.dumps(rooms))}"></script>'
 
 
 def _bytes(text: str) -> bytes:

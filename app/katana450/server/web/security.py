@@ -36,14 +36,15 @@ MAX_MESSAGE_BYTES = 16_384
 TLS_ONLY = "max-age=31536000"
 
 
-def page_policy(stop_origin: str | None = None) -> str:
+def page_policy(inline: str, stop_origin: str | None = None) -> str:
     """Return the content security policy of our own page, which allows only its own files.
 
-    ``stop_origin``: origin to which the page also sends STOP; None if there is none.
+    ``inline``: source of the script in the page. ``stop_origin``: origin to which the page also
+    sends STOP; None if there is none.
     """
     return content_policy(
         default=("'none'",),
-        script=("'self'",),
+        script=("'self'", inline),
         style=("'self'",),
         img=("'self'", "data:"),
         connect=("'self'",) if stop_origin is None else ("'self'", stop_origin),

@@ -70,17 +70,16 @@ class File:
         return Response(self.content, headers=headers, media_type=self.media_type)
 
 
-def load(folder: Path = STATIC) -> dict[str, File]:
-    """Return every file of the page by its path in ``folder``.
+def contents(folder: Path = STATIC) -> dict[str, bytes]:
+    """Return the content of every file of the page by its path in ``folder``.
 
     Comments of scripts, an eighth of what would be sent, become blank lines: lines keep their
     numbers.
     """
     return {
-        path.relative_to(folder).as_posix(): File.of(
-            COMMENT.sub(b"", path.read_bytes()) if path.suffix == ".js" else path.read_bytes(),
-            TYPES[path.suffix],
-        )
+        path.relative_to(folder).as_posix(): COMMENT.sub(b"", path.read_bytes())
+        if path.suffix == ".js"
+        else path.read_bytes()
         for path in sorted(folder.rglob("*"))
         if path.suffix in TYPES
     }
