@@ -2,6 +2,6 @@
 
 import sys
 
-from katana450.cli import main
+from katana450.cli import run
 
-sys.exit(main())
+sys.exit(run())

@@ -38,8 +38,7 @@ def write_files(writers: Mapping[Path, Writer], mode: int = 0o666) -> None:
             try:
                 temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
                 stack.callback(temporary.unlink, missing_ok=True)
-                opened = create_file(temporary, mode)
-                with os.fdopen(opened, "wb") as file:
+                with os.fdopen(create_file(temporary, mode), "wb") as file:
                     write(file)
                     file.flush()
                     os.fsync(file.fileno())

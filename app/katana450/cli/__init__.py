@@ -1,5 +1,9 @@
 """The command ``katana450``."""
 
-from katana450.cli.main import main
 
-__all__ = ["main"]
+def run() -> int:
+    """Run one command and return the exit status; see ``main``."""
+    # Here, because each process of a server imports this file again, and needs nothing of it.
+    from katana450.cli.main import main
+
+    return main()

@@ -19,7 +19,8 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit status: 0 done, 1 failed, 2 wrong arguments."""
-    options, unknown = _parser().parse_known_args(arguments)
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options, unknown = _parser(arguments).parse_known_args(arguments)
     # The options are sent to other processes, which cannot receive a parser.
     parser: argparse.ArgumentParser = vars(options).pop("parser")
     if unknown:
@@ -53,11 +54,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="katana450", description="Teleoperate and simulate the Katana450 arm in a browser."
     )
-    parser.add_argument("--version", action="version", version=f"katana450 {version()}")
+    shown = version() if any(each.startswith("--v") for each in arguments) else ""
+    parser.add_argument("--version", action="version", version=f"katana450 {shown}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     added = [command for extension in extensions() for command in extension.commands]
     for command in (*CORE_COMMANDS, *added):

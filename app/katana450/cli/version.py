@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as installed
-
 
 def version() -> str:
     """Return the version of the installed package."""
+    # This library takes longer than all else that the command line needs.
+    from importlib import metadata
+
     try:
-        return installed("katana450")
-    except PackageNotFoundError:
+        return metadata.version("katana450")
+    except metadata.PackageNotFoundError:
         return "(not installed)"
