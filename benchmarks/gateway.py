@@ -60,7 +60,7 @@ def serve() -> None:
     web.start()
     hub = Hub(time.monotonic)
     proxy = Proxy(hub, web.authenticator, Guard(server), server.get_port(), KEY)
-    routes = control_routes(hub, Budgets(hub.clock), web.authenticator, proxy)
+    routes = control_routes(hub, Budgets(hub.clock), web, proxy)
     app = Admission(Starlette(routes=[*web.routes, *routes]), hub, web.authenticator, web.acceptor)
     web.loop.call_soon_threadsafe(web.show, app)
     print(json.dumps({"viser": server.get_port(), "gateway": port}), flush=True)

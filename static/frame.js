@@ -31,7 +31,7 @@
   let tries = 0;
   let there = null; //  ms, since when viser has the kept view; null while it has another
   const room = new Map(); //   the last message of each type that depends on the theme
-  let loaded = false; // whether the whole scene of this connection has arrived
+  let loaded = false; // whether the panel of this connection has arrived
   let seen = 0;
   let reported = 0;
   let reporting = false;
@@ -148,7 +148,7 @@
       const ready = Viser.replayed(messages);
       dress(messages);
       Fit.hear(messages);
-      if (ready) loaded = true;
+      if (Viser.controlsIn(messages)) loaded = true;
       if (ready) Fit.begin();
       if (!kept || tries > 0 || !ready) return;
       tries = 1;

@@ -88,5 +88,5 @@ onmessage = ({ data }) => {
     url = data.open;
     connect();
   } else if (data.watch !== undefined) watch(data.watch);
-  else if (!say(data.say)) postMessage({ unsaid: data.say.do, id: data.say.id });
+  else if (!say(data.say)) postMessage({ unsaid: data.say.do });
 };

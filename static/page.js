@@ -16,6 +16,7 @@
   const TRY_AFTER = 2000; // ms without a drawn scene after which the page checks whether it can be drawn
   const REST_AFTER = 100; // ms after the first frame in which the rest of the page waits
   const OFFLINE = "No connection to the arm.";
+  const REPEATED = ["heartbeat", "jog", "servo", "query", "list_people"]; // requests that are sent without a press
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
   const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
@@ -272,7 +273,13 @@
     if (same) same.focus();
   }
 
-  const GROUPS = ["acts", "orders", "clear-stop"]; // what can be pressed only with a connection
+  // Show whether there is a connection for the controls that need one. They keep the focus; a press says why nothing happens.
+  function offer(possible) {
+    body.classList.toggle("offline", !possible);
+    for (const each of document.querySelectorAll("#acts :is(button, select), #orders button, #clear-stop"))
+      possible ? each.removeAttribute("aria-disabled") : each.setAttribute("aria-disabled", "true");
+  }
+
   let [drawnActs, drawnOrders] = ["", ""];
   function draw() {
     // A press is complete when the arm's state shows the stop.
@@ -319,7 +326,7 @@
     More.draw(status.name);
     const simulated = status.silence_profile === "simulation";
     text("on-silence", simulated ? SIMULATION : "stops after a quarter of a second");
-    for (const id of GROUPS) byId(id).inert = !up;
+    offer(up);
     if (!up) unknown();
   }
 
@@ -328,7 +335,7 @@
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : "starting";
     byId("go").hidden = true;
-    for (const id of GROUPS) byId(id).inert = true;
+    offer(false);
     text("holder", "Driver unknown");
     Pace.draw(null);
     head(proven ? "Stopped" : "No connection");
@@ -346,10 +353,10 @@
     body.classList.toggle("stale", lost || bad);
     const banner = byId("banner");
     const missing = status?.stop_path;
-    banner.hidden = !(lost || bad || missing) || (lost && !status);
+    banner.hidden = !(lost || bad || missing) || !status;
     banner.className = lost ? "lost" : "";
     // Beside the panel, whose head says which arm it is.
-    banner.style.width = `${inner()?.viewer()?.canvas?.clientWidth ?? scene.clientWidth}px`;
+    if (!banner.hidden) banner.style.width = `${inner()?.viewer()?.canvas?.clientWidth ?? scene.clientWidth}px`;
     const stale = "The picture is old.";
     let words = "The picture is old, although the connection is fast: this device may draw too slowly.";
     if (!lost && !bad) words = missing;
@@ -383,7 +390,7 @@
     } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
-    else if (data.unsaid) data.id === QUIETLY || toast(OFFLINE);
+    else if (data.unsaid) REPEATED.includes(data.unsaid) || toast(OFFLINE);
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
     else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard) || timeline?.hear(data.heard) || Jog.hear(data.heard))) return drawLink();

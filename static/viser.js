@@ -212,6 +212,9 @@ const Viser = (() => {
   // Return whether the server's whole scene has arrived with `messages`.
   const replayed = (messages) => messages.some(({ type }) => type === "ReplayDoneMessage");
 
+  // Return whether `messages` contain controls of the panel, without which viser shows its own settings.
+  const controlsIn = (messages) => messages.some(({ type }) => /^Gui(?!Set|Update|Remove)/.test(type));
+
   // Change `messages` to a theme {dark, sky, properties of the floor}. Return the changed messages.
   function paint(messages, { sky, dark, ...floor }) {
     return messages.filter((message) => {
@@ -298,7 +301,7 @@ const Viser = (() => {
 
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
-    HELD, start, hold, missing, keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
+    HELD, start, hold, missing, keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, controlsIn, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
     // Return whether the scene has been drawn.
     isDrawn: () => !held,
     // Return whether nodes are hidden in this page alone.

@@ -2,6 +2,6 @@
 
 import sys
 
-from katana450.cli import run
+from katana450.cli import main
 
-sys.exit(run())
+sys.exit(main())

@@ -16,13 +16,14 @@ import io
 import os
 import pickle
 import sys
-import tempfile
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from katana450.atomic import write_files, writer_of
+from katana450.errors import InputError
 from katana450.platform_support import cache_folder, only_this_user_writes
 
 if TYPE_CHECKING:
@@ -32,6 +33,9 @@ T = TypeVar("T")
 
 MAX_FILES = 500
 """Number of files after which those that were not used for longest are deleted."""
+
+LIBRARIES = ("numpy", "trimesh", "yourdfpy")
+"""Libraries whose version may change a value."""
 
 HASH_LENGTH = hashlib.sha256().digest_size
 
@@ -54,7 +58,7 @@ def kept(make: Callable[[], T], *inputs: bytes | str | np.ndarray[Any, Any]) -> 
             os.utime(file)
         return found
     value = make()
-    with suppress(OSError):
+    with suppress(OSError, InputError):
         _store(file, value)
     return value
 
@@ -81,19 +85,16 @@ def _surroundings() -> bytes:
     # By `os`, because `pathlib` takes four times as long for 700 files.
     package = os.path.dirname(__file__)
     known = sorted(
-        f"{folder.removeprefix(package)}/{name} {_stamp(f'{folder}/{name}')}"
+        f"{folder.removeprefix(package)}/{name} {found.st_size} {found.st_mtime_ns}"
         for folder, _, names in os.walk(package)
         for name in names
         if name.endswith(".py")
+        for found in (os.stat(f"{folder}/{name}"),)
     )
     # The folders that state the versions. `importlib.metadata` takes five times as long.
-    versions = {each.name for folder in sys.path for each in Path(folder).glob("*-info")}
-    return _digest([sys.version, *sorted(versions), *known])
-
-
-def _stamp(file: str) -> str:
-    found = os.stat(file)
-    return f"{found.st_size} {found.st_mtime_ns}"
+    folders = {each.name for folder in sys.path for each in Path(folder).glob("*-info")}
+    versions = sorted(each for each in folders if each.partition("-")[0] in LIBRARIES)
+    return _digest([sys.version, *versions, *known])
 
 
 @cache
@@ -116,18 +117,11 @@ def _loaded(data: bytes) -> Any:
 
 
 def _store(file: Path, value: object) -> None:
-    """Write ``value`` whole or not at all. Raises OSError."""
+    """Write ``value`` whole or not at all. Raises InputError."""
     stream = io.BytesIO()
     _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
     content = stream.getvalue()
-    descriptor, name = tempfile.mkstemp(dir=file.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as new:
-            new.write(hashlib.sha256(content).digest() + content)
-        Path(name).replace(file)
-    except OSError:
-        Path(name).unlink(missing_ok=True)
-        raise
+    write_files({file: writer_of(hashlib.sha256(content).digest() + content)}, mode=0o600)
     files = sorted(file.parent.iterdir(), key=lambda each: each.stat().st_mtime)
     for each in files[:-MAX_FILES]:
         each.unlink(missing_ok=True)

@@ -232,7 +232,8 @@ class Extension:
         gizmo: Returns the class of the gizmo of a tool with so many freedoms, or None. Called in
             the process of the view.
         joint_view: Returns the class of the view of a robot that is driven joint by joint, which is
-            called as that of `MachineView`. Called in the process of the view.
+            called as that of `MachineView`, and then its ``add_panel``. Called in the process of
+            the view.
     """
 
     name: str
@@ -286,7 +287,7 @@ def _loaded() -> Iterator[Extension]:
         else:
             yield extension
     files = (file for each in sys.path for file in Path(each).glob("*-info/entry_points.txt"))
-    if not any(PACKAGE.encode() in file.read_bytes() for file in files):
+    if not any(map(_may_name_group, files)):
         return
     # This library takes 20 ms of each process.
     from importlib.metadata import entry_points
@@ -302,6 +303,13 @@ def _loaded() -> Iterator[Extension]:
             yield found
         else:
             _report(entry.name, TypeError(f"{entry.value} is not an {Extension.__name__}"))
+
+
+def _may_name_group(file: Path) -> bool:
+    try:
+        return PACKAGE.encode() in file.read_bytes()
+    except OSError:
+        return True
 
 
 def _report(name: str, error: Exception) -> None:

@@ -10,7 +10,7 @@ TAPPED = """
     style.replaceSync(Viser.STEADY);
     document.adoptedStyleSheets.push(style);
     window.tapped = { sends: [], views: [], choices: [], sets: [], connected: 0, replayed: 0,
-                      painted: new Map(), controls: new Map(), withheld: null };
+                      panels: 0, painted: new Map(), controls: new Map(), withheld: null };
     Viser.tap({
         server(address, line) {
             Object.assign(tapped, { address, line });
@@ -26,6 +26,7 @@ TAPPED = """
         hears(messages) {
             Viser.keepControls(tapped.controls, messages);
             tapped.replayed += Viser.replayed(messages);
+            tapped.panels += Viser.controlsIn(messages);
             const [position, target] = Viser.viewsIn(messages);
             if (position && target) tapped.sets.push([position, target]);
             for (const each of Viser.paint(structuredClone(messages), { sky: "", dark: false }))

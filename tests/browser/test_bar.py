@@ -356,7 +356,7 @@ def test_viser_connects_only_when_the_person_has_signed_in(browser: Any, tmp_pat
         page.goto("about:blank")
         page.goto(f"{server.url}/#{token}")
         page.locator("#name", has_text="Anna").wait_for()
-        page.wait_for_function("document.querySelector('#poster.done')")
+        page.wait_for_selector("#poster.done", state="attached")
         assert sorted(each.partition("?")[0].rpartition("/")[2] for each in opened) == [
             "control",
             "viser",

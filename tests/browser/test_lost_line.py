@@ -43,20 +43,6 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         page.page.keyboard.press("Control+z")
         assert bar(page, "toast") == "No connection to the arm."
         assert noticed < 1.0
-        # Nothing that needs the arm can be pressed, or it says why nothing happens.
-        assert bar(page, "holder") == "Driver unknown"
-        assert page.page.locator("#acts[inert] button").all_inner_texts() == ["Take"]
-        page.page.evaluate("document.querySelector('#toast').textContent = ''")
-        page.page.locator("#go").dispatch_event("click")
-        page.page.wait_for_function("document.querySelector('#toast').textContent")
-        assert bar(page, "toast") == "No connection to the arm."
-        banner = page.page.locator("#banner").bounding_box()
-        panel = page.frame.evaluate(
-            "document.querySelector('[role=tablist]').getBoundingClientRect().x"
-        )
-        assert banner
-        assert banner["width"] > 600
-        assert banner["x"] + banner["width"] <= panel + 1
         robot.since = time.time()
         server.restart()
         back = time.monotonic()
@@ -65,8 +51,6 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
         print(f"noticed after {noticed:.2f} s, back after {time.monotonic() - back:.2f} s")
         page.wait_ready(("/arm", MOVE))
-        assert page.page.locator("#acts:not([inert]) button").all_inner_texts() == ["Take"]
-        assert bar(page, "holder") == "Nobody drives"
         robot.settle()
         # viser starts with its first view; then the camera is restored.
         page.wait_until(lambda: np.allclose(camera(page), looked, atol=2e-3), "the old view")
@@ -74,6 +58,34 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         assert np.allclose(camera(page), looked, atol=2e-3)
         page.drag_arrow(MOVE, "z", 0.03)
         robot.settle()
+
+
+def test_lost_page_offers_nothing_that_needs_the_arm(open_page: OpenPage) -> None:
+    with AppServer() as server:
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        server.kill()
+        page.page.wait_for_selector("#banner.lost")
+        assert bar(page, "holder") == "Driver unknown"
+        take_button = page.page.locator("#acts button[aria-disabled=true]")
+        assert take_button.all_inner_texts() == ["Take"]
+        page.page.evaluate("document.querySelector('#toast').textContent = ''")
+        take_button.focus()
+        page.page.keyboard.press("Enter")
+        page.wait_until(lambda: bar(page, "toast") == "No connection to the arm.", "the reason")
+        banner = page.page.locator("#banner").bounding_box()
+        panel = page.frame.evaluate(
+            "document.querySelector('[role=tablist]').getBoundingClientRect().x"
+        )
+        assert banner
+        assert banner["width"] > 600
+        assert banner["x"] + banner["width"] <= panel + 1
+        server.restart()
+        page.page.wait_for_selector("#banner", state="hidden")
+        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
+        # The focus stays, so that the next Enter means no other button.
+        assert page.page.evaluate("document.activeElement.textContent") == "Take"
+        assert page.page.locator("#acts button:not([aria-disabled])").all_inner_texts() == ["Take"]
+        assert bar(page, "holder") == "Nobody drives"
 
 
 LATE_RESET = """() => {

@@ -170,6 +170,9 @@ def test_page_speaks_to_its_worker_as_the_tap_expects(page: ViserPage, server: A
         assert height(page) == pytest.approx(0.9)
     with part("replayed"):
         assert ask(page, "tapped.replayed") == 1
+    with part("controlsIn"):
+        # Only its first messages: what followed changed values.
+        assert ask(page, "tapped.panels") == 1
 
 
 def test_page_tells_and_takes_views(page: ViserPage) -> None:

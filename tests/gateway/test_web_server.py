@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import closing
+from typing import Any, cast
 
 import pytest
+from starlette.applications import Starlette
 from starlette.responses import PlainTextResponse
 
+from katana450.assembly.routes import control_routes
 from katana450.assembly.web_server import WebServer
+from katana450.server.service.budget import Budgets
+from katana450.server.service.hub import Hub
+from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_page import PROGRAM
 from katana450.server.web.listen import listen
 from katana450.settings import Settings
-from tests.gateway.client import ask, enter
+from tests.gateway.client import ask, enter, page_name, websocket
 
 
 @pytest.fixture
@@ -59,14 +68,28 @@ def test_other_requests_wait_for_the_application(web: WebServer) -> None:
         assert asked.result(10.0) == 203
 
 
-@pytest.mark.parametrize("path", ["/control", "/stop", "/leave"])
-def test_our_page_waits_only_for_the_scene(web: WebServer, path: str) -> None:
-    with ThreadPoolExecutor(1) as pool:
-        asked: Future[int] = pool.submit(lambda: ask(f"{url_of(web)}{path}")[0])
-        with pytest.raises(FutureTimeoutError):
-            asked.result(0.3)
-        web.loop.call_soon_threadsafe(web.show, PlainTextResponse("ok", 203))
-        assert asked.result(10.0) == 203
+def test_socket_of_the_page_opens_with_the_scene_and_its_requests_wait(web: WebServer) -> None:
+    hub = Hub(time.monotonic)
+    proxy = Proxy(hub, web.authenticator, cast("Any", None), 0, "")
+    app = Starlette(routes=control_routes(hub, Budgets(hub.clock), web, proxy))
+
+    async def trial() -> None:
+        path, cookie = f"/control?page={page_name()}", enter(url_of(web))
+        opening = asyncio.create_task(websocket(url_of(web), path, cookie).__aenter__())
+        await asyncio.sleep(0.3)
+        assert not opening.done()
+        web.loop.call_soon_threadsafe(web.show, app)
+        socket = await asyncio.wait_for(opening, 5.0)
+        await socket.send(json.dumps({"do": "heartbeat", "n": 7}))
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(socket.recv(), 0.3)
+        web.loop.call_soon_threadsafe(web.complete)
+        async with asyncio.timeout(5.0):
+            while json.loads(await socket.recv()) != {"is": "echo", "n": 7}:
+                pass
+        await socket.close()
+
+    asyncio.run(trial())
 
 
 def test_requests_for_other_hosts_are_refused_at_once(web: WebServer) -> None:

@@ -75,15 +75,35 @@ def test_damaged_file_is_replaced(folder: Path) -> None:
 
 
 def test_change_of_the_code_makes_a_value_old(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    made = Made()
-    kept(made, b"a")
-    monkeypatch.setattr(disk_cache, "_stamp", str)
+    package, made = tmp_path / "package", Made()
+    package.mkdir()
+    (package / "code.py").write_text("X = 1\n", encoding="ascii")
+    monkeypatch.setattr(disk_cache, "__file__", str(package / "disk_cache.py"))
     monkeypatch.setattr(disk_cache, "_surroundings", disk_cache._surroundings.__wrapped__)
+    for _ in range(2):
+        kept(made, b"a")
+    assert made.times == 1
+    (package / "code.py").write_text("X = 12\n", encoding="ascii")
     kept(made, b"a")
     assert made.times == 2
     assert len(list(folder.iterdir())) == 2
+
+
+def test_another_version_of_a_library_makes_a_value_old(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made = Made()
+    monkeypatch.setattr(disk_cache, "_surroundings", disk_cache._surroundings.__wrapped__)
+    kept(made, b"a")
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "unrelated-1.0.dist-info").mkdir()
+    kept(made, b"a")
+    assert made.times == 1
+    (tmp_path / "trimesh-99.0.dist-info").mkdir()
+    kept(made, b"a")
+    assert made.times == 2
 
 
 def test_error_is_raised_again_and_leaves_no_file(folder: Path) -> None:

@@ -32,7 +32,7 @@ from katana450.server.view.view_updater import ViewUpdater
 
 
 class Frontend:
-    """The view, and the arm as the gateway sees it: first the scene, then all the rest.
+    """The view, and the arm as the gateway sees it. The scene is built first.
 
     Attributes:
         pipe: the pipe to the arm's process.
@@ -86,11 +86,11 @@ class Frontend:
         )
         self._detours: DetourPlanner | None = None
 
-    def attach(self) -> None:
-        """Attach the arm to the gateway.
+    def start(self) -> None:
+        """Attach the arm to the gateway, which is started, add the panel, and start the view.
 
-        The pipe is served when this function returns, so no answer contains a state older than this
-        call.
+        The pipe is served before the arm is attached, so no answer contains a state older than this
+        call. Raises KatanaError.
         """
         gateway, hub, pipe = self._gateway, self._gateway.hub, self.pipe
         robot, session, _ = self._found
@@ -99,8 +99,7 @@ class Frontend:
         if robot.arm is not None:
             planning_worker = PlanningWorker(session, pipe.state_publisher, pipe)
             planning_worker.notify = gateway.announce
-            # The runner comes later.
-            planning_worker.redirected = guarded(lambda: hub.runner.redirected())  # noqa: PLW0108
+            planning_worker.redirected = guarded(hub.runner.redirected)
             on_release = self._config.settings.go_on_release
             go = partial(hub.gate.submit, cmd.Go()) if on_release else None
             self._detours = DetourPlanner(session, pipe.state_publisher, planning_worker, go)
@@ -108,11 +107,7 @@ class Frontend:
         gateway.attach(ArmHandle(robot, session, pipe, planning_worker, nodes))
         if self._detours is not None:
             self._detours.start()
-
-    def start(self) -> None:
-        """Add the panel, and start the view. Raises KatanaError."""
-        robot, options = self._found.robot, self._config.options
-        self.view.add_panel(partial(_folders, self._gateway, options, robot, self.pipe))
+        self.view.add_panel(partial(_folders, gateway, self._config.options, robot, pipe))
         self.view.start()
 
     def stop(self) -> None:
@@ -167,6 +162,6 @@ def _folders(
 
 
 def _joint_view() -> Callable[..., ViewUpdater]:
-    """Return the view of a robot without a tool; without an extension, one that shows nothing."""
+    """Return what makes the view of a robot without a tool; without an extension, an empty one."""
     found = (each.joint_view() for each in extensions() if each.joint_view is not None)
-    return next(found, lambda server, _robot, publisher, *_: ViewUpdater(server, publisher, 1.0))
+    return next(found, lambda server, _, publisher, *rest: ViewUpdater(server, publisher, rest[-2]))

@@ -99,15 +99,13 @@ def _run(
 
         frontend = Frontend(gateway, config, meshes, supervisor.ended)
         gateway.show()
-        frontend.attach()
         # Browsers draw the scene meanwhile.
-        options = config.options
         for part in serve_extensions():
-            if options is not None and part.send_records is not None:
-                senders.append(part.send_records(options, web.recorder, records))
+            if config.options is not None and part.send_records is not None:
+                senders.append(part.send_records(config.options, web.recorder, records))
         # Without a reader, notes would only take memory.
         web.recorder.enabled = any(senders)
-        gateway.start(options)
+        gateway.start(config.options)
         supervisor.prove(lambda: gateway.hub.held_up < HANG_SECONDS)
         frontend.start()
         supervisor.report(READY)

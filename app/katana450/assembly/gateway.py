@@ -1,6 +1,6 @@
 """The gateway: the application behind the web server, with viser behind it.
 
-The scene is served first. What only requests need is imported when browsers have got it.
+Parts that only requests need are imported after the scene is sent.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from katana450.arm.robot.object_meshes import Meshes
-from katana450.assembly.routes import control_routes, health_route
+from katana450.assembly.routes import control_routes
 from katana450.assembly.web_server import WebServer
 from katana450.errors import LeaseError
 from katana450.extension import serve_extensions
@@ -82,7 +82,7 @@ class Gateway:
         self.gestures = Gestures(self.viser, guard, self.hub)
         proxy = Proxy(self.hub, web.authenticator, guard, self.viser.get_port(), key)
         self._budgets = Budgets(self.hub.clock)
-        own = control_routes(self.hub, self._budgets, web.authenticator, proxy)
+        own = control_routes(self.hub, self._budgets, web, proxy)
         self._app = Starlette(routes=[*web.routes, *own], exception_handlers={MutedError: _muted})
         self._moves = asyncio.Event()
         self._close_until = -math.inf
@@ -100,7 +100,7 @@ class Gateway:
         from katana450.server.web.http_api import Api
         from katana450.server.web.program_socket import LineServer
 
-        hub, who = self.hub, self._web.authenticator
+        hub, authenticator = self.hub, self._web.authenticator
         parts = () if options is None else serve_extensions()
         runners = [part.runner for part in parts if part.runner is not None]
         handlers = [part.handler for part in parts if part.handler is not None]
@@ -109,9 +109,9 @@ class Gateway:
             hub.use_runner(runners[0]()(hub, options or Namespace()))
         for handler in handlers:
             hub.add_handler(handler()(hub, options or Namespace()))
-        api = Api(hub, who, self._budgets, options, provided)
-        self._app.router.routes.extend([health_route(hub), *api.routes()])
-        lines = LineServer(hub, who, self._budgets).run(self._lines_socket)
+        api = Api(hub, authenticator, self._budgets, options, provided)
+        self._app.router.routes.extend(api.routes())
+        lines = LineServer(hub, authenticator, self._budgets).run(self._lines_socket)
         self.soon(self._web.complete, lines, *self._watches())
 
     def attach(self, arm: ArmHandle) -> None:
@@ -174,7 +174,8 @@ class Gateway:
         self._moves.set()
 
     async def _watch(self) -> None:
-        pause = TICK
+        # The time before counts for no delay of this machine.
+        pause = self.hub.held_up
         while True:
             hub = self.hub
             try:

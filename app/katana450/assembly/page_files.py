@@ -17,11 +17,11 @@ from katana450.server.web.static_files import TYPES, File, contents
 INDEX, THEME = "index.html", "theme.js"
 """Our page, and its first script, which sets the theme before anything is drawn."""
 
-FIRST = b'<script src="static/theme.js"></script>'
-"""That script in the page. It is sent within the page, which would wait for it."""
+THEME_ELEMENT = b'<script src="static/theme.js"></script>'
+"""Element of that script in the page, which contains the script when it is sent."""
 
-DEFERRED = re.compile(rb'<script src="static/([^"]+)" defer></script>\n')
-"""Pattern of a script that runs when the page is read."""
+DEFERRED_SCRIPT = re.compile(rb'<script src="static/([^"]+)" defer></script>\n')
+"""Pattern of the element of a script that runs when the page is read."""
 
 PAGE_SCRIPTS = "page-scripts.js"
 """Name of the file with all of these."""
@@ -31,8 +31,8 @@ def load() -> dict[str, File]:
     """Return every file of the page by its path, with those of its scripts."""
     found = contents()
     bundle = f'<script src="static/{PAGE_SCRIPTS}" defer></script>\n'.encode()
-    index = found[INDEX].replace(FIRST, b"<script>%s</script>" % found[THEME])
-    head, *names, rest = DEFERRED.split(index)
+    index = found[INDEX].replace(THEME_ELEMENT, b"<script>%s</script>" % found[THEME])
+    head, *names, rest = DEFERRED_SCRIPT.split(index)
     found[INDEX] = head + bundle + rest
     found[PAGE_SCRIPTS] = b"\n".join(found[name.decode()] for name in names if name)
     found[SCRIPTS] = b"\n".join(found[f"{name}.js"] for name in OUR_SCRIPTS)

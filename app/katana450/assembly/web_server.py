@@ -36,9 +36,8 @@ from katana450.settings import Settings
 PAGES, FILES = ("/", "/enter"), ("/static/", "/viser/")
 """Paths, and prefixes of paths, that are served before the application is complete."""
 
-OF_PAGE = ("/viser", "/control", "/stop", "/leave")
-"""Paths that are served when the scene is complete: the websockets of our page, and its STOP. A
-browser opens one websocket after the other, so a page whose second one waited would not draw."""
+SOCKETS = ("/viser", "/control")
+"""Paths of the websockets of our page, which are opened when the scene is complete."""
 
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
@@ -57,6 +56,7 @@ class WebServer:
         acceptor: Admits the connections.
         routes: Routes that need no arm.
         loop: The event loop, once the server is started.
+        ready: Set when every request is served.
     """
 
     loop: asyncio.AbstractEventLoop
@@ -89,7 +89,7 @@ class WebServer:
         self.routes = page_routes(self.authenticator, self.stop_path, self.recorder)
         self._app: ASGIApp = Starlette(routes=self.routes)
         self._beside: list[asyncio.Task[None]] = []
-        self._shown, self._complete = asyncio.Event(), asyncio.Event()
+        self._shown, self.ready = asyncio.Event(), asyncio.Event()
         self._server = _Server(
             self.acceptor,
             uvicorn.Config(
@@ -119,14 +119,14 @@ class WebServer:
             raise ConfigurationError("The gateway did not start; see the log above.")
 
     def show(self, app: ASGIApp) -> None:
-        """Serve our page and the scene by ``app``. Call it in the server's thread."""
+        """Serve the pages and the scene by ``app``. Call it in the server's thread."""
         self._app = app
         self._shown.set()
 
     def complete(self, *beside: Coroutine[Any, Any, None]) -> None:
         """Serve all by that app, and run ``beside`` as long. Call it in the server's thread."""
         self._beside = [asyncio.create_task(each) for each in beside]
-        self._complete.set()
+        self.ready.set()
 
     def stop(self) -> None:
         """Close every connection and stop answering."""
@@ -146,7 +146,7 @@ class WebServer:
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         if not (scope["path"] in PAGES or scope["path"].startswith(FILES)):
-            await (self._shown if scope["path"] in OF_PAGE else self._complete).wait()
+            await (self._shown if scope["path"] in SOCKETS else self.ready).wait()
         await self._app(scope, receive, send)
 
 

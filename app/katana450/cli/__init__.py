@@ -1,9 +1,9 @@
 """The command ``katana450``."""
 
 
-def run() -> int:
-    """Run one command and return the exit status; see ``main``."""
+def main() -> int:
+    """Run one command and return the exit status."""
     # Here, because each process of a server imports this file again, and needs nothing of it.
-    from katana450.cli.main import main
+    from katana450.cli.main import main as run
 
-    return main()
+    return run()

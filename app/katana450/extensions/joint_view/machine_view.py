@@ -77,7 +77,8 @@ class MachineView(ViewUpdater):
     def add_panel(self, folders: AddFolders) -> None:
         """Add the panel, with the controls of extensions. Raises KatanaError."""
         state, gui = self._state_publisher.snapshot.state, self._server.gui
-        self._panel = MachinePanel(gui, self._robot, self._gestures, state, folders)
+        with self._server.atomic():
+            self._panel = MachinePanel(gui, self._robot, self._gestures, state, folders)
         self._panel.handles.on_update(lambda _: self._handles.show(self._panel.handles.value))
 
     def show(self, snapshot: Snapshot) -> None:

@@ -90,8 +90,9 @@ class Hub:
     def use_runner(self, runner: Runner) -> None:
         """Let ``runner`` drive the arm over time, in place of one that never does."""
         self.runner = runner
-        self.add_handler(runner)
+        # Before its requests are known: a stop must reach it after every request.
         self.gate.on_stop = guarded(runner.stopped)
+        self.add_handler(runner)
 
     def add_handler(self, handler: RequestHandler) -> None:
         """Let ``handler`` answer its requests."""

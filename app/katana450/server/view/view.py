@@ -122,24 +122,24 @@ class View(ViewUpdater):
         if view_options.gizmo is not None:
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
-        self._layers = view_options.layers
         self._goal: FloatArray | None = None
-        self._tool = ""
+        self._layers, self._tool = view_options.layers, ""
         self._T_base_goal = np.eye(4)
         self.show(state_publisher.snapshot)
 
     def add_panel(self, folders: AddFolders) -> None:
         """Add the panel, with the controls of extensions. Raises KatanaError."""
         snapshot, server, gestures = self._state_publisher.snapshot, self._server, self._gestures
-        tabs = PanelTabs(server.gui)
-        with tabs.tab(DRIVE):
-            self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
-        self._folders = tuple(folders(tabs))
-        with tabs.tab(SCENE):
-            shows = DisplayOptions(self._look_from, self._layers)
-            self._log_problem = add_scene_tab(server.gui, gestures, shows)
-        # At the end of the panel, because the element takes an empty line.
-        server.gui.add_html(style())
+        with server.atomic():
+            tabs = PanelTabs(server.gui)
+            with tabs.tab(DRIVE):
+                self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
+            self._folders = tuple(folders(tabs))
+            with tabs.tab(SCENE):
+                shows = DisplayOptions(self._look_from, self._layers)
+                self._log_problem = add_scene_tab(server.gui, gestures, shows)
+            # At the end of the panel, because the element takes an empty line.
+            server.gui.add_html(style())
         self.show_panel(snapshot)
 
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:

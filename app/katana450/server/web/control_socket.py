@@ -73,10 +73,9 @@ class ControlSocket(Channel):
 async def serve(
     hub: Hub, authenticator: Authenticator, budgets: Budgets, socket: WebSocket
 ) -> None:
-    """Serve a control socket until it closes or its client is no longer authorised."""
+    """Serve an accepted control socket until it closes or its client is no longer authorised."""
     identity = authenticator.identity(socket.cookies)
     page = socket.query_params.get("page", "")
-    await socket.accept()
     if identity is None or not PAGE.fullmatch(page):
         await socket.close(SIGN_IN_CLOSE_CODE, "Sign in at the start page first.")
         return

@@ -77,9 +77,10 @@ def contents(folder: Path = STATIC) -> dict[str, bytes]:
     numbers.
     """
     return {
-        path.relative_to(folder).as_posix(): COMMENT.sub(b"", path.read_bytes())
-        if path.suffix == ".js"
-        else path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.suffix in TYPES
+        file.relative_to(folder).as_posix(): COMMENT.sub(b"", text)
+        if file.suffix == ".js"
+        else text
+        for file in sorted(folder.rglob("*"))
+        if file.suffix in TYPES
+        for text in (file.read_bytes().replace(b"\r\n", b"\n"),)
     }
