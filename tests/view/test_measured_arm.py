@@ -10,12 +10,12 @@ import numpy as np
 import viser
 
 from katana450.arm.control.session import Session
-from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
+from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.scenery import Scenery
 from katana450.server.view.view import GHOST_FROM, View
+from tests.view.gestures import RecordedGestures
 from tests.viser_bridge.internals import nodes
 
 
@@ -37,17 +37,15 @@ def test_arm_is_drawn_where_it_is_measured_and_its_setpoint_as_a_ghost(
 ) -> None:
     rest = session.begin(session.ready, 0.0, 0.0)
     measured = frozen(session.ready - 0.1)
-    gestures: Any = SimpleNamespace(listen=lambda *_: None)
-    meshes: Any = SimpleNamespace()
-    scenery = Scenery(server, robot, session, load_props(), gestures, meshes)
-    view: Any = SimpleNamespace(_server=server, _robot=robot, _setpoint=None)
+    state_publisher: Any = SimpleNamespace(snapshot=Snapshot(rest, 0))
+    view = View(server, robot, state_publisher, RecordedGestures(), lambda: 0, session, 30.0)
 
     def show(q: FloatArray) -> bool:
         """Show an arm at ``q``; return whether the ghost of its setpoint is visible."""
         state = replace(rest, q=frozen(q))
-        scenery.show(state)
-        View._show_setpoint(view, state)
-        return view._setpoint is not None and bool(view._setpoint.root.visible)
+        view.show(Snapshot(state, 0))
+        ghost: Any = nodes(server).get("/setpoint")
+        return ghost is not None and bool(ghost.visible)
 
     assert not show(session.ready)
     assert show(measured)

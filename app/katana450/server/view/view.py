@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,10 +47,12 @@ GHOST_COLOURS: dict[Status, Colour] = {
     Status.FAULT: (230, 45, 45),
 }
 
-GHOST_OPACITY = 0.35
-
 SETPOINT_COLOUR: Colour = (120, 130, 145)
-SETPOINT_OPACITY = 0.2
+
+GOAL, SETPOINT = "/ghost", "/setpoint"
+"""Nodes of the ghosts."""
+
+OPACITY = {GOAL: 0.35, SETPOINT: 0.2}
 
 GHOST_FROM = np.deg2rad(0.2)
 """Distance [rad] of a joint from its goal, or its setpoint, above which a ghost is shown."""
@@ -112,8 +114,7 @@ class View(ViewUpdater):
         )
         self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, robot, self._scenery.arm.path, props)
-        self._ghost = GhostNodes(server, robot, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
-        self._setpoint: GhostNodes | None = None
+        self._ghosts: dict[str, GhostNodes] = {}
         self._gap = Gap(server)
         self._gizmo = (view_options.gizmo or Gizmo)(
             server, self._arm, gestures, lambda: state_publisher.snapshot.state
@@ -128,9 +129,11 @@ class View(ViewUpdater):
         self.show(state_publisher.snapshot)
 
     def add_panel(self, folders: AddFolders) -> None:
-        """Add the panel, with the controls of extensions. Raises KatanaError."""
+        """Add the panel, with the controls of extensions, and the ghost. Raises KatanaError."""
         snapshot, server, gestures = self._state_publisher.snapshot, self._server, self._gestures
         with server.atomic():
+            # A drag shall not wait for it.
+            self._ghost(GOAL, GHOST_COLOURS[Status.OK])
             tabs = PanelTabs(server.gui)
             with tabs.tab(DRIVE):
                 self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
@@ -168,10 +171,12 @@ class View(ViewUpdater):
     def _show_goal(self, state: State) -> None:
         away = float(np.abs(state.goal - state.q).max()) > GHOST_FROM
         visible = away or state.status is not Status.OK
-        self._ghost.show(visible, GHOST_COLOURS[state.status])
-        if visible:
-            self._ghost.move(self._robot.joint_values(state.goal, state.gripper_goal))
-        self._show_setpoint(state)
+        values = self._robot.joint_values(state.goal, state.gripper_goal)
+        self._show_ghost(GOAL, GHOST_COLOURS[state.status], values if visible else None)
+        # A measured arm lags behind its setpoint, where it will be soon.
+        lags = float(np.abs(state.setpoint - state.q).max()) > GHOST_FROM
+        values = self._robot.joint_values(state.setpoint, state.gripper_setpoint)
+        self._show_ghost(SETPOINT, SETPOINT_COLOUR, values if lags else None)
         # Goals are immutable: a changed goal is another array.
         if state.goal is not self._goal or state.tool != self._tool:
             self._goal, self._tool = state.goal, state.tool
@@ -181,18 +186,18 @@ class View(ViewUpdater):
         self._gizmo.follow()
         self._gap.show(self._desired(state), self._T_base_goal[:3, 3])
 
-    def _show_setpoint(self, state: State) -> None:
-        """Show where a measured arm will be soon: it lags behind its setpoint."""
-        lags = float(np.abs(state.setpoint - state.q).max()) > GHOST_FROM
-        if self._setpoint is None:
-            if not lags:
-                return
-            colour = SETPOINT_COLOUR
-            ghost = GhostNodes(self._server, self._robot, "/setpoint", colour, SETPOINT_OPACITY)
-            self._setpoint = ghost
-        self._setpoint.show(lags, SETPOINT_COLOUR)
-        if lags:
-            self._setpoint.move(self._robot.joint_values(state.setpoint, state.gripper_setpoint))
+    def _show_ghost(self, root: str, colour: Colour, values: Mapping[str, float] | None) -> None:
+        """Show the ghost ``root`` at the joint ``values`` [rad or m]; None hides it."""
+        if values is not None or root in self._ghosts:
+            self._ghost(root, colour).show(values is not None, colour)
+        if values is not None:
+            self._ghost(root, colour).move(values)
+
+    def _ghost(self, root: str, colour: Colour) -> GhostNodes:
+        """Return the ghost ``root``, which is made at its first use."""
+        if root not in self._ghosts:
+            self._ghosts[root] = GhostNodes(self._server, self._robot, root, colour, OPACITY[root])
+        return self._ghosts[root]
 
     def _desired(self, state: State) -> FloatArray | None:
         """Return the tool point (3,) [m] of the target in the base frame; None without one."""
