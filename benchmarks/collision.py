@@ -211,11 +211,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arm = robot.require_arm()
     start = time.perf_counter()
     world = world_on_table(robot)
+    world.load()
     built = time.perf_counter() - start
     chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
     with without_coal():
         by_fcl = world_on_table(robot)
+        by_fcl.load()
     postures = np.random.default_rng(SEED).uniform(lower, upper, (count, len(lower)))
     print(f"{count} postures of seed {SEED}; load average {os.getloadavg()[0]:.1f}.")
     print(f"Bodies read and pairs found in {built:.2f} s.\n")
