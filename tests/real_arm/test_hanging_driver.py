@@ -68,9 +68,9 @@ def test_arm_that_hangs_delays_no_stop() -> None:
                 # Another participant than the driver presses STOP.
                 assert isinstance(watcher.ask(requests.Stop()), answers.Done)
                 assert time.perf_counter() - begun < PROMPT
-                state = driver.query(answers.State)
-                assert time.perf_counter() - begun < 2.0 * PROMPT
-                assert state.stop == "confirmed"
+                # The answer can come before the tick that stops.
+                while driver.query(answers.State).stop != "confirmed":
+                    assert time.perf_counter() - begun < 2.0 * PROMPT
                 wait_for(driver, "lost")
             finally:
                 emulator.send_signal(signal.SIGCONT)
