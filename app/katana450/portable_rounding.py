@@ -2,8 +2,8 @@
 
 OpenBLAS, numpy and glibc's libm choose other code for other processors, with sums in another order
 and with or without fused multiply-add. The last bits of a result then depend on the machine. With
-these variables they use the code that every x86-64 processor runs. They are read when a process
-begins, so they are for processes that are yet to be started.
+these variables they use the code that every x86-64 processor runs, in one thread. They are read
+when a process begins, so they are for processes that are yet to be started.
 """
 
 from __future__ import annotations
@@ -19,6 +19,10 @@ PROCESSORS = ("x86_64", "AMD64")
 BLAS = "OPENBLAS_CORETYPE"
 BLAS_CORE = "Nehalem"
 """The oldest processor for which numpy is built."""
+
+THREADS = "OPENBLAS_NUM_THREADS"
+"""More threads divide sums by the number of cores. They also wait busily when numpy is loaded, and
+the arrays of an arm are too small for them."""
 
 LIBM = "GLIBC_TUNABLES"
 LIBM_CHOICE = "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"
@@ -45,7 +49,7 @@ def portable_rounding(environment: Mapping[str, str]) -> dict[str, str]:
         if not tunables.endswith(LIBM_CHOICE):
             # The last one counts.
             found[LIBM] = f"{tunables}:{LIBM_CHOICE}".lstrip(":")
-        found[BLAS], found[NUMPY] = BLAS_CORE, NUMPY_CHOICE
+        found |= {BLAS: BLAS_CORE, THREADS: "1", NUMPY: NUMPY_CHOICE}
     return found
 
 
@@ -62,7 +66,7 @@ matter."""
 @contextmanager
 def starting_portable_processes() -> Iterator[None]:
     """Let processes that are started in the block round alike on all processors."""
-    before = {name: os.environ.get(name) for name in (BLAS, LIBM, NUMPY)}
+    before = {name: os.environ.get(name) for name in (BLAS, THREADS, LIBM, NUMPY)}
     os.environ.update(portable_rounding(os.environ))
     try:
         yield

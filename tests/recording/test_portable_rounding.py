@@ -123,6 +123,7 @@ def test_tunables_of_the_user_are_kept_and_ours_come_last() -> None:
     found = portable_rounding(given)
     assert found["GLIBC_TUNABLES"].startswith("glibc.malloc.arena_max=2:glibc.cpu.hwcaps=-")
     assert found["HOME"] == "/root"
+    assert found["OPENBLAS_NUM_THREADS"] == "1"
     assert portable_rounding(found) == found
     assert rounds_portably(found)
     assert not rounds_portably(given)
