@@ -34,3 +34,9 @@ def test_no_value_is_refused_with_the_name_of_a_function(text: str) -> None:
             pytest.fail(f"{command} {action.dest}: {error}")
     # Paths and names take any text.
     assert read > 10
+
+
+def test_a_command_collects_its_own_options_alone() -> None:
+    assert {name for name, _ in options_of(_parser(["fk", "--urdf", "a.urdf"]))} == {"katana450 fk"}
+    for other in ([], ["--help"], ["flyy"]):
+        assert len({name for name, _ in options_of(_parser(other))}) > 3

@@ -62,14 +62,16 @@ def _parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"katana450 {shown}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     added = [command for extension in extensions() for command in extension.commands]
+    offered: dict[str, CliCommand] = {}
     for command in (*CORE_COMMANDS, *added):
-        if command.name in commands.choices:
+        if offered.setdefault(command.name, command) is not command:
             print(
                 f"katana450: There are two commands {command.name}; the second is left out.",
                 file=sys.stderr,
             )
-            continue
-        options = commands.add_parser(command.name, help=command.help)
-        command.add_options(options)
-        options.set_defaults(command=command, parser=options)
+    # To collect the options of the other commands too takes 10 ms.
+    for name in offered.keys() & set(arguments[:1]) or offered:
+        options = commands.add_parser(name, help=offered[name].help)
+        offered[name].add_options(options)
+        options.set_defaults(command=offered[name], parser=options)
     return parser

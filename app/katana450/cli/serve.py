@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-import secrets
+import os
 import shutil
 import signal
 import tempfile
@@ -101,7 +101,7 @@ def serve(
     url = settings.public_url or _address(settings, listening.getsockname()[1])
     event_log = _server_log(options, listening.getsockname()[1])
     folder = _private_folder()
-    address = ArmAddress(pipe_address(folder, "arm"), secrets.token_bytes(32))
+    address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
     front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
     arm = ArmConfig(settings, urdf, tool, options, address, folder)
     stop = StopConfig(settings, stopping_socket, listening.getsockname()[1], address)
