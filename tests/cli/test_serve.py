@@ -49,6 +49,19 @@ def test_it_serves_the_page_on_this_machine_only(server: AppServer) -> None:
         assert addresses == {"0100007F"}  # 127.0.0.1
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_it_starts_no_process_that_only_cleans_up_and_no_threads_of_blas(server: AppServer) -> None:
+    children = Path(f"/proc/{server.pid}/task/{server.pid}/children").read_text(encoding="ascii")
+    names = {int(child): _of(int(child), "comm").strip() for child in children.split()}
+    assert sorted(names.values()) == ["katana450 arm", "katana450 front", "katana450 stop"]
+    for child in names:
+        assert "OPENBLAS_NUM_THREADS=1" in _of(child, "environ").split("\0")
+
+
+def _of(process: int, file: str) -> str:
+    return Path(f"/proc/{process}/{file}").read_text(encoding="utf-8")
+
+
 def test_busy_port_is_reported_with_the_remedy() -> None:
     with socket.socket() as other:
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

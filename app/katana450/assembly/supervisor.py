@@ -8,7 +8,8 @@ noticed by the silence of its pipe, and is ended.
 from __future__ import annotations
 
 import logging
-import multiprocessing
+import multiprocessing.resource_tracker
+import os
 import pickle
 import threading
 import time
@@ -245,6 +246,9 @@ class Supervisor:
 
     def start(self) -> None:
         """Start all processes, in the given order."""
+        # One more Python would clean up after semaphores and shared memory. The server has none.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        multiprocessing.resource_tracker.getfd = lambda: nowhere
         self._turned = time.monotonic()
         for child in self._children.values():
             if not child.spec.late:
