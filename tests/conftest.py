@@ -22,6 +22,8 @@ from katana450.settings import Settings
 from tests.schedule import Completeness, LowestPriority, Schedule
 
 LONG = "KATANA450_LONG" in os.environ
+MANY_DRAGS = int(os.environ.get("KATANA450_DRAGS", "500"))
+"""Number of random drags of each arm in the long tests; 10,000 of all arms take five hours."""
 
 # A machine that others keep busy delays single examples.
 hypothesis.settings.register_profile("katana450", deadline=None)

@@ -30,18 +30,18 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.velocity import tool_speed
 from katana450.resources import URDF_PATH
-from tests.conftest import LONG
+from tests.conftest import LONG, MANY_DRAGS
 from tests.robot.public_arms import SO101, written
 
 TICK = 0.01
 
-DRAGS = 10_000 if LONG else 10
-"""Number of drags of each arm; `make test-long` runs all."""
+DRAGS = MANY_DRAGS if LONG else 10
+"""Number of drags of each arm."""
 
 HARD_DRAGS = (1703, 4081, 6261, 6817)
-"""Numbers of drags that failed once: strides of 20 mm lost the pitch of the SO-101, detours of the
-SO-101 and of the Katana ended one rounding beyond a limit, and a single search found no detour of
-the PincherX."""
+"""Numbers of drags that failed once, of 10,000: strides of 20 mm lost the pitch of the SO-101,
+detours of the SO-101 and of the Katana ended one rounding beyond a limit, and a single search found
+no detour of the PincherX."""
 
 MAX_TICKS = 6000
 

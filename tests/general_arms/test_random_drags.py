@@ -19,6 +19,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
+from tests.conftest import MANY_DRAGS
 from tests.general_arms.published_arms import FOUR, SEVEN, SIX, SKEWED
 
 ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED}
@@ -171,8 +172,8 @@ def test_drags_of_seven_axes_keep_branch_and_limits(name: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ARMS)
-def test_10000_drags_keep_branch_and_limits(name: str) -> None:
-    found = drags(ARMS[name], 10_000)
+def test_many_drags_keep_branch_and_limits(name: str) -> None:
+    found = drags(ARMS[name], MANY_DRAGS)
     assert found.beside <= found.clear / 1000
     print(
         f"{name}: {found.arrived} arrived, {found.clear} had a clear way, {found.beside} of these "
