@@ -100,7 +100,7 @@ HANDS_THAT_CANNOT = {
     "no bodies": (without_bodies(UR5E), "contacts of the fingers cannot be computed"),
     "three directions": (
         hand_urdf("UR5e", RADIAL),
-        "moves digit_2 across the direction in which digit_1 and digit_3 close",
+        "moves digit_3 across the direction in which digit_1 and digit_2 close",
     ),
     "nothing opposite": (
         hand_urdf("UR5e", HOOK),

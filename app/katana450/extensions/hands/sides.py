@@ -125,7 +125,7 @@ def sides_of(world: CollisionWorld, hand: Hand) -> Sides:
         if float(np.linalg.norm(high - low)) >= MIN_MOTION:
             moved[mover] = high - low
     against = {
-        (a, b): float(np.linalg.norm(moved[b] - moved[a]))
+        (a, b): _length(moved[b] - moved[a])
         for a, b in combinations(moved, 2)
         if float(moved[a] @ moved[b]) < 0.0
     }
@@ -176,7 +176,7 @@ def _of_one_jaw(world: CollisionWorld, hand: Hand, groups: Groups, moved: Motion
         f"The gripper moves {names}, which closes neither on another finger nor on a body of the "
         "palm, so it cannot grasp. Its joints must bring two collision shapes together."
     )
-    main = max(moved, key=lambda mover: float(np.linalg.norm(moved[mover])), default=None)
+    main = max(moved, key=lambda mover: _length(moved[mover]), default=None)
     palm = [part for part in world.parts if part.mover == hand.palm]
     if main is None or not palm or any(_astray(each, moved[main]) for each in moved.values()):
         raise refusal
@@ -206,6 +206,14 @@ def _of_one_jaw(world: CollisionWorld, hand: Hand, groups: Groups, moved: Motion
     name = min(palm, key=far).name
     places = JawPlaces(name, float(found.points[1] @ y), tip(closed), tip(opened))
     return Sides(((), tuple(moving)), ((), tuple(groups[main])), y, gripper, places)
+
+
+def _length(motion: FloatArray) -> float:
+    """Return the length of ``motion`` [m], rounded: of equal ones the first is the longest.
+
+    Else rounding would decide, which is not the same on all processors.
+    """
+    return round(float(np.linalg.norm(motion)), 9)
 
 
 def _closed_where(gripper: GripperModel, apart: Callable[[float], float]) -> GripperModel:
