@@ -124,6 +124,24 @@ def test_arm_that_has_just_ended_is_not_young(ends: Ends) -> None:
     arm_end.close()
 
 
+def test_arm_that_moves_at_once_was_at_rest_when_its_command_was_given(
+    ends: Ends, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    front, told = ends.front, []
+    front.on_command_at_rest = lambda: told.append(front.state_publisher.snapshot.state.moving)
+    flush = front._flush
+
+    def slow() -> bool:
+        """Return when the state of the moving arm has arrived already."""
+        sent = flush()
+        until(lambda: front.state_publisher.snapshot.state.moving)
+        return sent
+
+    monkeypatch.setattr(front, "_flush", slow)
+    front.deliver(cmd.SetJoint(0, 1.0))
+    assert told == [True]
+
+
 def test_command_crosses_the_pipe_and_its_ticket_returns(ends: Ends) -> None:
     tickets = [ends.front.deliver(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
     assert tickets == [1, 2, 3]

@@ -130,11 +130,12 @@ class FrontEnd:
             self._number += 1
             if isinstance(command, cmd.Follow | cmd.OfferDetour):
                 self._plans.note(self._number, command.plan)
-            seen = self.state_publisher.snapshot.state.t
-            self._unsent.append(CommandMessage(self._number, command, actor, seen))
+            # Taken before the command is sent: the arm may move before this thread goes on.
+            state = self.state_publisher.snapshot.state
+            self._unsent.append(CommandMessage(self._number, command, actor, state.t))
             self._flush()
             number = self._number
-        if not self.state_publisher.snapshot.state.moving:
+        if not state.moving:
             self.on_command_at_rest()
         return number
 
