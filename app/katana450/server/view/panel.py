@@ -64,11 +64,12 @@ class Panel:
         self._readout = self._gui.add_html("")
         with self._gui.add_folder("Pose by numbers"):
             self._form = PoseForm(self._gui, self._arm, self._on_person, state)
+        self._numbered: State | None = None
+        self._display = self._form.display
         with self._gui.add_folder("Branches", expand_by_default=False):
             self._branches = BranchList(server, robot, find, self._on_person, state)
         with self._gui.add_folder("Details", expand_by_default=False):
             self._details = self._gui.add_html("")
-        self._show_numbers(state)
 
     def follow(self, state: State, now: float, *, caught_up: bool) -> None:
         """Show ``state`` at time ``now`` [s].
@@ -86,12 +87,12 @@ class Panel:
         self._branches.follow(state, now)
 
     def _show_numbers(self, state: State) -> None:
-        for html, content in (
-            (self._readout, readout.page(self._arm, state, self._form.display)),
-            (self._details, readout.details(self._arm, state)),
-        ):
-            if html.content != content:
-                html.content = content
+        # At rest the state stays the same object, and its numbers need no work.
+        if state is self._numbered and self._form.display is self._display:
+            return
+        self._numbered, self._display = state, self._form.display
+        self._readout.content = readout.page(self._arm, state, self._display)
+        self._details.content = readout.details(self._arm, state)
 
     def _set_controls(self, state: State) -> None:
         for slider, angle in zip(self._sliders, state.goal, strict=True):
