@@ -44,7 +44,7 @@ from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
 
-REST_TICK = 0.1
+REST_TICK = 0.2
 """[s] Interval of the checks while the arm rests and is not stopped; otherwise ``TICK``."""
 
 ANSWER_SECONDS = 2.0
