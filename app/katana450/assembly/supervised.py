@@ -26,7 +26,7 @@ END, NOTICE = b"e", b"n"
 """First bytes of the messages of the supervisor, beside heartbeats: the process must end; and a
 notice, which follows."""
 
-HEARTBEAT_INTERVAL = 0.1
+HEARTBEAT_INTERVAL = 0.2
 """[s] Shortest interval of the heartbeats, in both directions: each one is answered."""
 
 QUIET_SECONDS = 1.0

@@ -36,7 +36,7 @@ from katana450.assembly.supervised import (
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.portable_rounding import starting_portable_processes
 
-BEATS_BEFORE_DEADLINE = 8
+BEATS_BEFORE_DEADLINE = 4
 
 MAX_HEARTBEAT_INTERVAL = 0.4
 """[s] Longest interval of the heartbeats; a process soon reports that its supervisor hangs."""
@@ -246,7 +246,7 @@ class Supervisor:
 
     def start(self) -> None:
         """Start all processes, in the given order."""
-        # One more Python would clean up after semaphores and shared memory. The server has none.
+        # One more Python would clean up after semaphores and shared memory; see decision 0111.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         multiprocessing.resource_tracker.getfd = lambda: nowhere
         self._turned = time.monotonic()
@@ -260,7 +260,7 @@ class Supervisor:
         Raises the error that a process reports, and ConfigurationError if one ends or hangs.
         """
         while word not in self._children[name].statuses and not self._stopping.is_set():
-            self._wait()
+            self._wait(TURN / 4)
             for child in [each for each in self._children.values() if each.due is None]:
                 alive = child.running
                 if not alive:
@@ -286,9 +286,9 @@ class Supervisor:
         for child in self._children.values():
             child.end()
 
-    def _wait(self) -> None:
-        """Wait for a turn, or until a process ends."""
-        wait([each.process.sentinel for each in self._children.values() if each.due is None], TURN)
+    def _wait(self, turn: float = TURN) -> None:
+        """Wait for ``turn`` [s], or until a process ends."""
+        wait([each.process.sentinel for each in self._children.values() if each.due is None], turn)
         before, self._turned = self._turned, time.monotonic()
         late = self._turned - before - 2 * TURN
         for child in self._children.values():

@@ -38,7 +38,7 @@ ARM, FRONT_END, STOP = "katana450 arm", "katana450 front", "katana450 stop"
 ARM_DEADLINE = 1.0
 """[s] Time without a tick of the control loop after which the arm's process is ended."""
 
-FRONT_END_DEADLINE = 0.8
+FRONT_END_DEADLINE = 0.9
 """[s] Silence after which a front end is ended, so that the page is back within 3 s. A thread of
 its own sends the heartbeats, so load does not cause silence."""
 
