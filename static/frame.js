@@ -119,6 +119,7 @@
       return page ? `${address}?page=${page}` : address;
     },
     sends(message) {
+      outer?.katana?.used();
       const view = Viser.viewOf(message);
       if (view) looks(view);
       const choice = Viser.choiceOf(message);

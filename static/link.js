@@ -1,6 +1,8 @@
 // The page's connection to the gateway, in a worker, so that a busy page or a hidden tab cannot slow it.
 "use strict";
-const HEARTBEAT = 100; // ms; app/katana450/arm/control/lease.py expects it
+const HEARTBEAT = 100; // ms between heartbeats of a page that may drive; app/katana450/arm/control/lease.py expects it
+const REST = 500; // ms between them while nobody drives and this page is not used
+const USE = 2000; // ms after the last act for which a page counts as used
 const AGAIN = 400; // ms before the next attempt to connect
 const GIVE_UP = 3000; // ms, timeout for opening a connection and for silence on an open one
 const AHEAD = 3; // maximum of unanswered queries: fewer states are requested on a slow connection
@@ -10,6 +12,9 @@ let socket = null;
 let count = 0;
 let heard = 0;
 let opened = 0;
+let beaten = -Infinity; // time of the newest heartbeat
+let used = -Infinity; // time of the newest act of a person
+let free = false; // whether nobody drives and nothing is planned, so that nothing moves
 const heartbeats = new Map();
 let pace = null; // timer of the queries for states, while they are shown
 const looks = new Map();
@@ -17,6 +22,7 @@ const looks = new Map();
 function connect() {
   socket = new WebSocket(url);
   opened = performance.now();
+  free = false;
   const mine = socket;
   mine.onopen = () => {
     heard = performance.now();
@@ -28,6 +34,7 @@ function connect() {
     heard = performance.now();
     const message = JSON.parse(data);
     if (looks.has(message.id)) return shown(message);
+    if (message.is === "status") learn(message);
     if (message.is !== "echo") return postMessage({ heard: message });
     const sent = heartbeats.get(message.n);
     if (sent !== undefined) postMessage({ trip: heard - sent });
@@ -60,6 +67,25 @@ function shown(message) {
   if (message.is === "state") postMessage({ heard: message, took });
 }
 
+// Learn from the changes of the status whether the arm is free.
+const known = {};
+function learn(changes) {
+  Object.assign(known, changes);
+  free = known.holder === null && !known.planning;
+}
+
+function beat(now) {
+  beaten = now;
+  heartbeats.set(++count, now);
+  say({ do: "heartbeat", n: count });
+}
+
+// Note an act of a person, which may begin to drive: heartbeats come at once and often from now on.
+function use() {
+  used = performance.now();
+  if (used - beaten >= HEARTBEAT && socket?.readyState === WebSocket.OPEN) beat(used);
+}
+
 function watch(hz) {
   clearInterval(pace);
   pace = hz > 0 ? setInterval(look, 1000 / hz) : null;
@@ -77,9 +103,9 @@ setInterval(() => {
     postMessage({ link: "down", code: 0 });
     setTimeout(connect, AGAIN);
   } else if (open) {
-    heartbeats.set(++count, now);
-    say({ do: "heartbeat", n: count });
-    postMessage({ silent: now - heard });
+    if (!free || now - used < USE || now - beaten > REST - HEARTBEAT / 2) beat(now);
+    const [unanswered = now] = heartbeats.values();
+    postMessage({ silent: now - Math.max(heard, unanswered) });
   }
 }, HEARTBEAT);
 
@@ -88,5 +114,9 @@ onmessage = ({ data }) => {
     url = data.open;
     connect();
   } else if (data.watch !== undefined) watch(data.watch);
-  else if (!say(data.say)) postMessage({ unsaid: data.say.do });
+  else if (data.used) use();
+  else {
+    if (!say(data.say)) postMessage({ unsaid: data.say.do });
+    use();
+  }
 };

@@ -2,6 +2,7 @@
 "use strict";
 (() => {
   const STALE = 1.0; // s, age from which a picture is marked as old
+  const NOTE_EVERY = 100; // ms, minimum between two notes that this page is used
   const SLOW = 150; // ms, round trip from which a connection counts as slow
   const QUIET = 300; // ms without a message after which the state is unknown
   const ANSWER = 500; // ms without an answer after which a STOP is repeated by HTTP
@@ -185,9 +186,16 @@
     byId("poster").querySelector("p").textContent =
       "This browser cannot draw the scene: WebGL 2 is off or missing. Turn on hardware acceleration in its settings, or use another browser. STOP and Jog work without it.";
   }
+  // A person uses viser's page, which may begin to drive.
+  let noted = -Infinity;
+  function used() {
+    if (performance.now() - noted < NOTE_EVERY) return;
+    noted = performance.now();
+    worker.postMessage({ used: true });
+  }
   const SHEETS = ["jog", "objects", "teach", "episodes"];
   const closeSheets = () => SHEETS.forEach((id) => byId(id)?.hidden === false && show(id, false));
-  window.katana = { key, blur, toast, drawn, closeSheets, view: null, live: () => timeline?.live() };
+  window.katana = { key, blur, toast, drawn, closeSheets, used, view: null, live: () => timeline?.live() };
 
   // A window that is closed frees the arm at once. A page that is reloaded returns before that matters.
   window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page}`));

@@ -20,13 +20,15 @@ class SlowLink:
     """Context manager that relays connections from ``port`` to ``to_port`` on this machine.
 
     ``rate``: bytes per second in each direction for all connections together. ``delay``: one-way
-    delay [s], which can be changed. ``cut`` silences the line without closing it.
+    delay [s], which can be changed; with ``late_answers`` it holds for the server's data alone.
+    ``cut`` silences the line without closing it.
     """
 
     def __init__(self, to_port: int, rate: float, delay: float = 0.0) -> None:
         self.rate = rate
         self.cut = False
         self.delay = delay
+        self.late_answers = False
         self._to_port = to_port
         self._loop = asyncio.new_event_loop()
         self._listening = socket.create_server(("127.0.0.1", 0))
@@ -102,7 +104,8 @@ class SlowLink:
         while data := await source.read(max(int(self.rate * SLICE), 64)):
             now = self._loop.time()
             self._free_at[way] = max(self._free_at[way], now) + len(data) / self.rate
-            await asyncio.sleep(self._free_at[way] - now + self.delay)
+            delay = 0.0 if self.late_answers and way == 0 else self.delay
+            await asyncio.sleep(self._free_at[way] - now + delay)
             while self.cut:
                 await asyncio.sleep(SLICE)
             to.write(data)
