@@ -20,15 +20,17 @@ from tests.gateway.client import ask
 FATAL = """
 import pathlib
 import sys
+import threading
+from multiprocessing.connection import Connection
 from katana450.cli.main import main
-from katana450.arm.runtime.stop_pipe import StopPipe
-call = StopPipe._call
-def fatal(pipe, act, *values):
-    pathlib.Path(sys.argv[2]).unlink()
-    raise SystemExit
-def checked(pipe, act, *values):
-    return (fatal if pathlib.Path(sys.argv[2]).exists() else call)(pipe, act, *values)
-StopPipe._call = checked
+receive = Connection.recv
+def checked(pipe):
+    message, fuse = receive(pipe), pathlib.Path(sys.argv[2])
+    if threading.current_thread().name == "stop pipe" and fuse.exists():
+        fuse.unlink()
+        raise SystemExit
+    return message
+Connection.recv = checked
 if __name__ == "__main__":
     sys.exit(main(["serve", "--port", sys.argv[1]]))
 """

@@ -127,14 +127,13 @@ class FrontEnd:
                 raise InputError(
                     f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
                 )
-            self._number += 1
+            number = self._number = self._number + 1
             if isinstance(command, cmd.Follow | cmd.OfferDetour):
-                self._plans.note(self._number, command.plan)
+                self._plans.note(number, command.plan)
             # Taken before the command is sent: the arm may move before this thread goes on.
             state = self.state_publisher.snapshot.state
-            self._unsent.append(CommandMessage(self._number, command, actor, state.t))
+            self._unsent.append(CommandMessage(number, command, actor, state.t))
             self._flush()
-            number = self._number
         if not state.moving:
             self.on_command_at_rest()
         return number

@@ -87,7 +87,11 @@ class StopPipe:
                 self._call(self._attach, pipe)
                 with suppress(EOFError, OSError):
                     while True:
-                        self._call(self._take, pipe.recv())
+                        status = pipe.recv()
+                        self._heard = time.monotonic()
+                        # The same status again needs no turn of the event loop.
+                        if status != self.status:
+                            self._call(self._take, status)
                 self._call(self._attach, None)
 
     def _call(self, act: Callable[..., None], *values: object) -> None:
@@ -104,6 +108,5 @@ class StopPipe:
                 self.press(press)
 
     def _take(self, status: StopStatus) -> None:
-        self._heard = time.monotonic()
         self.status = status
         self._changed.set()
