@@ -27,7 +27,7 @@ RATE, BURST = 160.0, 320.0
 use of knobs and buttons."""
 
 PUSH_EVERY = 0.1
-"""Interval [s] of status updates."""
+"""Interval [s] of status updates; twice as long while nobody drives."""
 
 MAX_BAD_REQUESTS = 4
 """Maximum number of invalid requests; one more closes the socket."""
@@ -59,15 +59,14 @@ class ControlSocket(Channel):
     def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
         """Return the changes of the status, or None, and the time until the next call [s]."""
         t = self.hub.clock()
+        pause = PUSH_EVERY if self.hub.lease.holder is not None else 2 * PUSH_EVERY
         if self.participant is None or (not urgent and t - self._checked_at < PUSH_EVERY / 2):
-            return None, PUSH_EVERY
+            return None, pause
         self._checked_at = t
         now = status.common(self.hub) | status.of(self.hub, self.participant)
         changes = {key: value for key, value in now.items() if self._sent.get(key, self) != value}
-        if not changes:
-            return None, PUSH_EVERY
         self._sent = now
-        return {"is": "status", **changes}, PUSH_EVERY
+        return {"is": "status", **changes} if changes else None, pause
 
 
 async def serve(
