@@ -119,8 +119,7 @@ class Frontend:
 
 def find_gizmo(freedoms: int) -> type[Gizmo] | None:
     """Return the class of the gizmo that an extension has for a tool of so many freedoms."""
-    found = (each.gizmo(freedoms) for each in extensions() if each.gizmo is not None)
-    return next(found, None)
+    return next((each.gizmo(freedoms) for each in extensions() if each.gizmo is not None), None)
 
 
 def layers(options: Namespace | None) -> tuple[ViewLayer, ...]:

@@ -167,6 +167,11 @@ class _Server(uvicorn.Server):
         self.servers.append(cast(Any, self._acceptor.start(self._protocol, self.config.ssl)))
         self.begun.set()
 
+    async def main_loop(self) -> None:
+        """Check a few times a second whether the server ends; uvicorn does it ten times."""
+        while not await self.on_tick(0):
+            await asyncio.sleep(0.25)
+
     def _protocol(self) -> asyncio.Protocol:
         protocol: asyncio.Protocol = cast(Any, self.config.http_protocol_class)(
             config=self.config, server_state=self.server_state, app_state=self.lifespan.state
