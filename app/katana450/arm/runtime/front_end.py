@@ -130,7 +130,7 @@ class FrontEnd:
             number = self._number = self._number + 1
             if isinstance(command, cmd.Follow | cmd.OfferDetour):
                 self._plans.note(number, command.plan)
-            # Taken before the command is sent: the arm may move before this thread goes on.
+            # Read before the command is sent: afterwards the arm may move already.
             state = self.state_publisher.snapshot.state
             self._unsent.append(CommandMessage(number, command, actor, state.t))
             self._flush()
