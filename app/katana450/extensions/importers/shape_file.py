@@ -48,7 +48,7 @@ ROUNDING = 1e-6
 LONGEST_NAME = 40
 """Maximum number of characters of a name, of objects too."""
 
-SECONDS = 5.0
+SECONDS = 15.0
 """[s] Timeout of reading a file."""
 
 MAX_MEMORY_BYTES = 1 << 30
