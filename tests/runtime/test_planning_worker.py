@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.actor import Actor
+from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
@@ -60,3 +63,32 @@ def test_bent_elbow_follows_a_plan(session: Session) -> None:
     (follow,) = commands
     assert isinstance(follow, cmd.Follow)
     assert follow.plan.duration > 0.1
+
+
+PERSON = Actor(Person("1", "Ada", Role.OPERATOR), CommandChannel.PAGE)
+PROTECTION = replace(SERVER, grounds=Grounds.SERVER)
+PAUSE = cmd.Hold(finding=Finding(Reason.PAUSED))
+
+
+@pytest.mark.parametrize(
+    ("command", "actor", "calls"),
+    [
+        (cmd.Hold(), PROTECTION, 0),
+        (PAUSE, PROTECTION, 1),
+        (cmd.Hold(), PERSON, 1),
+        (cmd.Home(), PERSON, 1),
+        (cmd.SpeedScale(0.5), PERSON, 0),
+    ],
+    ids=["driver left", "pause by the server", "hold", "motion", "speed"],
+)
+def test_run_that_waits_is_kept_only_when_another_driver_leaves(
+    session: Session, command: cmd.Command, actor: Actor, calls: int
+) -> None:
+    state = session.begin(np.array([0.3, -0.9, 0.4, -0.6, -0.2]), 0.0, 0.0)
+    sink = Sink()
+    worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
+    heard: list[str] = []
+    worker.redirected = lambda: heard.append("redirected")
+    worker.deliver(command, actor)
+    assert len(heard) == calls
+    assert sink.commands == [command]

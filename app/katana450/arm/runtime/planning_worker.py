@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.actor import Actor
+from katana450.arm.control.actor import Actor, Grounds
 from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
@@ -42,7 +42,10 @@ class PlanningWorker:
         self.notify: Callable[[str], None] = log.warning
         """Called with the reason if no path was found."""
         self.redirected: Callable[[], None] = lambda: None
-        """Called, in any thread, when a command gives the arm another motion, a hold or a stop."""
+        """Called, in any thread, when a command gives the arm another motion, a hold or a stop.
+
+        Not for the hold of an arm whose driver has left.
+        """
         self.failure = ""
         """Reason for which no path was found, until the next command; empty without one."""
         self.newest_actor: Actor | None = None
@@ -65,7 +68,9 @@ class PlanningWorker:
         if not all(each.passive for each in traits):
             self.cancel()
             self.newest_actor = actor
-        if any(each.supersedes for each in traits):
+        # The hold for a driver who has left. A run that another person ordered is still wanted.
+        left = actor is not None and actor.grounds is Grounds.SERVER and command == cmd.Hold()
+        if any(each.supersedes for each in traits) and not left:
             self.redirected()
         if isinstance(command, cmd.TakeBranch):
             self._plan(command, actor)
@@ -97,8 +102,7 @@ class PlanningWorker:
             goal = with_branch(arm, state, command.branch).goal
             # At a stretched elbow two branches are one posture, but for rounding.
             if (np.abs(goal - state.setpoint) > START_TOLERANCE).any():
-                world = self._session.world_at(state)
-                plan = plan_to(arm, world, state, goal)
+                plan = plan_to(arm, self._session.world_at(state), state, goal)
                 # An arm that the server has paused meanwhile moves only by a newer command.
                 if waited or not self._state_publisher.snapshot.state.waits:
                     self._unless(cancelled, cmd.Follow(plan), actor)
