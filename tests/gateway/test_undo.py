@@ -58,6 +58,27 @@ def test_removed_object_returns_and_new_one_goes(program: Client) -> None:
     assert names(program) == there
 
 
+def test_look_and_place_of_an_object_are_undone_one_by_one(program: Client) -> None:
+    def basin() -> answers.SceneObject:
+        objects = program.query(answers.Objects).objects
+        return next(each for each in objects if each.name == "basin")
+
+    before = basin()
+    T = np.array(before.T)
+    T[0, 3] += 0.02
+    program.ask(requests.Place(name="basin", colour="#204060"))
+    program.ask(requests.Place(name="basin", opacity=0.5, hidden=True))
+    program.ask(requests.Place(name="basin", T=T.tolist()))
+    changed = basin()
+    assert (changed.colour, changed.opacity, changed.hidden) == ("#204060", 0.5, True)
+    np.testing.assert_allclose(changed.T, T, atol=1e-9)
+    program.ask(requests.Undo())
+    np.testing.assert_allclose(basin().T, before.T, atol=1e-9)
+    assert (basin().colour, basin().opacity, basin().hidden) == ("#204060", 0.5, True)
+    program.ask(requests.Undo())
+    assert basin() == before
+
+
 def test_nothing_is_undone_while_stopped_or_past_a_stop(program: Client) -> None:
     moved = program.nudge(1, 0.2)
     program.ask(requests.Stop())

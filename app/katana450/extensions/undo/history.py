@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.scene_objects import SceneObject, named
+from katana450.arm.control.scene_objects import SceneObject, named, same
 from katana450.arm.control.state import Outcome, State, Verdict
 from katana450.errors import InputError
 
@@ -139,9 +139,11 @@ class UndoHistory:
         if isinstance(command, cmd.SetGripper) and holds and state.moving:
             raise InputError("The hand holds an object and the arm moves: wait until it rests.")
         if isinstance(command, cmd.PlaceObject) and now is not None:
-            # Colour and opacity stay: they were not changed together with the place.
-            placed = replace(command.scene_object, appearance=now.appearance)
-            command = cmd.PlaceObject(placed)
+            before = command.scene_object
+            if changes[0].name == _look_of(now.name):
+                command = cmd.PlaceObject(replace(now, appearance=before.appearance))
+            else:
+                command = cmd.PlaceObject(replace(before, appearance=now.appearance))
         return changes[0], command
 
     def forget(self, change: Change, outcome: Future[Outcome]) -> None:
@@ -186,7 +188,17 @@ def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | No
     before: SceneObject | None = named(state.objects, name)
     if before is None:
         return f"object {name}", cmd.Remove(name)
-    return None if before.held else (f"object {name}", cmd.PlaceObject(before))
+    if before.held:
+        return None
+    looks = isinstance(command, cmd.PlaceObject) and same(
+        (command.scene_object,), (replace(before, appearance=command.scene_object.appearance),)
+    )
+    return _look_of(name) if looks else f"object {name}", cmd.PlaceObject(before)
+
+
+def _look_of(name: str) -> str:
+    """Return the name of a change of colour, opacity or visibility of an object."""
+    return f"look of {name}"
 
 
 def _object_of(command: cmd.Command) -> str | None:
