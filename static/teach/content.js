@@ -1,4 +1,4 @@
-// The content of the sheet with its changes, which can be undone; kept in the browser.
+// The content of the sheet with its changes, which can be undone; kept in the browser for each arm.
 import { kept, restored } from "./poses.js";
 
 const KEY = "katana450.teach";
@@ -6,19 +6,23 @@ const MAX_CHANGES = 100;
 
 export class Content {
   #storage;
+  #key;
   #listener;
   #past = [];
   #future = [];
   now = { name: "My script", times: 1, poses: [], text: null };
   broken = false; // whether something else was kept
 
-  // storage: of the browser, or null. `listener` is called after each change.
-  constructor(storage, listener) {
+  // storage: of the browser, or null; arm: the answer `arm`. `listener` is called after each change.
+  constructor(storage, arm, listener) {
     this.#storage = storage;
+    this.#key = `${KEY} ${arm.name}`;
     this.#listener = listener;
+    const joints = arm.joints.length;
     try {
-      const json = storage?.getItem(KEY);
-      if (json) this.now = restored(json);
+      // Earlier versions kept one list, of poses with five joints.
+      const json = storage?.getItem(this.#key) ?? (joints === 5 ? storage?.getItem(KEY) : null);
+      if (json) this.now = restored(json, joints);
     } catch {
       this.broken = true;
     }
@@ -63,7 +67,7 @@ export class Content {
   #become(now) {
     this.now = now;
     try {
-      this.#storage?.setItem(KEY, kept(now));
+      this.#storage?.setItem(this.#key, kept(now));
     } catch {
       // The browser keeps nothing; the sheet works as long as the page is open.
     }

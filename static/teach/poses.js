@@ -1,5 +1,5 @@
 // Taught poses as data, and the text of the script that moves through them.
-// A pose is {id, joints, gripper, grips, wait, speed, blend, picture}: five angles [deg], where the
+// A pose is {id, joints, gripper, grips, wait, speed, blend, picture}: joint angles [deg], where the
 // fingers were [deg, or mm if they slide; null without fingers] and whether they move there, the time
 // to wait there [s], the speed to it [%], whether it is passed without a rest, and a data URL.
 export const MAX_POSES = 100;
@@ -81,11 +81,11 @@ export function scriptOf({ name, times, poses }) {
 
 const isNumber = (value, low, high) => Number.isFinite(value) && value >= low && value <= high;
 
-// Return the content that is kept as `json`. Throws an error if it is anything else.
-export function restored(json) {
+// Return the content that is kept as `json`, for an arm of so many joints. Throws an error if it is anything else.
+export function restored(json, joints) {
   const { format, name, times, poses, text } = JSON.parse(json);
   const good = (pose) =>
-    pose.joints.length === 5 && pose.joints.every((angle) => isNumber(angle, -720, 720)) &&
+    pose.joints.length === joints && pose.joints.every((angle) => isNumber(angle, -720, 720)) &&
     (pose.gripper === null ? pose.grips === false : isNumber(pose.gripper, -180, 180) && typeof pose.grips === "boolean") &&
     isNumber(pose.wait, 0, MAX_WAIT) && isNumber(pose.speed, 1, 100) && typeof pose.blend === "boolean" &&
     typeof pose.picture === "string" && (!pose.picture || isPicture(pose.picture));

@@ -64,7 +64,7 @@ export class Teach {
     this.#page = page;
     this.#arm = arm;
     this.#run = new ScriptRun(page.say, ID);
-    this.#content = new Content(page.kept, () => this.#draw());
+    this.#content = new Content(page.kept, arm, () => this.#draw());
     const actions = html("div", { class: "bar" }, this.#add, this.#play, this.#step, this.#undo, this.#redo);
     const loop = html("label", {}, "Loop", this.#times, "times");
     const named = html("label", { class: "wide" }, "Name", this.#name);

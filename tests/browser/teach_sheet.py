@@ -49,7 +49,8 @@ def rows(page: ViserPage) -> Locator:
 
 def kept(page: ViserPage) -> Any:
     """Return what the browser keeps of the sheet."""
-    return json.loads(page.page.evaluate("localStorage.getItem('katana450.teach')") or "null")
+    own = "Object.keys(localStorage).find((key) => key.startsWith('katana450.teach '))"
+    return json.loads(page.page.evaluate(f"localStorage.getItem({own})") or "null")
 
 
 def turns(page: ViserPage) -> list[float]:

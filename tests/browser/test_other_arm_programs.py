@@ -15,6 +15,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
 from tests.browser.session import MOVE, Truth, clear_stop, take
 from tests.browser.sizes import PHONE, PORTRAIT, WIDE
+from tests.browser.teach_sheet import kept, open_sheet, press, reload, rows, says
 from tests.general_arms.links_of_arms import ur5e
 
 pytestmark = pytest.mark.long
@@ -152,3 +153,27 @@ def test_drag_is_undone_and_a_server_lost_in_a_drag_is_found_again(
     page.drag_arrow(MOVE, "z", -0.04)
     at_rest(page, truth)
     assert not np.allclose(truth.status()["q"], rest, atol=1e-3)
+
+
+def test_taught_poses_of_six_axes_return_after_a_reload(
+    server: AppServer, open_page: OpenPage
+) -> None:
+    # A list of five joints, as earlier versions kept it for every arm.
+    five = '{"format": 1, "name": "Old", "times": 1, "poses": [], "text": null}'
+    keep = f"localStorage.setItem('katana450.teach', '{five}');"
+    page = open_page(server.url, nodes=("/arm", MOVE), window=WIDE, script=keep)
+    take(page)
+    open_sheet(page)
+    assert page.page.get_by_label("Name", exact=True).input_value() == "My script"
+    press(page, "Add pose")
+    page.wait_until(lambda: rows(page).count() == 1, "a pose")
+    (pose,) = kept(page)["poses"]
+    assert len(pose["joints"]) == 6
+    again = reload(page)
+    assert rows(again).count() == 1
+    assert "cannot be read" not in says(again)
+    press(again, "Add pose")
+    again.wait_until(lambda: rows(again).count() == 2, "another pose")
+    assert kept(again)["poses"][0] == pose
+    assert again.page.evaluate("localStorage.getItem('katana450.teach')") == five
+    assert again.errors == []
