@@ -12,7 +12,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.session import MAX_STEP_TIME, Session
-from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.control.state import Reason, State, Status, Verdict
 from katana450.arm.runtime.tick import failed
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
@@ -315,3 +315,20 @@ def test_arm_keeps_its_azimuth_over_the_base(
     over = run(session, turned, [cmd.MoveTool(np.array(point))], ticks=10)
     assert over.goal[0] == pytest.approx(0.7, abs=1e-9)
     assert np.isfinite(over.goal).all()
+
+
+def test_limit_of_a_drag_is_no_outcome_of_the_gripper_or_the_speed(
+    session: Session, state: State
+) -> None:
+    others: list[cmd.Command] = [cmd.SetGripper(0.1), cmd.SpeedScale(0.9)]
+    far = cmd.MoveTool(np.array([0.9, 0.0, 0.1]))
+    verdicts = []
+    before = away = run(session, state, [far])
+    while away.status is Status.OK:
+        before, away = away, run(session, away, others)
+        verdicts += [each.verdict for each in away.outcomes]
+    assert len(verdicts) > 2
+    assert set(verdicts) == {Verdict.ACCEPTED}
+    # In the tick that reaches the limit, a drag is limited and not what follows it.
+    beyond = run(session, before, [far, *others])
+    assert [each.verdict for each in beyond.outcomes] == [Verdict.LIMITED, *2 * [Verdict.ACCEPTED]]

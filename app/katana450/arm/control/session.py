@@ -193,15 +193,18 @@ class Session:
             t: now [s], on the clock of ``state.t``.
         """
         outcomes: list[Outcome] = []
+        # Number of the newest command that may have changed the target, and the state before it.
+        newest: tuple[int, State] | None = None
         for command in commands:
             self.check(command)
-            before = state
+            if not all(each.traits.passive for each in command.parts):
+                newest = len(outcomes), state
             state, found = take_all(self._take, state, with_time(command, t))
             outcomes.append(found)
         if isinstance(state.intent, Tracking):
             state = tool_targets.tracked(self.require_arm(), state, state.intent)
-            if outcomes and outcomes[-1] is ACCEPTED:
-                outcomes[-1] = outcome(before, state)
+            if newest is not None and outcomes[newest[0]] is ACCEPTED:
+                outcomes[newest[0]] = outcome(newest[1], state)
         if outcomes or state.outcomes:
             state = replace(state, outcomes=tuple(outcomes))
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:

@@ -66,7 +66,7 @@ class PoseForm:
             step=1.0,
             hint="Roll, pitch and yaw in these units and this frame; pitch above 0 points down",
         )
-        self._fill(self._goal(state))
+        self._fill(forward(self._arm.chain_to(state.tool), state.goal))
         for choice in (self._unit, self._frame):
             choice.on_update(self._change_display)
         # viser shows the label of a row as the name of the pose, and each button by its own text.
@@ -94,9 +94,6 @@ class PoseForm:
     def _chosen_priority(self) -> Priority:
         chosen = self._priority.value
         return next(each for each, (name, _) in self._priorities.items() if name == chosen)
-
-    def _goal(self, state: State) -> FloatArray:
-        return forward(self._arm.chain_to(state.tool), state.goal)
 
     def _chosen(self) -> PoseDisplay:
         return PoseDisplay(*UNITS[self._unit.value], self._frame.value, self._arm.T_base_shoulder)
