@@ -29,8 +29,8 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         type=_silence,
         default=Settings.silence,
         metavar="SECONDS",
-        help="heartbeat timeout of the driver, after which a moving arm brakes; the page sends "
-        f"ten a second ({MIN_SILENCE:g} to {MAX_SILENCE:g}, default: %(default)s)",
+        help="heartbeat timeout of the driver, after which a moving arm brakes; the page of the "
+        f"driver sends ten a second ({MIN_SILENCE:g} to {MAX_SILENCE:g}, default: %(default)s)",
     )
     parser.add_argument(
         "--strict-silence",
