@@ -65,6 +65,15 @@ def test_path_and_trace_follow_the_arc(server: viser.ViserServer, arm: MountedAr
     last = traced.points
     traces.follow(state)
     assert traced.points is last
+    # Both stay until the arm is driven by hand.
+    state = session.step(state, [cmd.SetGripper(0.0)], state.t + 0.01)
+    traces.follow(state)
+    assert [desired.visible, traced.visible] == [True, True]
+    state = session.step(
+        state, [cmd.StepTool(np.array((0.0, 0.0, 0.01, 0.0, 0.0)))], state.t + 0.01
+    )
+    traces.follow(state)
+    assert [desired.visible, traced.visible] == [False, False]
 
 
 def test_errors_have_their_colours() -> None:

@@ -18,12 +18,14 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.requests import ProgramOrder
+from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
 from katana450.extensions.programs.server import step_list
 from katana450.extensions.programs.server.preview import TIME_STEP, Preview
 from katana450.extensions.programs.server.state_line import RUNS
 from katana450.extensions.programs.server.step_list import ListedStep
+from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.server.api.answers import Progress
 from katana450.server.view.controls import GestureGate, refuse
 
@@ -57,6 +59,10 @@ class Steering(Protocol):
     def program(self) -> Program | None:
         """The program whose planning has succeeded; None without one."""
         ...
+
+
+ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
+"""Statuses of a program whose run has ended."""
 
 
 class ProgramsPanel:
@@ -140,6 +146,9 @@ class ProgramsPanel:
             self._preview.begin()
             self._look.disabled = True
             self._show_time()
+        ended = progress is not None and progress.status in ENDED
+        if ended and isinstance(self._state().mode, DRIVEN):
+            self._preview.end()
 
     def _follow_program(self) -> None:
         program = self._steering.program

@@ -49,7 +49,7 @@ LOOK_OPACITY = 0.5
 
 
 class Preview:
-    """The path line, kept until another program is shown, and the ghosts, kept until it runs.
+    """The path line, kept until the arm is driven after the run, and ghosts, kept until it runs.
 
     The ghosts are sent when they are first shown: their shapes take up to a sixth of the page's
     data. Objects and water are simulated in a thread, which takes a second for a minute of motion.
@@ -127,6 +127,12 @@ class Preview:
         with self._lock:
             self._hide_ghosts()
             self._shown = None
+
+    def end(self) -> None:
+        """Hide the path line, because the program has ended and the arm is driven again."""
+        with self._lock:
+            if self._path_line.visible:
+                self._path_line.visible = False
 
     def _simulate(self, shown: _Shown) -> None:
         shown.simulated = True

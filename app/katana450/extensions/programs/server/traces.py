@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from katana450.arm.control.modes import Jogging, Positioning, Servoing, Tracking
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
@@ -33,6 +34,9 @@ SEND_INTERVAL = 0.1
 MAX_PIECES = 4000
 """Maximum number of pieces of a trace; the oldest half is then dropped."""
 
+DRIVEN = (Positioning, Tracking, Jogging, Servoing)
+"""Modes of an arm that is moved to a target or by a jog or stream, and not along a plan."""
+
 Colours = npt.NDArray[np.uint8]
 
 
@@ -49,7 +53,10 @@ class TracesLayer(ViewLayer):
 
 
 class Traces:
-    """Path and trace of the last plan with a tool path. Nothing is sent of an arm at rest."""
+    """Path and trace of the last plan with a tool path, until the arm is driven otherwise.
+
+    Nothing is sent of an arm at rest.
+    """
 
     def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
         self._T_base_shoulder = arm.T_base_shoulder
@@ -70,6 +77,9 @@ class Traces:
         """Extend the trace by the tool point of ``state``, and draw the path of a new plan."""
         following = state.following
         if following is None:
+            if self._plan is not None and isinstance(state.mode, DRIVEN):
+                self._plan = None
+                self._desired.visible = self._traced.visible = False
             return
         if following.plan is not self._plan:
             self._begin(following.plan)
