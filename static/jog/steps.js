@@ -147,7 +147,7 @@ export class Steps {
 
   #draw() {
     const columns = this.#frame === "joints"
-      ? this.#arm.joints.map((_, i) => [`Axis ${i + 1}`, this.#arm.slides[i] ? "mm" : "°"])
+      ? this.#arm.joints.map((_, i) => [this.#arm.links[i].label, this.#arm.slides[i] ? "mm" : "°"])
       : AXES.slice(0, this.freedoms);
     this.#grid.replaceChildren(
       ...columns.map(([name, unit], axis) => {

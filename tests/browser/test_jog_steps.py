@@ -96,9 +96,9 @@ def test_joints_move_by_steps(sheet: ViserPage, truth: Truth) -> None:
     choose(sheet, "frame", "joints")
     # Joints move by steps only, so a step is chosen.
     assert sheet.page.locator("#jog [name=step][value='1']").is_checked()
-    sheet.page.get_by_role("button", name="Axis 2 plus 1 °").click()
+    sheet.page.get_by_role("button", name="2 shoulder plus 1 °").click()
     choose(sheet, "step", "10")
-    sheet.page.get_by_role("button", name="Axis 5 minus 10 °").click()
+    sheet.page.get_by_role("button", name="5 wrist roll minus 10 °").click()
     wanted = start + np.radians((0.0, 1.0, 0.0, 0.0, -10.0))
     sheet.wait_until(
         lambda: np.allclose(truth.status()["q"], wanted, atol=1e-6), "the joints to turn"

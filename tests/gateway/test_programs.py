@@ -147,8 +147,8 @@ def test_errors_are_reported_with_their_lines(arm: Client) -> None:
     assert "line 3" in program.why
     assert "table" in program.why
     program = planned(arm, "gripper: none\nsteps: [home]\n")
-    assert "--bare" in program.why
-    with pytest.raises(RefusedError, match="--bare"):
+    assert "without its gripper" in program.why
+    with pytest.raises(RefusedError, match="without its gripper"):
         arm.ask(Steer(order=ProgramOrder.RUN))
 
 

@@ -12,9 +12,8 @@ import msgspec
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
 
 LOOPBACK_ONLY = (
-    "This server listens on this machine only, so a phone cannot reach it. Give each person an "
-    "access link (katana450 access give), and start the server with --host 0.0.0.0, --access, "
-    "--tls-cert and --tls-key."
+    "This server listens on this machine only, so a phone cannot reach it. The person in "
+    "charge of this arm can open it to the network, and give you an access link."
 )
 NO_ADDRESS = "This machine has no address in a network, so a phone cannot reach it."
 """Reasons for which there is no address for a phone."""

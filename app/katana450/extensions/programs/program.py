@@ -164,8 +164,8 @@ def compiled(
     """
     if script.bare and plan_context.arm.gripper.moves:
         raise InputError(
-            f"{script.name} needs an arm without its gripper (`gripper: none`). Start the server "
-            "with --bare."
+            f"{script.name} needs an arm without its gripper (`gripper: none`). This server was "
+            "started with the gripper."
         )
     frame = ScriptFrame.of(plan_context.T_base_shoulder, in_base=script.in_base)
     builder = PlanBuilder(plan_context, state, frame)

@@ -72,9 +72,7 @@ class Scripts:
     def save(self, name: str, text: str) -> Path:
         """Save a new script in the folder and return its path. Raises InputError if that fails."""
         if self._folder is None:
-            raise InputError(
-                "There is no folder for scripts: start the server with --programs DIR."
-            )
+            raise InputError("This server has no folder for scripts: keep the script elsewhere.")
         path = self._folder / file_name(name)
         if path.exists():
             raise InputError(f"A script {name!r} exists already. Choose another name.")

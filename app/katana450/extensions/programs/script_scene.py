@@ -82,9 +82,9 @@ class ScriptScene:
         """
         if difference := self._difference(session, state):
             raise self.at.wrong(
-                f"The scene is not that of the script: {difference}. Start a server with "
-                "`katana450 serve --scene SCRIPT`, load the scene on the page, or simulate the "
-                "script with `katana450 run SCRIPT --headless`. Without `scene` it runs in any."
+                f"The scene is not that of the script: {difference}. Load the "
+                "scene on the page, start the server with it, or simulate the script alone. "
+                "Without `scene` it runs in any."
             )
 
     def _difference(self, session: Session, state: State) -> str:

@@ -67,7 +67,7 @@ class ReachabilityLayer(ViewLayer):
             "Reachability",
             tuple(cut.value for cut in Cut),
             initial_value=Cut.HIDDEN.value,
-            hint="Points that the tool reaches, from the map given with --workspace",
+            hint="Points that the tool reaches, from the map that the server was started with",
         )
         # Only maps of arms that choose among all orientations tell which of them is that at Home.
         which = gui.add_dropdown(

@@ -55,9 +55,7 @@ class RecordingStore:
         """Return the run ``name``. Raises InputError if there is none."""
         if name == RING:
             if self._ring is None:
-                raise InputError(
-                    "This server records nothing. Start it without --no-record to change that."
-                )
+                raise InputError("This server records nothing, so there are no last minutes.")
             return self._ring
         if name not in self._files:
             raise InputError("The server no longer has that recording. Open its file again.")
