@@ -11,7 +11,6 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import AppearanceTrait
-from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
     MODES,
@@ -32,6 +31,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
+from tests.control.test_traits import examples
 
 TICK = 0.01
 
@@ -62,15 +62,13 @@ OF_FIVE_AXES = [each for each in COMMANDS if each is not cmd.OrientTool]
 
 
 def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Command:
-    """Return a command of class ``kind`` that ``session`` supports; KeyError if unknown."""
+    """Return a command of class ``kind`` that ``session`` supports."""
     objects = state.objects
     cup = named(objects, "cup")
     assert cup is not None
     pose = forward(session.require_arm().chain_to(state.tool), session.ready)
     found: dict[type[cmd.Command], Callable[[], cmd.Command]] = {
         cmd.SetJoint: lambda: cmd.SetJoint(0, 0.5),
-        cmd.SetAxes: lambda: cmd.SetAxes(((0, 0.5), (4, 0.1))),
-        cmd.Nudge: lambda: cmd.Nudge(0, 0.1),
         cmd.SetJoints: lambda: cmd.SetJoints(session.ready + 0.1),
         cmd.Servo: lambda: cmd.Servo(np.array(state.setpoint) + 0.002),
         cmd.MoveTool: lambda: cmd.MoveTool(FAR + 0.01),
@@ -78,38 +76,26 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.StepTool: lambda: cmd.StepTool(np.array([-0.4, 0.4, 0.0, 0.0, 0.0])),
         cmd.SetPose: lambda: cmd.SetPose(pose),
         cmd.SetGripper: lambda: cmd.SetGripper(0.4),
-        cmd.SetTool: lambda: cmd.SetTool("flange"),
         cmd.SetPriority: lambda: cmd.SetPriority(Priority.POSITION),
         cmd.TakeBranch: lambda: cmd.TakeBranch(BRANCHES[-1]),
-        cmd.EndDrag: cmd.EndDrag,
-        cmd.Home: cmd.Home,
-        cmd.GoToZero: cmd.GoToZero,
-        cmd.Hold: cmd.Hold,
-        cmd.Stop: cmd.Stop,
-        cmd.ClearStop: cmd.ClearStop,
-        cmd.Pause: cmd.Pause,
-        cmd.Resume: cmd.Resume,
         cmd.Follow: lambda: cmd.Follow(
             plan_to(session.require_arm(), None, state, session.ready + 0.3)
         ),
-        cmd.GoAlong: lambda: cmd.GoAlong(0.3),
         cmd.OfferDetour: lambda: cmd.OfferDetour(
             plan_to(session.require_arm(), None, state, session.ready + 0.3)
         ),
-        cmd.Go: cmd.Go,
         cmd.PlaceObject: lambda: cmd.PlaceObject(cup),
         cmd.Remove: lambda: cmd.Remove("cup"),
         cmd.Attach: lambda: cmd.Attach("cup", Attachment.TABLE),
         cmd.ReplaceScene: lambda: cmd.ReplaceScene(objects),
-        cmd.Fill: lambda: cmd.Fill(1e-4),
         cmd.MoveObject: lambda: cmd.MoveObject("cup", np.array([0.3, 0.35, 0.0])),
         cmd.SetAppearance: lambda: cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1),
-        cmd.OperateArm: lambda: cmd.OperateArm(ArmAct.UNBLOCK),
         cmd.Batch: lambda: cmd.Batch((cmd.SpeedScale(0.5),)),
-        cmd.SpeedScale: lambda: cmd.SpeedScale(0.5),
         cmd.Jog: lambda: cmd.Jog(np.array([0.0, 0.05, 0.0, 0.0, 0.0])),
     }
-    return found[kind]()
+    if kind in found:
+        return found[kind]()
+    return next(each for each in examples(session, state) if type(each) is kind)
 
 
 def streamed(session: Session, state: State) -> State:

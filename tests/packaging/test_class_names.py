@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -13,15 +12,32 @@ GLOSSARY = ROOT / "docs" / "glossary.md"
 SECTION = "## One name, several classes"
 
 
+def role(node: ast.ClassDef) -> str:
+    """Return whether the class is a command, a request or a program step; empty for others."""
+    bases = {ast.unparse(each) for each in node.bases}
+    if bases & {"BaseCommand", "AxisCommand"}:
+        return "command"
+    if any(each.endswith("Request") for each in bases):
+        return "request"
+    methods = {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
+    return "step" if {"read", "build"} <= methods else ""
+
+
 def defined_twice(package: Path) -> set[str]:
-    """Return the names of public classes with several definitions at the top of modules."""
-    count = Counter(
-        node.name
-        for file in sorted(package.rglob("*.py"))
-        for node in ast.parse(file.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
-    )
-    return {name for name, definitions in count.items() if definitions > 1}
+    """Return the names of public classes with several definitions at the top of modules.
+
+    A command, its request and its program step share a name.
+    """
+    roles: dict[str, list[str]] = {}
+    for file in sorted(package.rglob("*.py")):
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                roles.setdefault(node.name, []).append(role(node))
+    return {
+        name
+        for name, found in roles.items()
+        if len(found) > 1 and not (all(found) and len(set(found)) == len(found))
+    }
 
 
 def with_a_reason(glossary: str) -> set[str]:
@@ -50,6 +66,17 @@ def test_duplicate_is_found_across_modules(tmp_path: Path) -> None:
     (tmp_path / "one.py").write_text("class A: ...\nclass B: ...\nclass _C: ...\n")
     (tmp_path / "inner" / "two.py").write_text("class A: ...\nclass _C: ...\n")
     assert defined_twice(tmp_path) == {"A"}
+
+
+def test_command_request_and_step_share_a_name_once_each(tmp_path: Path) -> None:
+    step = "class {}:\n    def read(self): ...\n    def build(self): ...\n"
+    one = "class A(BaseCommand): ...\nclass B(BaseCommand): ...\nclass C(BaseCommand): ...\n"
+    (tmp_path / "one.py").write_text(one)
+    (tmp_path / "two.py").write_text(
+        "class A(Request, frozen=True): ...\nclass B(AxisCommand): ...\nclass C: ...\n"
+    )
+    (tmp_path / "three.py").write_text(step.format("A"))
+    assert defined_twice(tmp_path) == {"B", "C"}
 
 
 def test_reason_counts_only_in_its_section_and_with_words() -> None:
