@@ -257,6 +257,25 @@ def test_watchdog_stop_is_cleared_by_the_driver_in_any_case(by_presser: Clearing
     assert by_presser.hub.stopped is None
 
 
+def test_stop_during_the_start_is_confirmed_if_the_arm_was_stopped_on_another_path(
+    table: ClearingTable,
+) -> None:
+    driver = table.join(PAGES[0])
+    # The page is there before the arm. Its STOP goes to the gate and to the port of STOP.
+    table.hub.gate.arm = None
+    table.hub.stop(driver.actor, "one")
+    assert table.arm.stops == 0
+    table.stoppable.stop_elsewhere(pressed("Somebody", driver.person.key, "one", 5.0))
+    table.hub.gate.arm = cast(Any, table.arm)
+    table.wait(2 * TICK, driver)
+    stopped = table.hub.stopped
+    assert stopped is not None
+    assert stopped.stage == "confirmed"
+    table.hub.move(driver, cmd.ClearStop())
+    table.wait(TICK, driver)
+    assert table.hub.stopped is None
+
+
 def test_missing_path_of_stop_is_reported(table: ClearingTable) -> None:
     assert status.health(table.hub) is None
     table.hub.stop_path.problem = "STOP is not served on port 8081 now."

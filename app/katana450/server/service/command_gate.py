@@ -275,7 +275,7 @@ class CommandGate:
                 if stopped is not None and self.stopped.confirmed and not before.confirmed:
                     self._credit(stopped.cause)
                 sent = self.stopped.ticket
-                if stopped is None and (sent is None or snapshot.ticket >= sent):
+                if sent is None or (stopped is None and snapshot.ticket >= sent):
                     # The arm started after the stop, or an error undid the stop.
                     again = cmd.Stop(replace(self.stopped.cause, press=""))
                     ticket = arm.deliver(again, replace(SERVER, grounds=Grounds.SERVER))
