@@ -69,6 +69,8 @@ def test_look_and_place_of_an_object_are_undone_one_by_one(program: Client) -> N
     program.ask(requests.Place(name="basin", colour="#204060"))
     program.ask(requests.Place(name="basin", opacity=0.5, hidden=True))
     program.ask(requests.Place(name="basin", T=T.tolist()))
+    # As at the end of a drag, which sends the last place again.
+    program.ask(requests.Place(name="basin", T=T.tolist()))
     changed = basin()
     assert (changed.colour, changed.opacity, changed.hidden) == ("#204060", 0.5, True)
     np.testing.assert_allclose(changed.T, T, atol=1e-9)

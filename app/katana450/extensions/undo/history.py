@@ -190,10 +190,14 @@ def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | No
         return f"object {name}", cmd.Remove(name)
     if before.held:
         return None
-    looks = isinstance(command, cmd.PlaceObject) and same(
-        (command.scene_object,), (replace(before, appearance=command.scene_object.appearance),)
-    )
+    looks = isinstance(command, cmd.PlaceObject) and _looks_only(before, command.scene_object)
     return _look_of(name) if looks else f"object {name}", cmd.PlaceObject(before)
+
+
+def _looks_only(before: SceneObject, after: SceneObject) -> bool:
+    """Return whether the appearance, and nothing else, distinguishes ``after`` from ``before``."""
+    alike = same((after,), (replace(before, appearance=after.appearance),))
+    return alike and after.appearance != before.appearance
 
 
 def _look_of(name: str) -> str:
