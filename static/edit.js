@@ -31,8 +31,10 @@ const Edit = (() => {
   function note({ detail: status }) {
     undoable = status.undo ?? [];
     revocations = status.revocations;
-    const list = undoable.slice(0, 5).join(", ") || "nothing yet";
-    if (byId("undoable").textContent !== list) byId("undoable").textContent = list;
+    const names = undoable.length ? undoable : ["nothing yet"];
+    const list = byId("undoable");
+    if ([...list.children].map((each) => each.textContent).join() !== names.join())
+      list.replaceChildren(...names.map((name) => Object.assign(document.createElement("li"), { textContent: name })));
     byId("undo").disabled = !undoable.length;
   }
 

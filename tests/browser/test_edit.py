@@ -194,7 +194,8 @@ def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> 
     moved = np.array(truth.status()["goal"])
     assert np.abs(moved - start).max() > 0.05
     page.page.click("#help-button")
-    page.wait_until(lambda: "arm (drag)" in page.page.inner_text("#undoable"), "the list")
+    newest = page.page.locator("#undoable li").first
+    page.wait_until(lambda: newest.text_content() == "arm (drag)", "the list")
     page.page.click("#help button.main")
     page.page.mouse.click(60, 200)
     # The focus is in viser's document.
