@@ -119,7 +119,7 @@ def test_server_without_a_folder_saves_nothing() -> None:
         cookie = enter(server.url)
         assert not json.loads(ask(f"{server.url}/api/v1/scripts", Cookie=cookie)[2])["saves"]
         status, body = post(server, cookie, POSES, "/Mine")
-        assert (status, b"--programs" in body) == (409, True)
+        assert (status, b"no folder for scripts" in body) == (409, True)
 
 
 def test_schema_is_served_to_editors(server: AppServer) -> None:

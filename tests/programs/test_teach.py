@@ -100,7 +100,7 @@ def test_an_invalid_name_is_refused(tmp_path: Path, name: str) -> None:
 
 
 def test_without_a_folder_nothing_is_saved(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="--programs"):
+    with pytest.raises(InputError, match="no folder for scripts"):
         Scripts().save("Mine", "steps: [home]")
     with pytest.raises(InputError, match="no longer exists"):
         Scripts().text("Mine")

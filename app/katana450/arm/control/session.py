@@ -193,8 +193,7 @@ class Session:
             t: now [s], on the clock of ``state.t``.
         """
         outcomes: list[Outcome] = []
-        # Number of the newest command that may have changed the target, and the state before it.
-        newest: tuple[int, State] | None = None
+        newest: tuple[int, State] | None = None  # that may have changed the target, and before it
         for command in commands:
             self.check(command)
             if not all(each.traits.passive for each in command.parts):
@@ -269,7 +268,7 @@ class Session:
             case cmd.SpeedScale(value=value):
                 return replace(state, speed=value)
             case cmd.SetTool(name=name):
-                return replace(self._retooled(state, name), mode=state.mode)
+                return replace(self._aim(replace(state, tool=name), state.goal), mode=state.mode)
             case cmd.SetPriority(priority=priority):
                 return replace(state, priority=priority)
             case cmd.EndDrag():
@@ -347,16 +346,13 @@ class Session:
             case cmd.TakeBranch(branch=branch):
                 return tool_targets.with_branch(arm, state, branch)
             case cmd.SetTool(name=name):
-                return self._retooled(state, name)
+                # The goal stays, and the target becomes the goal.
+                return self._aim(replace(state, tool=name), state.goal)
             case cmd.Go():
                 return tool_targets.gone(arm, state)
             case cmd.Follow(plan=plan, tau=tau):
                 return follow_plan(arm, state, plan, tau)
         raise AssertionError(f"The table of transitions has no rule for {command!r}.")
-
-    def _retooled(self, state: State, name: str) -> State:
-        """Return ``state`` with another tool frame: its goal stays, its target becomes the goal."""
-        return self._aim(replace(state, tool=name), state.goal)
 
     def _aim(self, state: State, q: FloatArray) -> State:
         """Return ``state`` that is positioning at ``q`` (n,), or as near as the limits allow."""
