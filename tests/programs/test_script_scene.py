@@ -111,7 +111,7 @@ def test_first_difference_is_named(
     present = scene_of(attached(f"scene: it.yaml\n{STEPS}", lambda _: text)).begin(stage.session)
     with pytest.raises(ScriptError) as refused:
         scene.check_present(stage.session, present)
-    assert f"not that of the script: {difference}. Start a server with" in str(refused.value)
+    assert f"not that of the script: {difference}. Load the scene" in str(refused.value)
     assert refused.value.problems[0].line == 1
 
 

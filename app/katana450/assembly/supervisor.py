@@ -290,10 +290,10 @@ class Supervisor:
         """Wait for ``turn`` [s], or until a process ends."""
         wait([each.process.sentinel for each in self._children.values() if each.due is None], turn)
         before, self._turned = self._turned, time.monotonic()
-        late = self._turned - before - 2 * TURN
+        late = self._turned - before - TURN
         for child in self._children.values():
             if child.due is None:
-                if late > 0.0:
+                if late > TURN / 2:
                     child.excuse(late)
                 child.beat()
 
