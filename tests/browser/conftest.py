@@ -15,10 +15,12 @@ from playwright.sync_api import Error as PlaywrightError
 
 from katana450.client import Client, connect
 from tests.browser.chromium import launched
-from tests.browser.page import ViserPage
+from tests.browser.page import FIRST_VISIT, ViserPage
+from tests.browser.person import Person
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth, prepare
+from tests.browser.session import MOVE, Truth, clear_stop, prepare
 from tests.browser.shared_server import SharedServer
+from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, SIZES
 
 THREAD_SECONDS = 5.0
 ARTEFACTS = Path(__file__).resolve().parents[2] / "test-artefacts"
@@ -163,3 +165,28 @@ def pytest_runtest_makereport(
     if report.failed and (windows := item.session.stash.get(WINDOWS, None)):
         windows.save(re.sub(r"[^\w.-]+", "-", f"{item.path.stem}-{item.name}").strip("-"))
     return report
+
+
+@pytest.fixture
+def person(
+    server: AppServer, open_page: OpenPage, size: str, scheme: str, truth: Truth, artefacts: Path
+) -> Iterator[Person]:
+    """Return a person on a first visit, at the ``size`` and in the ``scheme`` of the test."""
+    touches = SIZES[size] in (PORTRAIT, LANDSCAPE)
+    page = open_page(
+        server.url,
+        nodes=("/arm", MOVE),
+        window=SIZES[size],
+        color_scheme=scheme,
+        own_camera=True,
+        script=FIRST_VISIT,
+        **(PHONE if touches else {}),
+    )
+    if truth.status()["stopped"] is not None:
+        clear_stop(page, truth)
+
+    def keep(name: str) -> None:
+        page.keep(artefacts / f"flow-{name}-{size}-{scheme}.png")
+
+    yield Person(page, truth, keep, touches=touches)
+    assert page.errors == []

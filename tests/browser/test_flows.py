@@ -6,140 +6,31 @@ their own, which CONTRIBUTING.md lists.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
-from playwright.sync_api import Locator
 
 from katana450.client import Client
 from katana450.server.api import answers
-from tests.browser.conftest import OpenPage
-from tests.browser.finger import fingers, middle
-from tests.browser.page import FIRST_VISIT, Pixel, ViserPage
+from tests.browser.person import Person, still
 from tests.browser.server import AppServer
-from tests.browser.session import AXES, MOVE, Truth, bar, clear_stop
+from tests.browser.session import AXES, MOVE, bar, clear_stop
 from tests.browser.shared_server import SharedServer
-from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, SIZES, in_sizes_and_schemes
+from tests.browser.sizes import SIZES, in_sizes_and_schemes
 
 pytestmark = pytest.mark.long
 
-PHONES = (PORTRAIT, LANDSCAPE)
 PLANNED = 60.0
 """Timeout [s] of a plan on a busy machine."""
-
-DOUBLE = 700
-"""Time [ms] after which a second press of Pause is one of its own."""
-
-Keep = Callable[[str], None]
-
-
-class Person:
-    """A person who presses by mouse at a desk and by finger on a phone."""
-
-    def __init__(self, page: ViserPage, truth: Truth, keep: Keep, *, touches: bool) -> None:
-        self.page, self.truth, self.keep, self.touches = page, truth, keep, touches
-
-    def press(self, element: Locator) -> None:
-        if self.touches:
-            element.tap()
-        else:
-            element.click()
-
-    def button(self, name: str, *, inside: str = "body") -> None:
-        self.press(self.page.page.locator(inside).get_by_role("button", name=name, exact=True))
-
-    def drag_arrow(self, metres: float) -> None:
-        if not self.touches:
-            self.page.drag_arrow(MOVE, "z", metres)
-            return
-        start, end = self.page.grip_arrow(MOVE, "z").pixels(metres)
-        with fingers(self.page.page) as hand:
-            hand.put(start)
-            hand.move(end)
-            hand.lift()
-
-    def open_panel(self, tab: str) -> None:
-        sheet = self.page.frame.locator("#k450-sheet")
-        while self.touches and sheet.is_visible():
-            if sheet.get_attribute("aria-label") == "Controls, full height":
-                break
-            sheet.tap()
-            self.page.page.wait_for_timeout(400)
-        if self.touches and sheet.is_visible():
-            self.assert_above(self.page.page.get_by_role("group", name="Camera"), sheet)
-        self.press(self.page.frame.get_by_role("tab", name=tab, exact=True))
-
-    def pause(self, status: Callable[[], Any]) -> None:
-        """Pause by the bar; a second press that follows at once would be the same one."""
-        self.press(self.page.page.locator("#pause"))
-        self.page.wait_until(lambda: status() == "paused", "the pause")
-        self.page.page.wait_for_timeout(DOUBLE)
-
-    def assert_above(self, group: Locator, sheet: Locator) -> None:
-        """Check that the buttons of ``group`` lie above the ``sheet``, not over its controls."""
-        top = sheet.bounding_box()
-        assert top is not None
-        for button in group.locator("button, select").all():
-            box = button.bounding_box() if button.is_visible() else None
-            assert box is None or box["y"] + box["height"] <= top["y"] + 1.0
-
-    def fold_panel(self) -> None:
-        sheet = self.page.frame.locator("#k450-sheet")
-        if self.touches and sheet.is_visible():
-            sheet.tap()
-            self.page.page.wait_for_timeout(400)
-
-    def stop(self) -> None:
-        """Stop by the key or the button, and clear the stop."""
-        self.assert_stop_is_free()
-        if self.touches:
-            self.page.page.locator("#stop").tap()
-        else:
-            self.page.page.keyboard.press("Escape")
-        self.truth.wait(mood="stopped")
-        self.page.wait_until(lambda: bar(self.page, "headline") == "Stopped", "the stop")
-        clear_stop(self.page, self.truth)
-
-    def assert_stop_is_free(self) -> None:
-        """Check that nothing lies over STOP and that the page does not scroll sideways."""
-        place = middle(self.page.page.locator("#stop"))
-        found = self.page.page.evaluate("(at) => document.elementFromPoint(...at).id", place)
-        assert found == "stop"
-        assert self.page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
 
 
 @pytest.fixture
 def server(shared_server: SharedServer) -> AppServer:
     """Return the server in the state of a new one for each walk, which leaves an object."""
     return shared_server.as_new()
-
-
-@pytest.fixture
-def person(
-    server: AppServer, open_page: OpenPage, size: str, scheme: str, truth: Truth, artefacts: Path
-) -> Iterator[Person]:
-    touches = SIZES[size] in PHONES
-    page = open_page(
-        server.url,
-        nodes=("/arm", MOVE),
-        window=SIZES[size],
-        color_scheme=scheme,
-        own_camera=True,
-        script=FIRST_VISIT,
-        **(PHONE if touches else {}),
-    )
-    if truth.status()["stopped"] is not None:
-        clear_stop(page, truth)
-
-    def keep(name: str) -> None:
-        page.keep(artefacts / f"flow-{name}-{size}-{scheme}.png")
-
-    yield Person(page, truth, keep, touches=touches)
-    assert page.errors == []
 
 
 @in_sizes_and_schemes(SIZES)
@@ -265,10 +156,7 @@ def objects(person: Person, reader: Client, folder: Path) -> None:
     place: Any = np.array(found.T)
     top = place[:3, 3] + (0.0, 0.0, 0.5 * found.size[-1])
     pixel = still(page, lambda: page.project(top))
-    if person.touches:
-        page.page.touchscreen.tap(*pixel)
-    else:
-        page.page.mouse.click(*pixel)
+    person.point(pixel)
     page.page.wait_for_selector("#selection:not([hidden])")
     person.keep("selection")
     if person.touches:
@@ -284,19 +172,6 @@ def objects(person: Person, reader: Client, folder: Path) -> None:
     else:
         page.page.keyboard.press("Control+z")
     page.wait_until(lambda: added in names(), "the object to return")
-
-
-def still(page: ViserPage, where: Callable[[], Pixel]) -> Pixel:
-    """Return a pixel when it moves no more: the camera follows the size of the picture."""
-    pixels = [where()]
-
-    def rests() -> bool:
-        page.page.wait_for_timeout(500)
-        pixels.append(where())
-        return bool(np.allclose(pixels[-1], pixels[-2], atol=0.5))
-
-    page.wait_until(rests, "the camera to rest")
-    return pixels[-1]
 
 
 def teaching(person: Person) -> None:

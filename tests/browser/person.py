@@ -1,0 +1,113 @@
+"""A person at a page: by mouse and keys at a desk, by real touches on a phone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import Locator
+
+from tests.browser.finger import fingers, middle
+from tests.browser.page import Pixel, ViserPage
+from tests.browser.session import MOVE, Truth, bar, clear_stop
+
+DOUBLE = 700
+"""Time [ms] after which a second press of Pause is one of its own."""
+
+Keep = Callable[[str], None]
+
+
+class Person:
+    """A person who presses by mouse at a desk and by finger on a phone."""
+
+    def __init__(self, page: ViserPage, truth: Truth, keep: Keep, *, touches: bool) -> None:
+        self.page, self.truth, self.keep, self.touches = page, truth, keep, touches
+
+    def press(self, element: Locator) -> None:
+        if self.touches:
+            element.tap()
+        else:
+            element.click()
+
+    def button(self, name: str, *, inside: str = "body") -> None:
+        self.press(self.page.page.locator(inside).get_by_role("button", name=name, exact=True))
+
+    def point(self, pixel: Pixel) -> None:
+        """Click or tap a pixel."""
+        if self.touches:
+            self.page.page.touchscreen.tap(*pixel)
+        else:
+            self.page.page.mouse.click(*pixel)
+
+    def drag_arrow(self, metres: float) -> None:
+        if not self.touches:
+            self.page.drag_arrow(MOVE, "z", metres)
+            return
+        start, end = self.page.grip_arrow(MOVE, "z").pixels(metres)
+        with fingers(self.page.page) as hand:
+            hand.put(start)
+            hand.move(end)
+            hand.lift()
+
+    def open_panel(self, tab: str) -> None:
+        sheet = self.page.frame.locator("#k450-sheet")
+        while self.touches and sheet.is_visible():
+            if sheet.get_attribute("aria-label") == "Controls, full height":
+                break
+            sheet.tap()
+            self.page.page.wait_for_timeout(400)
+        if self.touches and sheet.is_visible():
+            self.assert_above(self.page.page.get_by_role("group", name="Camera"), sheet)
+        self.press(self.page.frame.get_by_role("tab", name=tab, exact=True))
+
+    def pause(self, status: Callable[[], Any]) -> None:
+        """Pause by the bar; a second press that follows at once would be the same one."""
+        self.press(self.page.page.locator("#pause"))
+        self.page.wait_until(lambda: status() == "paused", "the pause")
+        self.page.page.wait_for_timeout(DOUBLE)
+
+    def assert_above(self, group: Locator, sheet: Locator) -> None:
+        """Check that the buttons of ``group`` lie above the ``sheet``, not over its controls."""
+        top = sheet.bounding_box()
+        assert top is not None
+        for button in group.locator("button, select").all():
+            box = button.bounding_box() if button.is_visible() else None
+            assert box is None or box["y"] + box["height"] <= top["y"] + 1.0
+
+    def fold_panel(self) -> None:
+        sheet = self.page.frame.locator("#k450-sheet")
+        if self.touches and sheet.is_visible():
+            sheet.tap()
+            self.page.page.wait_for_timeout(400)
+
+    def stop(self) -> None:
+        """Stop by the key or the button, and clear the stop."""
+        self.assert_stop_is_free()
+        if self.touches:
+            self.page.page.locator("#stop").tap()
+        else:
+            self.page.page.keyboard.press("Escape")
+        self.truth.wait(mood="stopped")
+        self.page.wait_until(lambda: bar(self.page, "headline") == "Stopped", "the stop")
+        clear_stop(self.page, self.truth)
+
+    def assert_stop_is_free(self) -> None:
+        """Check that nothing lies over STOP and that the page does not scroll sideways."""
+        place = middle(self.page.page.locator("#stop"))
+        found = self.page.page.evaluate("(at) => document.elementFromPoint(...at).id", place)
+        assert found == "stop"
+        assert self.page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+
+
+def still(page: ViserPage, where: Callable[[], Pixel]) -> Pixel:
+    """Return a pixel when it moves no more: the camera follows the size of the picture."""
+    pixels = [where()]
+
+    def rests() -> bool:
+        page.page.wait_for_timeout(500)
+        pixels.append(where())
+        return bool(np.allclose(pixels[-1], pixels[-2], atol=0.5))
+
+    page.wait_until(rests, "the camera to rest")
+    return pixels[-1]
