@@ -10,12 +10,12 @@ import pytest
 
 from katana450.client import Client
 from katana450.server.api import answers
+from tests.browser.page import Pixel
 from tests.browser.person import Person, still
 from tests.browser.server import AppServer
 from tests.browser.session import AXES, bar
 from tests.browser.shared_server import SharedServer
 from tests.browser.sizes import SIZES, in_sizes_and_schemes
-from tests.browser.spots import spot
 
 pytestmark = pytest.mark.long
 
@@ -97,7 +97,13 @@ def taught_poses(person: Person) -> None:
 def link(person: Person, reader: Client) -> None:
     page, truth = person.page, person.truth
     links = ["/arm/" + "/".join(each.path) for each in reader.query(answers.Arm).links]
-    person.point(still(page, lambda: spot(page, links, 1).pixel))
+
+    def middle() -> Pixel:
+        """Return the pixel in the middle of the upper arm."""
+        shoulder, elbow = (page.node_pose(each)[:3, 3] for each in links[1:3])
+        return page.project(0.5 * (shoulder + elbow))
+
+    person.point(still(page, middle))
     chosen = page.page.get_by_role("group", name="Selected joint")
     page.wait_until(chosen.is_visible, "the bar of the joint")
     assert chosen.locator("b").inner_text() == "2 shoulder"
