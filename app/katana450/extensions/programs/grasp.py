@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -23,6 +23,13 @@ from katana450.extensions.programs.conditions import Held
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.located_step import Conditional
 from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder
+from katana450.extensions.programs.schema_parts import (
+    OBJECT,
+    Schema,
+    any_of,
+    mapping,
+    number_or_text,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -75,6 +82,17 @@ class _Room:
     is_missed: bool = False
 
 
+def grasp_schema(about: str) -> Schema:
+    """Return the name of an object, or how to grasp it."""
+    how = {
+        "side": {"enum": [FRONT, ABOVE], "description": "Side of the tool; found unless given"},
+        "pitch": number_or_text(0.0, 90.0, "Pitch of the tool, deg; found unless given"),
+        "height": number_or_text(1.0, 500.0, "Height above the underside, mm; found unless given"),
+    }
+    fields = mapping("An object, and how to grasp it", "object", {"object": OBJECT, **how})
+    return any_of(about, OBJECT, fields)
+
+
 @dataclass(frozen=True)
 class Grasp:
     """Grasp an object: open the fingers, approach it, close until both sides touch.
@@ -85,6 +103,8 @@ class Grasp:
         pitch: of the tool [rad]; None for the first with which this and all later steps succeed.
         height: above the underside of the object [m]; None for HEIGHT_FRACTIONS of its height.
     """
+
+    schema: ClassVar[Schema] = grasp_schema("Open, approach an object, and close the fingers on it")
 
     name: str
     side: str = ""

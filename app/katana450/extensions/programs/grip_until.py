@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.gripper_model import GripperModel
@@ -13,6 +13,7 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import OBJECT, Schema, mapping, number_or_text
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -86,6 +87,15 @@ class GripUntil:
         force: [N].
         holding: name of the object that they must hold then; "" for any.
     """
+
+    schema: ClassVar[Schema] = mapping(
+        "Close the fingers until they press with a force",
+        "until",
+        {
+            "until": number_or_text(MIN_FORCE, MAX_FORCE, "Force of a finger, N, such as 3 N"),
+            "holding": OBJECT,
+        },
+    )
 
     force: float
     holding: str = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -13,6 +13,18 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import (
+    BLEND,
+    BRANCH,
+    OFFSET,
+    ORIENTATION,
+    TURN,
+    Schema,
+    any_of,
+    mapping,
+    number_or_text,
+    reference,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step, nothing
@@ -35,6 +47,16 @@ class Move:
         place: the place; with ``by`` its orientation and branch.
         by: (3,) motion of the tool point from its present place [m]; None to move to ``place``.
     """
+
+    schema: ClassVar[Schema] = any_of(
+        "Move to a place on any path, round obstacles",
+        reference("place"),
+        mapping(
+            "Move relative to the present place",
+            "by",
+            {"by": OFFSET, **ORIENTATION, "branch": BRANCH},
+        ),
+    )
 
     place: StepTarget
     by: FloatArray | None = None
@@ -66,6 +88,10 @@ class Move:
 class Joints:
     """Move to the joint angles ``q`` (n,) [rad] on a free path round obstacles."""
 
+    schema: ClassVar[Schema] = reference(
+        "joints", "Move to these angles of the joints, deg, round obstacles"
+    )
+
     q: FloatArray
 
     @classmethod
@@ -81,6 +107,12 @@ class Joints:
 @dataclass(frozen=True)
 class Nudge:
     """Move the joint ``axis`` (from 0) by the relative angle ``by`` [rad]."""
+
+    schema: ClassVar[Schema] = mapping(
+        "Turn one joint by an angle",
+        "axis by",
+        {"axis": number_or_text(1, places.MAX_JOINTS, "Number of the joint, from 1"), "by": TURN},
+    )
 
     axis: int
     by: float
@@ -104,6 +136,8 @@ class Nudge:
 class Home:
     """Move to the ready posture on a free path round obstacles."""
 
+    schema: ClassVar[Schema] = {"type": "null", "description": "Move to the ready posture"}
+
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read the step, which takes no value. Raises ScriptError."""
@@ -118,6 +152,12 @@ class Home:
 @dataclass(frozen=True)
 class Via:
     """Move through places, without a rest if the corners are rounded."""
+
+    schema: ClassVar[Schema] = mapping(
+        "Move the joints through places, with rounded corners",
+        "through",
+        {"through": reference("through"), "blend": BLEND},
+    )
 
     through: tuple[StepTarget, ...]
     blend: float

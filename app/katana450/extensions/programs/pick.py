@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.grasp import Grasp
+from katana450.extensions.programs.grasp import Grasp, grasp_schema
 from katana450.extensions.programs.place import PlaceHeld
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import Schema
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -22,6 +24,8 @@ LIFTS = (0.06, 0.04, 0.025, 0.015)
 @dataclass(frozen=True)
 class Pick(Grasp):
     """Grasp an object, and lift it."""
+
+    schema: ClassVar[Schema] = grasp_schema("Grasp an object, and lift it")
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan grasp and lifting. Raises InputError if it is not possible."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -21,6 +21,16 @@ from katana450.extensions.programs.carry import APPROACHES, carry
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.places import point
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import (
+    LENGTH,
+    OBJECT,
+    TEXT,
+    TURN,
+    Schema,
+    any_of,
+    mapping,
+    reference,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step, nothing
@@ -50,6 +60,32 @@ class PlaceHeld:
         on: name of the object on which to place it; "" for whatever is below.
         yaw: its angle about the vertical [rad]; None for any.
     """
+
+    schema: ClassVar[Schema] = {
+        **mapping(
+            "Put the held object down, and draw back",
+            "",
+            {
+                "at": any_of(
+                    "Its place: the name of a pose, [x, y, z], or x, y and, if wanted, z, yaw",
+                    TEXT,
+                    reference("point"),
+                    mapping(
+                        "Its place",
+                        "x y",
+                        {
+                            "x": LENGTH,
+                            "y": LENGTH,
+                            "z": {**LENGTH, "description": "Height of its underside, mm"},
+                            "yaw": {**TURN, "description": "Angle about the vertical, deg"},
+                        },
+                    ),
+                ),
+                "on": {**OBJECT, "description": "Object that carries it; its middle without `at`"},
+            },
+        ),
+        "minProperties": 1,
+    }
 
     at: FloatArray | None
     in_base: bool
@@ -109,6 +145,11 @@ class PlaceHeld:
 class SetDown:
     """Put the held object back to its place of the grasp, and draw back."""
 
+    schema: ClassVar[Schema] = {
+        "type": "null",
+        "description": "Put the held object back to where it was grasped, and draw back",
+    }
+
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read the step, which takes no value. Raises ScriptError."""
@@ -131,6 +172,11 @@ class SetDown:
 @dataclass(frozen=True)
 class Release:
     """Open the fingers where the arm is, and draw back; the object stands on what is below it."""
+
+    schema: ClassVar[Schema] = {
+        "type": "null",
+        "description": "Open the fingers on the held object where it is, and draw back",
+    }
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003

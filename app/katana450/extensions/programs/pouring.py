@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,13 @@ from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.pour_rate import RatedTilt, RatePlan
 from katana450.extensions.programs.pour_tilt import film_after, tilt_for
+from katana450.extensions.programs.schema_parts import (
+    OBJECT,
+    Schema,
+    any_of,
+    mapping,
+    number_or_text,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -97,6 +104,25 @@ class Pour:
         rate: flow while pouring [m^3/s]; None to turn the cup evenly. Of all, the last
             LAST_FRACTION flows faster.
     """
+
+    schema: ClassVar[Schema] = any_of(
+        "Carry the cup over an object, turn it over, shake it, and turn it back",
+        OBJECT,
+        mapping(
+            "An object, and how much to pour",
+            "into",
+            {
+                "into": OBJECT,
+                "ml": number_or_text(1.0, 1000.0, "How much to pour, ml; all unless given"),
+                "rate": number_or_text(
+                    1.0, 50.0, "Flow while pouring, ml/s, or a text such as 10 ml/s"
+                ),
+                "shake": number_or_text(
+                    0, 20, "Number of shakes after all is poured, 3 unless given"
+                ),
+            },
+        ),
+    )
 
     into: str
     shake: int

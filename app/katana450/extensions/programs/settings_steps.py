@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,14 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, SetSpeed, UseTool, Wait
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import (
+    OBJECT,
+    TEXT,
+    Schema,
+    any_of,
+    mapping,
+    number_or_text,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -24,6 +32,11 @@ from katana450.maths.planning.plan import MARGIN
 
 MAX_PAUSE = 3600.0
 """[s] Maximum duration of a wait."""
+
+
+FINGERS = number_or_text(
+    -180.0, 180.0, "open, closed, or the angle of the fingers, deg; mm if they slide"
+)
 
 
 @dataclass(frozen=True)
@@ -34,6 +47,16 @@ class Gripper:
         where: ``open``, ``closed`` or a position.
         holding: name of the object that they must hold then; "" for any or none.
     """
+
+    schema: ClassVar[Schema] = any_of(
+        "open, closed, or the angle of the fingers, deg; mm if they slide",
+        FINGERS,
+        mapping(
+            "A position of the fingers, and what they must hold then",
+            "to",
+            {"to": FINGERS, "holding": OBJECT},
+        ),
+    )
 
     where: float | str
     holding: str = ""
@@ -99,6 +122,8 @@ def _with_fingers(builder: PlanBuilder, angle: float) -> State:
 class TimedPause:
     """Wait for ``seconds`` [s]."""
 
+    schema: ClassVar[Schema] = number_or_text(0.0, MAX_PAUSE, "Wait, s")
+
     seconds: float
 
     @classmethod
@@ -115,6 +140,11 @@ class TimedPause:
 @dataclass(frozen=True)
 class Tool:
     """Select the tool frame to which all later points refer."""
+
+    schema: ClassVar[Schema] = {
+        **TEXT,
+        "description": "Tool frame of all later points: tcp, grasp or flange",
+    }
 
     name: str
 
@@ -134,6 +164,10 @@ class Tool:
 @dataclass(frozen=True)
 class Speed:
     """Limit all later motions to the fraction ``value`` of the program's speed."""
+
+    schema: ClassVar[Schema] = number_or_text(
+        MIN_SPEED, 1.0, "Fraction of full speed of all later motions"
+    )
 
     value: float
 

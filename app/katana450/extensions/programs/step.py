@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Protocol, Self
+from typing import ClassVar, Protocol, Self
 
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import Schema
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 
 
 class Step(Protocol):
-    """A program step."""
+    """A program step.
+
+    Attributes:
+        schema: JSON Schema of its value, with which editors explain and check it.
+    """
+
+    schema: ClassVar[Schema]
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,14 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import FillCup, PutObject
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import (
+    LENGTH,
+    OBJECT,
+    Schema,
+    any_of,
+    mapping,
+    number_or_text,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -28,6 +36,19 @@ from katana450.maths.water.units import ML
 @dataclass(frozen=True)
 class Fill:
     """Fill the cup with ``volume`` [m^3] of ``liquid``."""
+
+    schema: ClassVar[Schema] = any_of(
+        "Fill the cup with water, ml, or with another liquid",
+        number_or_text(0.0, 1000.0, "Volume of water, ml"),
+        mapping(
+            "A volume, and of which liquid",
+            "ml",
+            {
+                "ml": number_or_text(0.0, 1000.0, "Volume, ml"),
+                "of": {"enum": list(LIQUIDS), "description": "The liquid, water unless given"},
+            },
+        ),
+    )
 
     volume: float
     liquid: Liquid = WATER
@@ -59,6 +80,12 @@ class Put:
     Consecutive steps of this kind form one arrangement: an object may overlap the old place of
     another that is placed elsewhere by a later one of them.
     """
+
+    schema: ClassVar[Schema] = mapping(
+        "Set an object to another place on the table, without the arm",
+        "object x y",
+        {"object": OBJECT, "x": LENGTH, "y": LENGTH},
+    )
 
     name: str
     x: float

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -16,6 +16,19 @@ from katana450.extensions.programs import places
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.moves import through
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import (
+    ARC_PITCH,
+    BLEND,
+    BRANCH,
+    LENGTH,
+    OFFSET,
+    ORIENTATION,
+    TURN,
+    Schema,
+    mapping,
+    number_or_text,
+    reference,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -34,6 +47,12 @@ LEVEL_TOLERANCE = 1e-6
 @dataclass(frozen=True)
 class Line:
     """Move the tool on a straight line; its orientation changes evenly."""
+
+    schema: ClassVar[Schema] = mapping(
+        "Move the tool point on a straight line, to a point or by an offset",
+        "",
+        {"to": reference("point"), "by": OFFSET, **ORIENTATION},
+    )
 
     to: FloatArray | None
     by: FloatArray | None
@@ -76,6 +95,12 @@ class Line:
 @dataclass(frozen=True)
 class Lines:
     """Move the tool on straight lines through places without a rest, with rounded corners."""
+
+    schema: ClassVar[Schema] = mapping(
+        "Move the tool point on straight lines through places, with rounded corners",
+        "through",
+        {"through": reference("through"), "blend": BLEND},
+    )
 
     through: tuple[StepTarget, ...]
     blend: float
@@ -194,6 +219,20 @@ class ArcGeometry:
 class Arc:
     """Move the tool about an axis by ``angle`` [rad] and along it by ``climb`` [m]."""
 
+    schema: ClassVar[Schema] = mapping(
+        "Move the tool point round an axis from its present place",
+        "centre axis angle",
+        {
+            "centre": reference("point"),
+            "axis": reference("direction"),
+            "angle": TURN,
+            "climb": {**LENGTH, "description": "Motion along the axis, mm"},
+            "pitch": ARC_PITCH,
+            "roll": TURN,
+            "yaw": TURN,
+        },
+    )
+
     turn: ArcGeometry
     angle: float
     climb: float
@@ -226,6 +265,21 @@ class Arc:
 @dataclass(frozen=True)
 class Circle:
     """Move the tool to the highest point of a circle of ``radius`` [m], and from there round it."""
+
+    schema: ClassVar[Schema] = mapping(
+        "Move to the highest point of a circle, then round it",
+        "centre normal radius",
+        {
+            "centre": reference("point"),
+            "normal": reference("direction"),
+            "radius": number_or_text(0.1, 1000.0, "mm"),
+            "turns": number_or_text(-20.0, 20.0, "Number of turns, 1 unless given"),
+            "pitch": ARC_PITCH,
+            "roll": TURN,
+            "yaw": TURN,
+            "branch": BRANCH,
+        },
+    )
 
     turn: ArcGeometry
     radius: float
@@ -270,6 +324,17 @@ class Circle:
 @dataclass(frozen=True)
 class Screw:
     """Move the tool as one rigid body about an axis and along it, as far as its axes can."""
+
+    schema: ClassVar[Schema] = mapping(
+        "Move the tool about an axis and along it, as one rigid body",
+        "point axis",
+        {
+            "point": reference("point"),
+            "axis": reference("direction"),
+            "angle": TURN,
+            "climb": {**LENGTH, "description": "Motion along the axis, mm"},
+        },
+    )
 
     point: FloatArray
     axis: FloatArray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.places import LEAST_JOINTS, MAX_JOINTS
 from katana450.extensions.programs.plan_builder import CARRY, PlanBuilder, UntimedPath
 from katana450.extensions.programs.recorded_pace import recorded_scaling
+from katana450.extensions.programs.schema_parts import Schema, list_of, mapping, reference
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -66,6 +67,12 @@ class FollowTrajectory:
         times: (m,) [s], from any zero.
         postures: (m, n) [rad].
     """
+
+    schema: ClassVar[Schema] = mapping(
+        "Move through postures at given times, on a smooth path, slower where limits require it",
+        "through",
+        {"through": list_of(reference("posture"), 2, MAX_POSTURES)},
+    )
 
     times: FloatArray
     postures: FloatArray

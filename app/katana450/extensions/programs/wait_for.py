@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
@@ -12,6 +12,12 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.conditions import CONDITIONS, Condition, one_condition
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.schema_parts import (
+    CONDITION_FIELDS,
+    Schema,
+    mapping,
+    number_or_text,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.settings_steps import MAX_PAUSE
 from katana450.extensions.programs.source import YamlValue
@@ -55,6 +61,19 @@ class WaitFor:
 
     The steps after it are planned for the scene as it is when the script is planned.
     """
+
+    schema: ClassVar[Schema] = {
+        **mapping(
+            "Wait at rest until one condition holds",
+            "",
+            {
+                **CONDITION_FIELDS,
+                "timeout": number_or_text(0.01, MAX_PAUSE, "s; 60 unless given"),
+            },
+        ),
+        "minProperties": 1,
+        "maxProperties": 2,
+    }
 
     condition: Condition | None
     timeout: float
