@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from katana450.arm.control.scene_objects import Shape
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.client import Client, RefusedError
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Shape
 
 THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
 

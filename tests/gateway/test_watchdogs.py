@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from katana450.arm.control.scene_objects import Shape
 from katana450.client import Client, connect
 from katana450.client.files import LostError, RefusedError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Shape
 from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask
 from tests.gateway.test_isolation import FAR

@@ -18,6 +18,7 @@ from starlette.requests import Request
 
 import katana450
 from katana450.arm.control.lease import Role
+from katana450.arm.control.scene_objects import Shape
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.extensions.programs.script import parse
@@ -25,7 +26,6 @@ from katana450.extensions.recording.live.route import recording_routes
 from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Shape
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer

@@ -76,7 +76,7 @@ class ObjectRequests(RequestHandler):
         size = None if known is None else known.size
         solid = None if known is None else known.solid
         if request.shape is not None:
-            shape = Shape(request.shape.value)
+            shape = request.shape
         if request.mesh is not None:
             solid = self.hub.meshes.need(request.mesh).solid
         if request.size is not None:
@@ -121,7 +121,7 @@ class ObjectRequests(RequestHandler):
         scene_object = self._known(request.name)
         if scene_object is None:
             raise InputError(f"There is no {request.name!r}.")
-        to = Attachment(request.to.value)
+        to = request.to
         hand = arm.environment.hand
         if request.T is None or hand is None:
             check_mounted(arm.environment, arm.state.objects, scene_object, to, arm.state.x)

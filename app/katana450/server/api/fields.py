@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
+
+if TYPE_CHECKING:
+    # The process of STOP reads two requests and no commands.
+    from katana450.arm.control.commands import Command
 
 VERSION = 1
 
@@ -74,27 +78,6 @@ class Frame(Enum):
     """The base frame, on the table under the control box."""
 
 
-class Shape(Enum):
-    """Shape that stands for an object in collision checks."""
-
-    BOX = "box"
-    CYLINDER = "cylinder"
-    SPHERE = "sphere"
-    MESH = "mesh"
-    """An uploaded file; its convex hull is checked for contacts."""
-
-
-class Attachment(Enum):
-    """Body to which an object can be fixed."""
-
-    HAND = "hand"
-    """The object moves with the hand and counts as a part of it, whatever the fingers do."""
-    WORLD = "world"
-    """The object stays where it is."""
-    TABLE = "table"
-    """The object is put down upright on the table below, and stays there."""
-
-
 def tag_of(name: str) -> str:
     """Return the tag of the message class ``name``: ``clear_stop`` for ``ClearStop``."""
     return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
@@ -156,6 +139,13 @@ class Request(
 
     id: Id = None
     revocations: Annotated[int, Meta(ge=0)] | None = None
+
+    def command(self) -> Command | None:
+        """Return the command of the request.
+
+        None if it is no command, or if its command depends on the arm.
+        """
+        return None
 
 
 class MotionRequest(Request, frozen=True, kw_only=True):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from msgspec import Meta
 
+from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import (
@@ -20,6 +22,7 @@ from katana450.server.api.fields import (
     Matrix3,
     Matrix4,
     MotionRequest,
+    Name,
     Rates,
     Request,
     RequestTraits,
@@ -49,6 +52,9 @@ class Jog(Request, frozen=True, kw_only=True):
             if not math.isfinite(rate) or abs(rate) > limit:
                 raise ValueError(f"the rate {rate} is not between {-limit:g} and {limit:g}")
 
+    def command(self) -> cmd.Command:
+        return cmd.Jog(np.array(self.rates), self.frame)
+
 
 class StepTool(MotionRequest, frozen=True, kw_only=True):
     """Move the target of the tool by one step. Steps in a row add up.
@@ -71,6 +77,9 @@ class StepTool(MotionRequest, frozen=True, kw_only=True):
             if not math.isfinite(step) or abs(step) > limit:
                 raise ValueError(f"the step {step} is not between {-limit:g} and {limit:g}")
 
+    def command(self) -> cmd.Command:
+        return cmd.StepTool(np.array(self.by), self.frame)
+
 
 class Joint(MotionRequest, frozen=True, kw_only=True):
     """Move one joint to a value.
@@ -85,6 +94,9 @@ class Joint(MotionRequest, frozen=True, kw_only=True):
     axis: Annotated[int, Meta(ge=1, le=MAX_JOINTS)]
     value: float
 
+    def command(self) -> cmd.Command:
+        return cmd.SetJoint(self.axis - 1, self.value)
+
 
 class Joints(MotionRequest, frozen=True, kw_only=True):
     """Move all joints along a straight line in joint space; they arrive together.
@@ -96,6 +108,9 @@ class Joints(MotionRequest, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
     q: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)]
+
+    def command(self) -> cmd.Command:
+        return cmd.SetJoints(np.array(self.q))
 
 
 class Servo(Request, frozen=True, kw_only=True):
@@ -114,6 +129,9 @@ class Servo(Request, frozen=True, kw_only=True):
 
     q: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)]
     qd: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)] | None = None
+
+    def command(self) -> cmd.Command:
+        return cmd.Servo(np.array(self.q), None if self.qd is None else np.array(self.qd))
 
 
 class Pose(MotionRequest, frozen=True, kw_only=True):
@@ -159,6 +177,9 @@ class Turn(MotionRequest, frozen=True, kw_only=True):
     pitch: float
     roll: float
 
+    def command(self) -> cmd.Command:
+        return cmd.TurnTool(self.pitch, self.roll)
+
 
 class Orient(MotionRequest, frozen=True, kw_only=True):
     """Turn the tool of an arm outside the five-axis family; its target position is kept.
@@ -186,6 +207,9 @@ class Gripper(MotionRequest, frozen=True, kw_only=True):
 
     angle: float
 
+    def command(self) -> cmd.Command:
+        return cmd.SetGripper(self.angle)
+
 
 class Undo(MotionRequest, frozen=True):
     """Undo the last change of a goal, an object or a setting by this client.
@@ -202,6 +226,9 @@ class EndDrag(MotionRequest, frozen=True):
 
     traits: ClassVar[RequestTraits] = COMMAND
 
+    def command(self) -> cmd.Command:
+        return cmd.EndDrag()
+
 
 class Go(MotionRequest, frozen=True):
     """Move along the detour that the state offers, to the target that a drag did not reach.
@@ -213,17 +240,26 @@ class Go(MotionRequest, frozen=True):
 
     traits: ClassVar[RequestTraits] = COMMAND
 
+    def command(self) -> cmd.Command:
+        return cmd.Go()
+
 
 class Home(MotionRequest, frozen=True):
     """Move to the ready posture."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 
+    def command(self) -> cmd.Command:
+        return cmd.Home()
+
 
 class GoToZero(MotionRequest, frozen=True):
     """Move to the zero posture, in which the arm is stretched along x."""
 
     traits: ClassVar[RequestTraits] = COMMAND
+
+    def command(self) -> cmd.Command:
+        return cmd.GoToZero()
 
 
 class OperateArm(Request, frozen=True, kw_only=True):
@@ -243,3 +279,36 @@ class OperateArm(Request, frozen=True, kw_only=True):
 
     act: ArmAct
     confirmed: bool = False
+
+    def command(self) -> cmd.Command:
+        return cmd.OperateArm(self.act, self.confirmed)
+
+
+class Branch(MotionRequest, frozen=True, kw_only=True):
+    """Move to the target pose on another branch: with another shoulder or elbow.
+
+    Attributes:
+        shoulder: Shoulder of the branch of a five-axis arm.
+        elbow: Elbow of the branch of a five-axis arm.
+        name: Name of the branch, in place of shoulder and elbow; the answer ``branches`` has it.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+    shoulder: Literal["front", "back"] | None = None
+    elbow: Literal["up", "down"] | None = None
+    name: Name | None = None
+
+    def __post_init__(self) -> None:
+        five = (self.shoulder is None) + (self.elbow is None)
+        if five != (0 if self.name is None else 2):
+            raise ValueError("a branch has a shoulder and an elbow, or a name")
+
+
+class Hold(MotionRequest, frozen=True):
+    """Come to rest and drop the target."""
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+    def command(self) -> cmd.Command:
+        return cmd.Hold()

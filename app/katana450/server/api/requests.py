@@ -12,6 +12,8 @@ from typing import Annotated, Any, ClassVar, Literal, Union, get_args
 import msgspec
 from msgspec import Meta
 
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import Attachment, Shape
 from katana450.errors import InputError
 from katana450.maths.kinematics.priority import Priority
 from katana450.server.api.fields import (
@@ -23,14 +25,12 @@ from katana450.server.api.fields import (
     MIN_SPEED,
     ROOT,
     VERSION,
-    Attachment,
     Frame,
     Id,
     MotionRequest,
     Name,
     Request,
     RequestTraits,
-    Shape,
     tag_of,
 )
 from katana450.server.api.lease_requests import (
@@ -44,10 +44,12 @@ from katana450.server.api.lease_requests import (
     Withdraw,
 )
 from katana450.server.api.motion_requests import (
+    Branch,
     EndDrag,
     Go,
     GoToZero,
     Gripper,
+    Hold,
     Home,
     Jog,
     Joint,
@@ -159,6 +161,9 @@ class ClearStop(Request, frozen=True):
 
     traits: ClassVar[RequestTraits] = RequestTraits(free=True)
 
+    def command(self) -> cmd.Command:
+        return cmd.ClearStop()
+
 
 class Speed(Request, frozen=True, kw_only=True):
     """Set the maximum speed.
@@ -170,6 +175,9 @@ class Speed(Request, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
     value: Annotated[float, Meta(ge=MIN_SPEED, le=MAX_SPEED)]
+
+    def command(self) -> cmd.Command:
+        return cmd.SpeedScale(self.value)
 
 
 class Tool(Request, frozen=True, kw_only=True):
@@ -183,6 +191,9 @@ class Tool(Request, frozen=True, kw_only=True):
 
     name: Name
 
+    def command(self) -> cmd.Command:
+        return cmd.SetTool(self.name)
+
 
 class SetPriority(Request, frozen=True, kw_only=True):
     """Choose which part of a target is kept when the arm cannot satisfy all of it.
@@ -195,26 +206,8 @@ class SetPriority(Request, frozen=True, kw_only=True):
 
     priority: Priority
 
-
-class Branch(MotionRequest, frozen=True, kw_only=True):
-    """Move to the target pose on another branch: with another shoulder or elbow.
-
-    Attributes:
-        shoulder: Shoulder of the branch of a five-axis arm.
-        elbow: Elbow of the branch of a five-axis arm.
-        name: Name of the branch, in place of shoulder and elbow; the answer ``branches`` has it.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    shoulder: Literal["front", "back"] | None = None
-    elbow: Literal["up", "down"] | None = None
-    name: Name | None = None
-
-    def __post_init__(self) -> None:
-        five = (self.shoulder is None) + (self.elbow is None)
-        if five != (0 if self.name is None else 2):
-            raise ValueError("a branch has a shoulder and an elbow, or a name")
+    def command(self) -> cmd.Command:
+        return cmd.SetPriority(self.priority)
 
 
 class Nudge(MotionRequest, frozen=True, kw_only=True):
@@ -232,11 +225,8 @@ class Nudge(MotionRequest, frozen=True, kw_only=True):
     axis: Annotated[int, Meta(ge=1, le=MAX_JOINTS)]
     by: float
 
-
-class Hold(MotionRequest, frozen=True):
-    """Come to rest and drop the target."""
-
-    traits: ClassVar[RequestTraits] = COMMAND
+    def command(self) -> cmd.Command:
+        return cmd.Nudge(self.axis - 1, self.by)
 
 
 class Pause(Request, frozen=True):
@@ -249,11 +239,17 @@ class Pause(Request, frozen=True):
 
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
+    def command(self) -> cmd.Command:
+        return cmd.Pause()
+
 
 class Resume(MotionRequest, frozen=True):
     """Resume the motion after a pause."""
 
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
+
+    def command(self) -> cmd.Command:
+        return cmd.Resume()
 
 
 class Watch(Request, frozen=True, kw_only=True):

@@ -7,9 +7,9 @@ from typing import Annotated, ClassVar, Literal
 import msgspec
 from msgspec import Meta
 
+from katana450.arm.control.scene_objects import Attachment, Shape
 from katana450.server.api.fields import (
     COMMAND,
-    Attachment,
     FieldValue,
     Frame,
     Key,
@@ -19,7 +19,6 @@ from katana450.server.api.fields import (
     NodeName,
     Request,
     RequestTraits,
-    Shape,
 )
 
 

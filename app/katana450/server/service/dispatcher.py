@@ -25,18 +25,6 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.pending_answer import PendingAnswer, give_back
 
-COMMANDS: dict[type[requests.Request], cmd.Command] = {
-    requests.EndDrag: cmd.EndDrag(),
-    requests.Go: cmd.Go(),
-    requests.Home: cmd.Home(),
-    requests.GoToZero: cmd.GoToZero(),
-    requests.Hold: cmd.Hold(),
-    requests.Pause: cmd.Pause(),
-    requests.Resume: cmd.Resume(),
-    requests.ClearStop: cmd.ClearStop(),
-}
-"""Commands of the requests that have no fields."""
-
 ACCEPTED, REQUESTED = Verdict.ACCEPTED.value, "requested"
 """Outcomes in answers that do not come from the arm's process."""
 
@@ -173,51 +161,20 @@ class Dispatcher:
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of ``request``; None for a request about the lease."""
-        if type(request) in COMMANDS:
-            return COMMANDS[type(request)]
-        match request:
-            case requests.Joint(axis=axis, value=value):
-                return cmd.SetJoint(axis - 1, value)
-            case requests.Joints(q=q):
-                return cmd.SetJoints(np.array(q))
-            case requests.Nudge(axis=axis, by=by):
-                return cmd.Nudge(axis - 1, by)
-            case requests.Jog(rates=rates, frame=frame):
-                return cmd.Jog(np.array(rates), frame)
-            case requests.Speed(value=value):
-                return cmd.SpeedScale(value)
-            case requests.Servo(q=q, qd=qd):
-                return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
-            case requests.Gripper(angle=angle):
-                return cmd.SetGripper(angle)
-            case requests.OperateArm(act=act, confirmed=confirmed):
-                return cmd.OperateArm(act, confirmed)
-            case requests.Set():
-                return self._setting(request)
-        return self._tool_command(request)
-
-    def _tool_command(self, request: requests.Request) -> cmd.Command | None:
-        """Return the command of a request about the tool; None for another request."""
         match request:
             case requests.Pose(T=T, frame=frame):
                 return cmd.SetPose(self._in_shoulder(frame) @ se3.printed(T))
             case requests.Position(p=p, frame=frame):
                 return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
-            case requests.Turn(pitch=pitch, roll=roll):
-                return cmd.TurnTool(pitch, roll)
-            case requests.StepTool(by=by, frame=frame):
-                return cmd.StepTool(np.array(by), frame)
-            case requests.Tool(name=name):
-                return cmd.SetTool(name)
-            case requests.SetPriority(priority=priority):
-                return cmd.SetPriority(priority)
-            case requests.Branch(name=name, shoulder=shoulder, elbow=elbow):
-                name = name or f"{shoulder}-{elbow}"
-                return cmd.TakeBranch(branch_named(self._hub.present().arm, name))
             case requests.Orient(R=R, frame=frame):
                 rotation = so3.validated(np.array(R), tolerance=tolerances.ROTATION_PRINTED)
                 return cmd.OrientTool(self._in_shoulder(frame)[:3, :3] @ rotation)
-        return None
+            case requests.Branch(name=name, shoulder=shoulder, elbow=elbow):
+                name = name or f"{shoulder}-{elbow}"
+                return cmd.TakeBranch(branch_named(self._hub.present().arm, name))
+            case requests.Set():
+                return self._setting(request)
+        return request.command()
 
     def _setting(self, request: requests.Set) -> cmd.Command:
         """Return the command that sets fields of the VRML world, all at once."""
