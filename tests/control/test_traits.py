@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from dataclasses import MISSING, fields
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -25,43 +26,34 @@ ABSTRACT = (cmd.AxisCommand,)
 BALL = SceneObject("ball", Shape.SPHERE, (0.02,), np.eye(4))
 
 
+PLAIN: dict[object, object] = {int: 0, float: 0.1, str: "ball"}
+"""Values of fields by their types, for commands whose fields may have any value."""
+
+
 def examples(session: Session, state: State) -> list[cmd.Command]:
-    """Return one command of each class."""
-    q = np.zeros(session.require_arm().chain.n)
-    return [
-        *(
-            cmd.SetJoint(0, 0.1),
-            cmd.SetAxes(((0, 0.1),)),
-            cmd.Nudge(0, 0.1),
-            cmd.SetJoints(q),
-            cmd.Servo(q),
-        ),
-        *(cmd.MoveTool(np.array((0.3, 0.0, 0.1))), cmd.TurnTool(0.1, 0.1), cmd.SetPose(np.eye(4))),
-        *(cmd.StepTool(np.full(5, 0.01)), cmd.OrientTool(np.eye(3))),
-        *(cmd.SetGripper(0.1), cmd.SetTool("flange"), cmd.SetPriority(Priority.PITCH)),
-        *(cmd.TakeBranch(BRANCHES[0]), cmd.EndDrag(), cmd.Home(), cmd.GoToZero(), cmd.Hold()),
-        *(cmd.Stop(), cmd.ClearStop(), cmd.Pause(), cmd.Resume(), cmd.GoAlong(0.5)),
-        *(
-            cmd.Follow(plan_to(session.require_arm(), None, state, q)),
-            cmd.OfferDetour(plan_to(session.require_arm(), None, state, q)),
-            cmd.Go(),
-            cmd.SpeedScale(0.5),
-            cmd.Jog(np.ones(5)),
-        ),
-        *(
-            cmd.PlaceObject(BALL),
-            cmd.Remove("ball"),
-            cmd.MoveObject("ball"),
-            cmd.Attach("ball", Attachment.WORLD),
-        ),
-        *(
-            cmd.ReplaceScene((BALL,)),
-            cmd.SetAppearance("ball", AppearanceTrait.CHOICE, 0),
-            cmd.Fill(1e-4),
-        ),
-        cmd.OperateArm(ArmAct.UNBLOCK),
+    """Return one command of each class. Only fields with further types need an entry here."""
+    arm = session.require_arm()
+    q = np.zeros(arm.chain.n)
+    given: list[BaseCommand] = [
+        *(cmd.SetAxes(((0, 0.1),)), cmd.SetJoints(q), cmd.Servo(q), cmd.Jog(np.ones(5))),
+        *(cmd.MoveTool(np.array((0.3, 0.0, 0.1))), cmd.SetPose(np.eye(4))),
+        *(cmd.StepTool(np.full(5, 0.01)), cmd.OrientTool(np.eye(3)), cmd.TakeBranch(BRANCHES[0])),
+        *(cmd.SetTool("flange"), cmd.SetPriority(Priority.PITCH), cmd.Fill(1e-4)),
+        *(cmd.Follow(plan_to(arm, None, state, q)), cmd.OfferDetour(plan_to(arm, None, state, q))),
+        *(cmd.PlaceObject(BALL), cmd.Attach("ball", Attachment.WORLD), cmd.ReplaceScene((BALL,))),
+        *(cmd.SetAppearance("ball", AppearanceTrait.CHOICE, 0), cmd.OperateArm(ArmAct.UNBLOCK)),
         cmd.Batch((cmd.Home(),)),
     ]
+    kinds: dict[Any, Any] = {type(each): each for each in given}
+    return [kinds.get(kind) or plain_example(kind) for kind in KINDS]
+
+
+def plain_example(kind: Any) -> Any:
+    """Return a command of a class whose fields are numbers and texts."""
+    types = get_type_hints(kind)
+    needed = [each.name for each in fields(kind) if each.default is MISSING]
+    assert all(types[name] in PLAIN for name in needed), f"add an example of {kind.__name__}"
+    return kind(**{name: PLAIN[types[name]] for name in needed})
 
 
 def subclasses(kind: type) -> set[type]:
