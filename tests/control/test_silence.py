@@ -7,6 +7,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import finding_text
+from katana450.arm.control.plans import plan_to
 from katana450.arm.control.restart import at_rest, restarted
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
@@ -54,6 +55,17 @@ def test_paused_arm_rests_until_the_next_command(
     later = run(session, paused, [], ticks=100)
     np.testing.assert_array_equal(later.q, paused.q)
     assert not run(session, later, [command]).waits
+
+
+def test_plan_that_begins_elsewhere_keeps_a_pause(
+    session: Session, state: State, paused: State
+) -> None:
+    elsewhere = plan_to(session.require_arm(), None, state, paused.goal)
+    for _ in range(2):
+        paused = run(session, paused, [cmd.Follow(elsewhere)])
+        assert paused.status is Status.PAUSED
+        assert reasons(paused) == {Reason.WAITING, Reason.LOOP_LATE, Reason.NOT_AT_START}
+        assert len(paused.findings) == 3
 
 
 @pytest.mark.parametrize("command", [cmd.SpeedScale(0.5), cmd.SetPriority(Priority.PITCH)])

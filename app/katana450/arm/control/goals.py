@@ -130,14 +130,13 @@ def with_time(command: Command, t: float) -> Command:
 def follow_plan(arm: ArmModel, state: State, plan: Plan, tau: float) -> State:
     """Return ``state`` that follows ``plan`` from here.
 
-    If the arm does not stand at ``tau`` [s] of it, the only change is a finding that reports it.
+    If the arm does not stand at ``tau`` [s] of it, it does not move, and a finding reports it.
     """
     distances = np.abs(state.setpoint - (plan.q(tau) if tau else plan.start))
     if distances.max() > START_TOLERANCE or not state.motion.at_rest:
         axis = int(distances.argmax())
-        others = without_finding(state, Reason.NOT_AT_START).findings
         finding = Finding(Reason.NOT_AT_START, float(distances[axis]), axis)
-        return replace(state, findings=(*others, finding))
+        return replace(state, findings=(*state.findings, finding))
     return _along(arm, state, Following.begin(plan, tau))
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.goals import may_offer
+from katana450.arm.control.goals import may_offer, without_finding
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.scene_objects import MAX_OBJECTS, named
 from katana450.arm.control.state import (
@@ -51,7 +52,12 @@ def take_all(
         if why:
             return state, refused(why)
         after = take(state, command)
-        return after, outcome(state, after)
+        taken = outcome(state, after)
+        if taken.verdict is Verdict.REFUSED:
+            # A plan that begins elsewhere. It leaves no trace but the finding that says so.
+            others = without_finding(state, Reason.NOT_AT_START).findings
+            after = replace(state, findings=(*others, *taken.findings))
+        return after, taken
     outcomes = []
     for part in command.commands:
         state, part_outcome = take_all(take, state, part)

@@ -172,15 +172,11 @@ class Dispatcher:
             case requests.Branch(name=name, shoulder=shoulder, elbow=elbow):
                 name = name or f"{shoulder}-{elbow}"
                 return cmd.TakeBranch(branch_named(self._hub.present().arm, name))
-            case requests.Set():
-                return self._setting(request)
+            case requests.Set(node=node, field=field, value=value, more=more):
+                arm = self._hub.present()
+                first = requests.FieldSetting(node=node, field=field, value=value)
+                return arm.nodes.command(arm.state, (first, *more))
         return request.command()
-
-    def _setting(self, request: requests.Set) -> cmd.Command:
-        """Return the command that sets fields of the VRML world, all at once."""
-        arm = self._hub.present()
-        first = requests.FieldSetting(node=request.node, field=request.field, value=request.value)
-        return arm.nodes.command(arm.state, (first, *request.more))
 
     def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
         """Return the transform (4, 4) from ``frame`` to {S}."""
