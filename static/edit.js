@@ -38,6 +38,11 @@ const Edit = (() => {
     byId("undo").disabled = !undoable.length;
   }
 
+  // Return the point [x, y] of the table below the pointer; null if it is over something else.
+  function tableAt({ clientX, clientY, target }) {
+    return target.matches?.("canvas") ? page.scene()?.tableAt([clientX, clientY]) : null;
+  }
+
   // Show the place for a file while one is dragged over the page.
   function drag(event) {
     if (!event.dataTransfer?.types.includes("Files")) return;
@@ -53,7 +58,7 @@ const Edit = (() => {
     // Folders are read after this event, which ends the access to what was dropped.
     const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
     if (files.length === 1 && /\.mcap$/i.test(files[0].name)) page.replay(files[0]);
-    else if (files.length || entries.length) Objects.take(files, entries);
+    else if (files.length || entries.length) Objects.take(files, entries, tableAt(event));
   }
 
   function listen(target) {

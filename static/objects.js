@@ -11,6 +11,7 @@ const Objects = (() => {
   let main = ""; // the file to read in it, if it is a .zip file of several
   let placed = null; // the name of its object
   let fitted = false; // whether its scale was chosen to fit
+  let where = null; // [x, y] of the point of the table on which the files were dropped
   let waiting = null; // an answer whose object is placed when its scale is chosen
   const files = () => import("./objects/files.js");
 
@@ -68,7 +69,7 @@ const Objects = (() => {
   function place(mesh, scale) {
     placed = mesh.name;
     window.dispatchEvent(new Event("placed"));
-    say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(scale && { scale }) });
+    say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(where && { near: where }), ...(scale && { scale }) });
   }
 
   const millimetres = (metres) => String(Number((1e3 * metres).toPrecision(3)));
@@ -152,8 +153,9 @@ const Objects = (() => {
   }
 
   // Read files that were chosen or dropped: one object or several, or a scene in a .zip file. `entries` are the dropped
-  // files and folders.
-  async function take(list, entries) {
+  // files and folders, `at` is the point of the table on which they were dropped.
+  async function take(list, entries, at = null) {
+    where = at;
     if (byId("objects").hidden) byId("objects-button").click();
     const { gathered, areAlone, excess, zipped, isScene } = await files();
     const found = await gathered(list, entries).catch(() => []);

@@ -8,7 +8,8 @@ import { Steps } from "./steps.js";
 import { Views } from "./views.js";
 
 const CLICK = 5; // px, within which a press and its release count as a click
-const SOLID = ["/arm", "/cup", "/basin", "/objects", "/table"]; // nodes that a ray can meet
+const TABLE = "/table";
+const SOLID = ["/arm", "/cup", "/basin", "/objects", TABLE]; // nodes that a ray can meet
 const OBJECTS = ["/cup", "/basin"]; // nodes of objects; the others are below the next one
 const MORE = "/objects";
 const STYLE = new URL("scene.css", import.meta.url).href;
@@ -16,7 +17,7 @@ const STYLE = new URL("scene.css", import.meta.url).href;
 export class Stage {
   #stage;
   #scene;
-  #page; // {say, toast, status}
+  #page; // {say, toast, status, edit}
   #joints;
   #views;
   #steps;
@@ -35,7 +36,7 @@ export class Stage {
     this.#joints = new Joints(stage, scene, page);
     this.#load();
     this.#views = new Views(stage, scene);
-    this.#steps = new Steps(page.say);
+    this.#steps = new Steps(page.say, page.edit);
     this.#listen();
     window.katana.turned = () => this.#views.turned();
     scene.addEventListener("load", () => this.#listen());
@@ -59,6 +60,11 @@ export class Stage {
     if (arm.joints_only) return;
     this.#branches = new Branches(this.#stage, this.#scene, arm, this.#page.status);
     this.#branches.listen(this.#scene.contentWindow);
+  }
+
+  // Names of the joints, such as "2 shoulder"; empty before the arm is known.
+  get jointLabels() {
+    return this.#joints.arm?.links.map(({ label }) => label) ?? [];
   }
 
   // Remove the selected object. Return whether there is one.
@@ -176,6 +182,18 @@ export class Stage {
   #focus({ target, clientX, clientY }) {
     const hit = target.matches?.("canvas") && this.#pick([clientX, clientY]);
     if (hit) this.#views.focus(hit.point);
+  }
+
+  // Return the point [x, y] of the table at a pixel, in m in the base frame; null if something else is there.
+  tableAt(pixel) {
+    const { node } = this.#scene.contentWindow.katanaScene;
+    const [hit, table] = [this.#pick(pixel), node(TABLE)];
+    for (let each = hit?.object; each; each = each.parent) {
+      if (each !== table) continue;
+      const { x, y } = node("").worldToLocal(hit.point.clone());
+      return [x, y];
+    }
+    return null;
   }
 
   #pick(pixel) {

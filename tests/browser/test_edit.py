@@ -17,12 +17,13 @@ from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, clear_stop, prepare
 
-DROP = """async ([name, bytes]) => {
+DROP = """async ([name, bytes, [clientX, clientY] = []]) => {
     const data = new DataTransfer();
     data.items.add(new File([new Uint8Array(bytes)], name));
     const where = document.querySelector("canvas") ?? document.body;
     for (const kind of ["dragenter", "dragover", "drop"])
-        where.dispatchEvent(new DragEvent(kind, {dataTransfer: data, bubbles: true}));
+        where.dispatchEvent(
+            new DragEvent(kind, {dataTransfer: data, bubbles: true, clientX, clientY}));
 }"""
 
 
@@ -75,6 +76,26 @@ def test_dropped_file_is_put_on_the_table(page: ViserPage, reader: Client, docum
     # What was dropped can be undone.
     page.page.keyboard.press("Control+z")
     page.wait_until(lambda: names(reader) == before, "the object to go")
+    assert page.errors == []
+
+
+def test_file_lands_on_the_table_where_it_was_dropped(
+    page: ViserPage, reader: Client, artefacts: Path
+) -> None:
+    data = list(trimesh.creation.box((30.0, 30.0, 30.0)).export(file_type="stl"))
+    box = page.page.locator("#scene").bounding_box()
+    assert box is not None
+    for name, place in (("left", (0.45, 0.15, 0.0)), ("right", (0.40, -0.12, 0.0))):
+        x, y = page.project(place)
+        page.frame.evaluate(DROP, [f"{name}.stl", data, [x - box["x"], y - box["y"]]])
+        page.wait_until(lambda name=name: name in names(reader), "the object")  # type: ignore[misc]
+        found = next(each for each in reader.query(answers.Objects).objects if each.name == name)
+        T: Any = np.array(found.T)
+        np.testing.assert_allclose(T[:2, 3], place[:2], rtol=0, atol=0.002)
+    page.keep(artefacts / "dropped.png")
+    for _ in range(2):
+        page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: not {"left", "right"} & names(reader), "them to go")
     assert page.errors == []
 
 

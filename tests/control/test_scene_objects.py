@@ -262,6 +262,14 @@ def test_new_objects_are_placed_in_reach_and_apart() -> None:
     apart = np.linalg.norm(places[:, None] - places, axis=2) + np.eye(12)
     assert apart.min() >= 2.0 * girth(objects[0])
     assert np.linalg.norm(places, axis=1).max() <= 0.6
+    # A place that is wanted is taken if it is free and clear of the arm, otherwise one near it.
+    new = knot(np.eye(4), "new", scale=0.6)
+    side = free_place(new, [], near=(0.1, 0.5))
+    np.testing.assert_array_equal(side[:3, 3], (0.1, 0.5, 0.0))
+    beside = free_place(new, [replace(new, name="there", T=side)], near=(0.1, 0.5))[:2, 3]
+    assert 2.0 * girth(new) <= np.linalg.norm(beside - (0.1, 0.5)) < 0.25
+    before = free_place(new, [], near=(-0.1, 0.05))[:2, 3]
+    assert np.linalg.norm(before) >= 0.36
     # A carried object and the object itself take no place.
     carried = [replace(objects[0], fixed=True), *objects[1:]]
     np.testing.assert_array_equal(

@@ -22,23 +22,33 @@ AZIMUTHS = tuple(math.radians(sign * angle) for angle in range(0, 110, 12) for s
 
 
 def free_place(
-    scene_object: SceneObject, objects: Sequence[SceneObject], table: float = 0.0
+    scene_object: SceneObject,
+    objects: Sequence[SceneObject],
+    table: float = 0.0,
+    near: tuple[float, float] | None = None,
 ) -> FloatArray:
     """Return the pose (4, 4) in the base frame of a free place for ``scene_object``.
 
-    The place is straight ahead if there is room, else aside, else farther out. If there is room
-    nowhere, it is straight ahead too. ``table``: its height [m].
+    The place is straight ahead if there is room, else aside, else farther out; with ``near`` (x, y)
+    [m] it is the one nearest to that point. If there is room nowhere, it is straight ahead.
+    ``table``: its height [m].
     """
     others = [each for each in objects if each.name != scene_object.name and not each.carried]
-    for distance in np.arange(MIN_DISTANCE, MAX_DISTANCE, 0.06).tolist():
-        for azimuth in AZIMUTHS:
-            at = np.array((distance * math.cos(azimuth), distance * math.sin(azimuth), table))
-            gaps = (
-                math.hypot(*(each.T[:2, 3] - at[:2])) - girth(each) - girth(scene_object)
-                for each in others
-            )
-            if all(gap >= OBJECT_GAP for gap in gaps):
-                return se3.from_rotation_translation(np.eye(3), at)
+    places = [
+        (distance * math.cos(azimuth), distance * math.sin(azimuth))
+        for distance in np.arange(MIN_DISTANCE, MAX_DISTANCE, 0.06).tolist()
+        for azimuth in AZIMUTHS
+    ]
+    if near is not None:
+        # The point itself, unless the arm in its ready posture is there.
+        wanted = [near] if math.hypot(*near) >= MIN_DISTANCE else []
+        places = [*wanted, *sorted(places, key=lambda place: math.dist(place, near))]
+    for place in places:
+        gaps = (
+            math.dist(each.T[:2, 3], place) - girth(each) - girth(scene_object) for each in others
+        )
+        if all(gap >= OBJECT_GAP for gap in gaps):
+            return se3.from_rotation_translation(np.eye(3), (*place, table))
     return se3.from_rotation_translation(np.eye(3), (MIN_DISTANCE, 0.0, table))
 
 

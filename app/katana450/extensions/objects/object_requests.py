@@ -59,7 +59,8 @@ class ObjectRequests(RequestHandler):
             if known is not None:
                 return scene_object
             table = arm.environment.table_height
-            return replace(scene_object, T=free_place(scene_object, arm.state.objects, table))
+            T = free_place(scene_object, arm.state.objects, table, near=request.near)
+            return replace(scene_object, T=T)
         T = se3.printed(request.T, f"The pose of {request.name!r}")
         if request.frame is requests.Frame.SHOULDER:
             T = arm.arm.T_base_shoulder @ T

@@ -187,11 +187,10 @@ class Dispatcher:
     def query(self, at: str) -> answers.Answer:
         """Return the answer to a ``query`` of ``at``. Raises LeaseError while there is no arm."""
         hub = self._hub
-        match at:
-            case "event_log":
-                return serialize.event_log(hub.event_log.lines)
-            case "state":
-                return serialize.state(hub)
+        if at == "event_log":
+            return serialize.event_log(hub.event_log.lines)
+        if at == "state":
+            return serialize.state(hub)
         arm = hub.present()
         if at == "loop":
             return serialize.loop(arm.loop_timing)
