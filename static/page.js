@@ -301,7 +301,7 @@
     else head(status.headline, status.end);
     const at = status.stopped_at ? `${time(status.stopped_at)}:` : "";
     const cause = status.stopped ? [at, status.stopped] : [proven];
-    text("why", [status.taken, status.why, ...cause, status.until].filter(Boolean).join(" "));
+    text("why", named([status.taken, status.why, ...cause, status.until].filter(Boolean).join(" ")));
     byId("objects-button").hidden = status.role === "viewer";
     byId("teach-button").hidden = status.role === "viewer" || !status.scripts;
     const clear = byId("clear-stop");
@@ -375,9 +375,18 @@
     if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
   }
 
+  // Name the joints in a sentence that numbers them: "axis 2 (shoulder)".
+  function named(words) {
+    const labels = stage?.jointLabels ?? [];
+    return words.replace(/\baxis (\d+)\b/gi, (axis, number) => {
+      const name = labels[number - 1]?.replace(/^\d+ /, "") ?? "";
+      return /^[a-z]/i.test(name) && !words.includes(name) ? `${axis} (${name})` : axis;
+    });
+  }
+
   let toastTimer = null;
   function toast(words) {
-    text("toast", words);
+    text("toast", named(words));
     byId("toast").classList.add("shown");
     clearTimeout(toastTimer);
     toastTimer = setTimeout(() => byId("toast").classList.remove("shown"), TOAST);
@@ -448,11 +457,13 @@
   for (const id of SHEETS)
     byId(`${id}-button`).addEventListener("click", async () => {
       if (id === "teach") await loadTeach();
-      const shown = byId(id).hidden;
-      for (const other of SHEETS)
-        if (other !== id && byId(other) && !(high.matches && [id, other].includes("jog") && ![id, other].includes("objects"))) show(other, false);
-      show(id, shown);
+      open(id, byId(id).hidden);
     });
+  function open(id, shown) {
+    for (const other of SHEETS)
+      if (other !== id && byId(other) && !(high.matches && [id, other].includes("jog") && ![id, other].includes("objects"))) show(other, false);
+    show(id, shown);
+  }
   // The sheet of taught poses, loaded on first use.
   let teach = null;
   let loading = null; // one sheet, also after two clicks
@@ -460,6 +471,13 @@
     const options = { say, kept, scene, status: () => status };
     loading ??= import("./teach/teach.js").then(({ Teach }) => Teach.in(byId("stage"), options));
     teach = await loading;
+  }
+  // Open a script, by its name, as text in the sheet of taught poses.
+  async function editScript(name) {
+    if (byId("teach-button").hidden) return toast("You may watch, not drive.");
+    await loadTeach();
+    open("teach", true);
+    teach.open(name);
   }
   const kept = storage();
   Pace.begin({ say, toast });
@@ -471,7 +489,7 @@
   let stage = null;
   async function takeHold() {
     const { Stage } = await import("./scene/stage.js");
-    stage ??= new Stage(byId("stage"), scene, { say, toast, status: () => (up ? status : null) });
+    stage ??= new Stage(byId("stage"), scene, { say, toast, status: () => (up ? status : null), edit: editScript });
   }
   // REC and the episodes, loaded when the server records.
   let episodes = null;

@@ -1,16 +1,22 @@
-// The steps of a program in the panel: buttons to run it from a step, and to pause before a step.
+// A program in the panel: its steps, with buttons to run from a step and to pause before a step, and the button
+// that edits the chosen script as text.
 const AGAIN = 50; // ms between two attempts to restore the focus
 const TRIES = 20;
 
 export class Steps {
   #say;
+  #edit;
 
-  constructor(say) {
+  // `edit` opens a script, by its name, as text.
+  constructor(say, edit) {
     this.#say = say;
+    this.#edit = edit;
   }
 
   listen(inner) {
     inner.addEventListener("click", ({ target }) => {
+      const script = target.closest?.("[data-script]")?.dataset.script;
+      if (script) return this.#edit(script);
       const button = target.closest?.(".steps button");
       if (!button) return;
       const at = this.#step(button);

@@ -364,6 +364,11 @@ export class Teach {
     this.#open.value = "";
     if (!name) return;
     if (name === FILE) return this.#file.click();
+    await this.open(name);
+  }
+
+  // Show the script of this name, of the library or of the folder of the server.
+  async open(name) {
     const answer = await fetch(`api/v1/scripts/${encodeURIComponent(name)}`).catch(() => null);
     if (answer?.ok) await this.#load(await answer.text(), name);
     else this.#say(answer ? await answer.text() : "There is no connection to the arm.", true);

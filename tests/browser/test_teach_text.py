@@ -38,6 +38,25 @@ def sheet(new_page: ViserPage) -> ViserPage:
     return new_page
 
 
+def test_chosen_script_of_the_panel_is_edited_as_text(new_page: ViserPage, artefacts: Path) -> None:
+    page = new_page.page
+    new_page.frame.get_by_role("tab", name="Programs").click()
+    new_page.frame.get_by_role("button", name="Edit as text").click()
+    area = page.locator("#teach-text")
+    area.wait_for()
+    new_page.wait_until(lambda: "steps:" in area.input_value(), "the text")
+    chosen = new_page.frame.get_by_label("Script", exact=True).input_value()
+    assert area.input_value() == page.evaluate(
+        "async (name) => (await fetch(`api/v1/scripts/${name}`)).text()", chosen
+    )
+    assert page.locator("#teach-problems li").count() == 0
+    new_page.keep(artefacts / "panel-edit-as-text.png")
+    # What was in Teach before returns.
+    page.get_by_role("button", name="Undo in Teach").click()
+    area.wait_for(state="hidden")
+    assert new_page.errors == []
+
+
 @pytest.mark.long
 def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefacts: Path) -> None:
     teach(sheet, truth, (20.0, -25.0))

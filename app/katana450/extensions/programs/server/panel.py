@@ -106,6 +106,7 @@ class ProgramsPanel:
             hint="Scripts of the library, and of the folder of this server",
         )
         self._choice.on_update(lambda _: self._draw(None))
+        self._edit = gui.add_html("")
         self._orders = gui.add_button_group(
             "Program",
             ("Preview", *ORDERS),
@@ -132,6 +133,9 @@ class ProgramsPanel:
         if self._scripts.changed != self._listed:
             self._listed = self._scripts.changed
             self._choice.options = tuple(self._scripts.paths)
+        edit = _edit_button(self._choice.value)
+        if edit != self._edit.content:
+            self._edit.content = edit
         progress = self._steering.progress
         status = _page(progress)
         if status != self._status.content:
@@ -234,6 +238,12 @@ def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
         return not (parse(scripts.text(name)).bare and robot.require_arm().gripper.moves)
     except KatanaError:
         return False
+
+
+def _edit_button(name: str) -> str:
+    """Return the button that opens the script ``name`` as text, see `static/scene/steps.js`."""
+    button = f"<button type=button data-script='{escape(name)}'>Edit as text</button>"
+    return f"<div class='k450'>{button}</div>"
 
 
 def _page(progress: Progress | None) -> str:
