@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import PRIORITIES, limit_text
+from katana450.arm.control.messages import PRIORITIES, axis_names, limit_text
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.cli.main import main
 from katana450.extensions.reachability.reachability_file import load_map
@@ -49,7 +49,7 @@ def test_branches_are_shown_and_one_is_taken(
     # At rest the read-out shows the distances to singularity and limit.
     distances = limit_distances(chain, READY)
     axis = int(distances.argmin())
-    assert now("limit") == limit_text(axis, distances[axis])
+    assert now("limit") == limit_text(axis, axis_names(chain.names)[axis], distances[axis])
     assert now("singular") == f"{singular_values(chain, READY)[-1]:.3f}"
 
     page.open_tab("Scene")

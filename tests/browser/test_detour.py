@@ -1,4 +1,4 @@
-"""The offer of a detour on the page: in the sentence of the bar, taken by Go or Enter."""
+"""The sentence of the bar: it names a joint at its limit, and offers a detour."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from katana450.client import connect
+from katana450.server.api import requests
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
@@ -70,3 +72,13 @@ def test_detour_is_offered_in_the_sentence_and_taken_by_enter_or_go(
             "the ready posture",
             seconds=20.0,
         )
+
+
+def test_reason_names_the_joint(page: ViserPage, server: AppServer, artefacts: Path) -> None:
+    with connect(server.url, "Driver") as driver:
+        driver.ask(requests.Joint(axis=5, value=30.0))
+        reason = "xis 5 (wrist roll) at its limit of 171.50°"
+        page.wait_until(lambda: reason in page.page.inner_text("#why"), "the reason")
+        page.keep(artefacts / "reason-names-the-joint.png")
+        driver.ask(requests.Home())
+        driver.ask(requests.ReleaseLease())

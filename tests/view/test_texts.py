@@ -152,7 +152,7 @@ def test_the_condition_has_no_digits_of_rounding(
 
 
 def test_nearest_limit_is_reported_with_its_axis() -> None:
-    assert limit_text(1, math.radians(7.31)) == "axis 2: 7.3° left"
+    assert limit_text(1, "shoulder", math.radians(7.31)) == "2 shoulder: 7.3° left"
 
 
 @pytest.mark.parametrize(

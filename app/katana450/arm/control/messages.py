@@ -267,9 +267,9 @@ def finding_text(finding: Finding) -> str:
     return _capital(REASONS[finding.reason](finding))
 
 
-def limit_text(number: int, angle: float) -> str:
-    """Return the distance ``angle`` [rad] of an axis, counted from 0, to its nearer limit."""
-    return f"{axis(number)}: {degrees(angle)} left"
+def limit_text(number: int, name: str, angle: float) -> str:
+    """Return the distance ``angle`` [rad] of joint ``name``, from 0, to its nearer limit."""
+    return f"{number + 1} {name}: {degrees(angle)} left"
 
 
 ROOM = "to each limit"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from html import escape
 
-from katana450.arm.control.messages import ROOM, condition, degrees, limit_text, signed
+from katana450.arm.control.messages import ROOM, axis_names, condition, degrees, limit_text, signed
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
@@ -28,7 +28,7 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
     )
     distances = limit_distances(chain, state.q)
     nearest = int(distances.argmin())
-    limit = limit_text(nearest, float(distances[nearest]))
+    limit = limit_text(nearest, axis_names(chain.names)[nearest], float(distances[nearest]))
     return (
         f"<div class='k450'><table><thead><tr><th>{escape(state.tool)} in {display.frame_name}</th>"
         f"<th>now</th><th>goal</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
