@@ -84,10 +84,13 @@ const More = (() => {
       const { keep } = await import("./more/keep.js");
       keep(toast, { last: RECORDED });
     });
-    byId("phone-button").addEventListener("click", async () => {
-      const { toggle } = await import("./more/phone.js");
-      toggle(toast);
-    });
+    // In the bar, or in the menu for a finger.
+    for (const id of ["phone-bar", "phone-button"])
+      byId(id).addEventListener("click", async () => {
+        if (dialog.open) dialog.close();
+        const { toggle } = await import("./more/phone.js");
+        toggle(toast);
+      });
   }
 
   // Take the name in a status; use the kept one for a person whom the server has named.

@@ -1,4 +1,4 @@
-"""The QR code of the server's address, in the small menu of the page."""
+"""The QR code of the server's address: in the bar, for a finger in the small menu."""
 
 from __future__ import annotations
 
@@ -40,8 +40,11 @@ def test_code_on_the_screen_holds_the_address(
 ) -> None:
     window, options = SIZES[size]
     page = open_page(server.url, nodes=("/arm",), window=window, color_scheme=scheme, **options)
-    page.page.click("#more-button")
-    button = page.page.locator("#phone-button")
+    if size == "desk":
+        button = page.page.locator("#phone-bar")
+    else:
+        page.page.click("#more-button")
+        button = page.page.locator("#phone-button")
     button.click()
     url = f"http://{own_address()}:{server.port}"
     address = page.page.get_by_label("Address for a phone")
@@ -59,14 +62,15 @@ def test_code_on_the_screen_holds_the_address(
     assert "Everybody who opens this address can drive the arm." in note.inner_text()
     colours: list[str] = note.evaluate(
         "(each) => [getComputedStyle(each).color, "
-        "getComputedStyle(document.getElementById('more')).backgroundColor]"
+        "getComputedStyle(document.getElementById('phone')).backgroundColor]"
     )
     assert contrast(*colours) >= 4.5
     # Nothing is cut, and STOP stays in reach.
-    assert page.page.locator("#more").evaluate("(each) => each.scrollWidth <= each.clientWidth")
+    assert page.page.locator("#phone").evaluate("(each) => each.scrollWidth <= each.clientWidth")
     page.page.click("#stop", trial=True)
-    button.click()
+    page.page.click("#phone form button")
     code.wait_for(state="hidden")
+    assert button.get_attribute("aria-expanded") == "false"
     assert page.errors == []
 
 
@@ -76,8 +80,7 @@ def test_page_of_a_server_on_loopback_says_how_to_let_a_phone_in(
 ) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm",))
-        page.page.click("#more-button")
-        page.page.click("#phone-button")
+        page.page.click("#phone-bar")
         page.page.locator("#phone p", has_text="on this machine only").wait_for()
         assert page.page.inner_text("#phone p") == LOOPBACK_ONLY
         assert page.page.locator("#phone img").count() == 0
