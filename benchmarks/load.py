@@ -169,18 +169,22 @@ async def inquire(url: str) -> None:
 
 
 async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
-    """Return [s] from sending STOP until a tick brakes, and until a state shows it, each time."""
+    """Return [s] from STOP until a tick brakes, and until a state shows it, each time.
+
+    STOP is sent on all paths of the client, as in any program that calls ``stop``.
+    """
     found: list[tuple[float, float]] = []
     states = arm.states(100.0)
     for _ in range(times):
         await arm.clear_stop()
         await asyncio.sleep(0.4)
         sent = time.perf_counter()
-        await arm.send(requests.Stop())
+        pressed = asyncio.create_task(arm.stop())
         async for state in states:
             if state.status == "stopped":
                 found.append((state.t - sent, time.perf_counter() - sent))
                 break
+        await pressed
     await arm.clear_stop()
     return found
 
