@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.maths.collision.engine import Engine, Witness
+from katana450.maths.collision.contact import Witness
+from katana450.maths.collision.engine import Engine
 from katana450.maths.collision.nearest_points import Support, deepest, nearest_points, overlap
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import so3

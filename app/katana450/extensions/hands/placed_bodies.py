@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from katana450.maths.collision.engine import Witness
+from katana450.maths.collision.contact import Witness
 from katana450.maths.collision.shape import half_space, sphere
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import se3

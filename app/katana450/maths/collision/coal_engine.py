@@ -7,7 +7,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from katana450.maths.collision.engine import Witness
+from katana450.maths.collision.contact import Witness
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 SIGNED = coal.DistanceRequest()

@@ -4,23 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.util import find_spec
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
+from katana450.maths.collision.contact import Witness
 from katana450.maths.geometry.arrays import FloatArray
-
-
-class Witness(NamedTuple):
-    """The nearest points of two bodies.
-
-    Attributes:
-        distance: distance between them [m]; a negative value is their depth.
-        points: the nearest point of each, (2, 3) [m].
-        normal: unit direction (3,) from the first body to the second.
-    """
-
-    distance: float
-    points: FloatArray
-    normal: FloatArray
 
 
 class Engine(Protocol):

@@ -15,7 +15,7 @@ import fcl
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from katana450.maths.collision.engine import Witness
+from katana450.maths.collision.contact import Witness
 from katana450.maths.collision.nearest_points import Support, deepest, nearest_points, overlap
 from katana450.maths.geometry.arrays import FloatArray, frozen
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from katana450.maths.collision.engine import Witness
+from katana450.maths.collision.contact import Witness
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 Support = Callable[[FloatArray], FloatArray]
