@@ -11,13 +11,11 @@ import pytest
 from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.messages import (
     AXIS_NAMES,
-    BRANCH_HEADINGS,
     PRIORITIES,
     PRIORITY_HINTS,
     REASONS,
     STATUS,
     axis_names,
-    branch_cells,
     condition,
     degrees,
     excluded,
@@ -34,6 +32,7 @@ from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.server.view.branches import HEADINGS, cells_of
 from katana450.server.view.view import GHOST_COLOURS
 
 
@@ -177,15 +176,15 @@ def test_branch_cells_have_three_texts(
         BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
     )
     choice = BranchOption(cost, contact)
-    assert branch_cells(choice) == (expected, "90°, 1.3 s", "0.151")
-    assert len(BRANCH_HEADINGS) == 1 + len(branch_cells(choice))
+    assert cells_of(choice) == (expected, "90°, 1.3 s", "0.151")
+    assert len(HEADINGS) == 1 + len(cells_of(choice))
 
 
 def test_branch_that_the_limits_exclude_has_their_axes_in_place_of_numbers(state: State) -> None:
     cost = BranchMetrics(BRANCHES[0], state.q, True, 0.0, 0.0, 0.0, 0.0, 0.1)
     for axes, expected in (((2,), "limits of axis 3"), ((0, 2, 3), "limits of axes 1, 3 and 4")):
         choice = BranchOption(cost, None, excluded("back-up", axes))
-        assert branch_cells(choice) == (expected, "–", "–")
+        assert cells_of(choice) == (expected, "–", "–")
         assert "exclude the branch back-up" in choice.refusal
 
 

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 from katana450.arm.control.state import CAUSES, Finding, Reason, State, Status
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
-
-if TYPE_CHECKING:
-    from katana450.arm.control.branch_options import BranchOption
+from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
 
@@ -72,23 +68,23 @@ def _contact(finding: Finding) -> str:
     one, other = finding.parts or ("a link", "another")
     # Parts that stand close at rest keep less, and parts in a contact may only part.
     why = (
-        f"the arm stops at {_short(1e3 * STOP)} mm"
+        f"the arm stops at {short(1e3 * STOP)} mm"
         if finding.amount >= STOP
         else "they must not come nearer"
     )
-    return f"{part(one)} and {part(other)} are {_short(1e3 * finding.amount)} mm apart: {why}"
+    return f"{part(one)} and {part(other)} are {short(1e3 * finding.amount)} mm apart: {why}"
 
 
 def _within(finding: Finding) -> str:
     if not finding.time:
         return ""
-    return f" within {_short(1e3 * finding.amount)} mm and {finding.time:.2f} s"
+    return f" within {short(1e3 * finding.amount)} mm and {finding.time:.2f} s"
 
 
 def _lopsided(finding: Finding) -> str:
     finger, item = finding.parts or ("a finger", "something")
     return (
-        f"{part(finger)} is {_short(1e3 * finding.amount)} mm from {part(item)}, which the other "
+        f"{part(finger)} is {short(1e3 * finding.amount)} mm from {part(item)}, which the other "
         "touches: open the gripper, centre it on the object, close it again"
     )
 
@@ -98,11 +94,11 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.PAUSED: lambda _: "paused: press Resume to continue",
     Reason.CONTACT: _contact,
     Reason.ACROSS_GAP: lambda f: (
-        f"{axis(f.axis)} would have to leap {_short(math.degrees(f.amount))}° to follow: "
+        f"{axis(f.axis)} would have to leap {short(math.degrees(f.amount))}° to follow: "
         "drag along another path, or choose the pose under Branches"
     ),
-    Reason.OUT_OF_REACH: lambda f: f"{_short(1e3 * f.amount)} mm out of reach",
-    Reason.POSITION_CHANGED: lambda f: f"position gives way by {_short(1e3 * f.amount)} mm",
+    Reason.OUT_OF_REACH: lambda f: f"{short(1e3 * f.amount)} mm out of reach",
+    Reason.POSITION_CHANGED: lambda f: f"position gives way by {short(1e3 * f.amount)} mm",
     Reason.AXIS_1: lambda _: (
         "axis 1 is in the way: drag around it, or choose another pose under Branches"
     ),
@@ -115,25 +111,25 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",
     Reason.GRIPPER_SLIDE_LIMIT: lambda f: f"the gripper at its limit of {millimetres(f.amount)}",
     Reason.YAW_FIXED: lambda f: (
-        f"wrist yaw is fixed by position: {_short(math.degrees(f.amount))}° off"
+        f"wrist yaw is fixed by position: {short(math.degrees(f.amount))}° off"
     ),
-    Reason.PITCH_CHANGED: lambda f: f"pitch gives way by {_short(math.degrees(f.amount))}°",
-    Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
+    Reason.PITCH_CHANGED: lambda f: f"pitch gives way by {short(math.degrees(f.amount))}°",
+    Reason.ROLL_CHANGED: lambda f: f"roll stops {short(math.degrees(f.amount))}° short",
     Reason.ORIENTATION_CHANGED: lambda f: (
-        f"orientation gives way by {_short(math.degrees(f.amount))}°"
+        f"orientation gives way by {short(math.degrees(f.amount))}°"
     ),
     Reason.LOPSIDED: _lopsided,
     Reason.SLIDING: lambda f: (
         f"{part((f.parts or ('the object',))[0])} slides in the fingers under a load of "
-        f"{_short(f.amount)} N: grip it with more force, or move more slowly"
+        f"{short(f.amount)} N: grip it with more force, or move more slowly"
     ),
     Reason.SLIPPED: lambda f: (
         f"{part((f.parts or ('the object',))[0])} slipped out of the fingers under a load of "
-        f"{_short(f.amount)} N: open the gripper, then grip it with more force"
+        f"{short(f.amount)} N: open the gripper, then grip it with more force"
     ),
     Reason.NOT_AT_START: lambda f: (
         f"the plan begins at another posture: {axis(f.axis)} is "
-        f"{_short(math.degrees(f.amount))}° off, or the arm still moves; go to its start first"
+        f"{short(math.degrees(f.amount))}° off, or the arm still moves; go to its start first"
     ),
     Reason.INTERNAL: lambda _: "internal error: the arm holds; see the server's log",
     Reason.RESTARTED: lambda _: "the arm's process was started again; see the server's log",
@@ -186,10 +182,6 @@ PRIORITY_HINTS: dict[Priority, str] = {
     Priority.PITCH: "The tool keeps the pitch of the target, and stops where it cannot.",
     Priority.POSITION: "The tool point goes to the target, with the nearest pitch it can have.",
 }
-
-BRANCH_HEADINGS = ("branch", "off by", "path", "singular")
-
-NOTHING_LOST = "nothing"
 
 MOVING = "Moving to the target"
 
@@ -284,7 +276,7 @@ def condition(values: FloatArray) -> str:
 
     values: the singular values of the Jacobian.
     """
-    return "∞" if values[0] >= MAX_CONDITION * values[-1] else _short(float(values[0] / values[-1]))
+    return "∞" if values[0] >= MAX_CONDITION * values[-1] else short(float(values[0] / values[-1]))
 
 
 def excluded(branch: object, axes: Sequence[int]) -> str:
@@ -297,27 +289,10 @@ def excluded(branch: object, axes: Sequence[int]) -> str:
     )
 
 
-def branch_cells(choice: BranchOption) -> tuple[str, str, str]:
-    """Return the loss, the path length and time, and the smallest singular value of a branch."""
-    metrics = choice.metrics
-    if choice.refusal:
-        return choice.refusal.partition(" exclude")[0].removeprefix("The "), "–", "–"
-    lost = []
-    if metrics.position_error > POSITION_WORTH_TELLING:
-        lost.append(f"{_short(1e3 * metrics.position_error)} mm")
-    if metrics.rotation_error > ANGLE_WORTH_TELLING:
-        lost.append(f"{_short(math.degrees(metrics.rotation_error))}°")
-    if choice.contact is not None:
-        one, other = choice.contact.parts
-        lost.append(f"{part(one)} meets {part(other)}")
-    path = f"{degrees(metrics.distance, 0)}, {metrics.time:.1f} s"
-    return ", ".join(lost) or NOTHING_LOST, path, f"{metrics.smallest_singular_value:.3f}"
-
-
 def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def _short(value: float) -> str:
+def short(value: float) -> str:
     """Return ``value`` with enough digits to act on: no decimal from 10 up, one below."""
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -15,10 +15,11 @@ import viser
 
 from katana450.arm.control.branch_options import BranchOption, branch_named
 from katana450.arm.control.commands import TakeBranch
-from katana450.arm.control.messages import BRANCH_HEADINGS, branch_cells
+from katana450.arm.control.messages import degrees, part, short
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from katana450.server.view.controls import Listen
 from katana450.server.view.scene import Colour, GhostNodes
 
@@ -29,6 +30,10 @@ COLOURS: tuple[Colour, ...] = (
 """Colours of the branches in their order, which colour-blind people can distinguish."""
 
 OPACITY = 0.25
+
+HEADINGS = ("branch", "off by", "path", "singular")
+
+NOTHING_LOST = "nothing"
 
 NONE, OTHERS = "None", "All others"
 """Choices of the ghosts that are shown, in addition to each single branch."""
@@ -124,12 +129,12 @@ class BranchList:
 
 def _rows(found: tuple[BranchOption, ...], now: AnyBranch) -> str:
     """Return the table as HTML, with one row per branch and the branch ``now`` marked."""
-    head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in HEADINGS)
     rows = "".join(
         f"<tr data-branch='{choice.metrics.branch}'"
         f"{' aria-current=true' if choice.metrics.branch == now else ''}>"
         f"<th><i style='background:rgb{colour}'></i>{choice.metrics.branch}</th>"
-        + "".join(f"<td>{escape(cell)}</td>" for cell in branch_cells(choice))
+        + "".join(f"<td>{escape(cell)}</td>" for cell in cells_of(choice))
         + "</tr>"
         for choice, colour in zip(found, COLOURS, strict=False)
     )
@@ -137,3 +142,19 @@ def _rows(found: tuple[BranchOption, ...], now: AnyBranch) -> str:
         f"<div class='k450'><table class='branches'><thead><tr>{head}</tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
     )
+
+
+def cells_of(choice: BranchOption) -> tuple[str, str, str]:
+    """Return the loss, the path length and time, and the smallest singular value of a branch."""
+    metrics = choice.metrics
+    if choice.refusal:
+        return choice.refusal.partition(" exclude")[0].removeprefix("The "), "–", "–"
+    lost = []
+    if metrics.position_error > POSITION_WORTH_TELLING:
+        lost.append(f"{short(1e3 * metrics.position_error)} mm")
+    if metrics.rotation_error > ANGLE_WORTH_TELLING:
+        lost.append(f"{short(math.degrees(metrics.rotation_error))}°")
+    if choice.contact is not None:
+        lost.append(" meets ".join(map(part, choice.contact.parts)))
+    path = f"{degrees(metrics.distance, 0)}, {metrics.time:.1f} s"
+    return ", ".join(lost) or NOTHING_LOST, path, f"{metrics.smallest_singular_value:.3f}"
