@@ -15,7 +15,7 @@ from katana450.arm.runtime.arm_listener import FRONT, Greeting, connect, connect
 from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
-from katana450.assembly.frontend_process import FrontendConfig
+from katana450.assembly.frontend_config import FrontendConfig
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
@@ -55,10 +55,8 @@ class Frontend:
             EOFError: the server ends, or the arm's process has closed the pipe.
         """
         self._gateway, self._config = gateway, config
-        settings, added = config.settings, layers(config.options)
-        self._found = find_robot(settings, config.urdf, config.tool)
-        robot, session, _ = self._found
-        address = config.address
+        settings, address, added = config.settings, config.address, layers(config.options)
+        robot, session, _ = self._found = find_robot(settings, config.urdf, config.tool)
         self.pipe = FrontEnd(
             connect_when_ready(address, Greeting(FRONT), ended),
             session.check,

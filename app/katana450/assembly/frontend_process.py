@@ -6,19 +6,14 @@ It can end and be started again. The arm runs in another process, which stops th
 from __future__ import annotations
 
 import gc
-import socket
-from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from katana450.arm.runtime.arm_listener import ArmAddress
+from katana450.assembly.frontend_config import FrontendConfig
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.extension import serve_extensions
 from katana450.platform_support import reset_priority
-from katana450.settings import Settings
 
 if TYPE_CHECKING:
     from katana450.assembly.web_server import WebServer
@@ -31,30 +26,6 @@ WAKE_INTERVAL = 0.25
 
 HANG_SECONDS = 5.0
 """[s] Time after which an event loop that does not turn counts as hung."""
-
-
-@dataclass(frozen=True)
-class FrontendConfig:
-    """Configuration of a front end, used each time it is started.
-
-    Attributes:
-        settings: of the server.
-        urdf, tool: see ``robot.loader.load``.
-        listening: the socket for browsers.
-        lines: the socket for programs that send JSON lines, if any.
-        options: options of the extensions; None if no extension takes part.
-        address: address of the arm's process.
-        folder: private folder with the meshes of scene objects.
-    """
-
-    settings: Settings
-    urdf: Path
-    tool: str | None
-    listening: socket.socket
-    lines: socket.socket | None
-    options: Namespace | None
-    address: ArmAddress
-    folder: Path
 
 
 def run_frontend(config: FrontendConfig, records: Connection, supervisor: SupervisorPipe) -> None:

@@ -18,7 +18,8 @@ from typing import Any
 
 from katana450.arm.runtime.arm_listener import ArmAddress
 from katana450.assembly.arm_process import ArmConfig, run_arm
-from katana450.assembly.frontend_process import OPEN, FrontendConfig, run_frontend
+from katana450.assembly.frontend_config import FrontendConfig
+from katana450.assembly.frontend_process import OPEN, run_frontend
 from katana450.assembly.log_lines import start_log
 from katana450.assembly.output import say
 from katana450.assembly.stop_process import StopConfig, run_stop

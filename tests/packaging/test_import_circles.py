@@ -1,0 +1,16 @@
+"""No module imports itself through others, not even where a function imports on use."""
+
+from __future__ import annotations
+
+from graphlib import TopologicalSorter
+
+import grimp
+
+
+def test_imports_have_no_circle() -> None:
+    # The linter of imports is built on this graph. Imports for type checkers alone do not count.
+    graph = grimp.build_graph("katana450", exclude_type_checking_imports=True, cache_dir=None)
+    assert len(graph.modules) > 600
+    imports = {each: graph.find_modules_directly_imported_by(each) for each in graph.modules}
+    # Raises CycleError with the modules of a circle.
+    TopologicalSorter(imports).prepare()
