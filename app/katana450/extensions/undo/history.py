@@ -28,7 +28,6 @@ GOALS: dict[type[cmd.BaseCommand], str] = {
     cmd.SetJoint: "joint",
     cmd.SetAxes: "joints",
     cmd.SetJoints: "joints",
-    cmd.Nudge: "joint step",
     cmd.StepTool: "step",
     cmd.Jog: "jog",
     cmd.TakeBranch: "branch",
@@ -36,10 +35,13 @@ GOALS: dict[type[cmd.BaseCommand], str] = {
     cmd.Home: "home",
     cmd.GoToZero: "zero",
 }
-"""The commands that change the goal of the arm, in words."""
+"""The commands that change the goal of the arm, in words. Other motions of single axes do too."""
 
-SINGLE = (cmd.Nudge, cmd.StepTool, cmd.TakeBranch, cmd.Go, cmd.Home, cmd.GoToZero, cmd.Remove)
-"""Commands of which each is a change of its own, however soon it follows."""
+GESTURES = (
+    *(cmd.EndDrag, cmd.SetAxes, cmd.Jog, cmd.SetTool, cmd.SetPriority, cmd.SpeedScale),
+    *(cmd.PlaceObject, cmd.MoveObject, cmd.Attach),
+)
+"""Commands that continue the same change, if they follow soon, as the samples of a stream do."""
 
 OBJECTS = (cmd.PlaceObject, cmd.MoveObject, cmd.Attach, cmd.Remove)
 
@@ -103,7 +105,7 @@ class UndoHistory:
             return
         change = Change(*found, actor, self._clock())
         last = self._changes[-1] if self._changes else None
-        one_gesture = not isinstance(command, SINGLE)
+        one_gesture = command.traits.stream or isinstance(command, GESTURES)
         # A state without the last command does not show what this one changes.
         if last is not None and change.continues(last) and (one_gesture or not caught_up):
             self._changes = (*self._changes[:-1], replace(last, at=change.at))
@@ -171,8 +173,9 @@ class UndoHistory:
 
 def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | None:
     """Return the name of the change by ``command``, and its inverse; None for no such change."""
-    if type(command) in GOALS:
-        return f"arm ({GOALS[type(command)]})", cmd.SetJoints(state.goal)
+    if type(command) in GOALS or isinstance(command, cmd.AxisCommand):
+        what = GOALS.get(type(command), type(command).__name__.lower())
+        return f"arm ({what})", cmd.SetJoints(state.goal)
     match command:
         case cmd.SetGripper():
             return "gripper", cmd.SetGripper(state.gripper_goal)
