@@ -40,7 +40,7 @@ const Edit = (() => {
 
   // Return the point [x, y] of the table below the pointer; null if it is over something else.
   function tableAt({ clientX, clientY, target }) {
-    return target.matches?.("canvas") ? page.scene()?.tableAt([clientX, clientY]) : null;
+    return target.matches?.("canvas") && target.ownerDocument === scene.contentDocument ? page.scene()?.tableAt([clientX, clientY]) : null;
   }
 
   // Show the place for a file while one is dragged over the page.

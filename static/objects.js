@@ -1,4 +1,4 @@
-// Objects and scenes from files: the server reads a file, and the object is placed before the arm.
+// Objects and scenes from files: the server reads a file, and the object is placed where it was dropped, or before the arm.
 "use strict";
 const Objects = (() => {
   const API = "api/v1/";

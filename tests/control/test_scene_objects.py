@@ -268,8 +268,10 @@ def test_new_objects_are_placed_in_reach_and_apart() -> None:
     np.testing.assert_array_equal(side[:3, 3], (0.1, 0.5, 0.0))
     beside = free_place(new, [replace(new, name="there", T=side)], near=(0.1, 0.5))[:2, 3]
     assert 2.0 * girth(new) <= np.linalg.norm(beside - (0.1, 0.5)) < 0.25
+    behind = free_place(new, [], near=(-0.3, 0.0))[:2, 3]
+    assert np.linalg.norm(behind - (-0.3, 0.0)) < 0.1
     before = free_place(new, [], near=(-0.1, 0.05))[:2, 3]
-    assert np.linalg.norm(before) >= 0.36
+    assert np.linalg.norm(before) >= 0.36 - 1e-9
     # A carried object and the object itself take no place.
     carried = [replace(objects[0], fixed=True), *objects[1:]]
     np.testing.assert_array_equal(

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from katana450.arm.control.scene_objects import Shape
 from katana450.arm.robot.mounted_arm import MountedArm
@@ -48,3 +49,13 @@ def test_skewed_pose_is_refused_with_the_error(program: Client) -> None:
     skewed = ((1.0, 2e-3, 0.0, 0.3), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
     with pytest.raises(RefusedError, match=r"off orthonormal by 0\.002 \(allowed: 1e-03\)"):
         program.ask(requests.Pose(T=skewed))
+
+
+def test_object_is_placed_near_a_point_of_the_table(program: Client) -> None:
+    ball = requests.Place(name="near", shape=Shape.SPHERE, size=[0.02], can_be_held=True)
+    program.ask(structs.replace(ball, near=(0.1, 0.5)))
+    (found,) = (each for each in program.query(answers.Objects).objects if each.name == "near")
+    np.testing.assert_allclose(np.array(found.T)[:3, 3], (0.1, 0.5, 0.0), rtol=0, atol=1e-9)
+    program.ask(requests.Remove(name="near"))
+    with pytest.raises(RefusedError, match="nothing carries it there"):
+        program.ask(structs.replace(ball, near=(1.3, 1.3)))

@@ -1,4 +1,4 @@
-"""Place of a new object: on the table in front of the arm, beside the objects there."""
+"""Place of a new object on the table, beside the objects there: before the arm, or near a point."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ MIN_DISTANCE, MAX_DISTANCE = 0.36, 0.60
 OBJECT_GAP = 0.02
 """[m] Minimum gap between two objects."""
 
+RADII = (0.0, 0.03, 0.06, 0.09, 0.12, 0.15)
+"""[m] Distances from a point that is wanted, at which a place is tried."""
+
 AZIMUTHS = tuple(math.radians(sign * angle) for angle in range(0, 110, 12) for sign in (1, -1))
 """[rad] Directions to try, from straight ahead outwards to both sides."""
 
@@ -30,8 +33,8 @@ def free_place(
     """Return the pose (4, 4) in the base frame of a free place for ``scene_object``.
 
     The place is straight ahead if there is room, else aside, else farther out; with ``near`` (x, y)
-    [m] it is the one nearest to that point. If there is room nowhere, it is straight ahead.
-    ``table``: its height [m].
+    [m] it is near that point. If there is room nowhere, it is straight ahead. All places are clear
+    of the arm in its ready posture, and of other objects. ``table``: its height [m].
     """
     others = [each for each in objects if each.name != scene_object.name and not each.carried]
     places = [
@@ -40,9 +43,13 @@ def free_place(
         for azimuth in AZIMUTHS
     ]
     if near is not None:
-        # The point itself, unless the arm in its ready posture is there.
-        wanted = [near] if math.hypot(*near) >= MIN_DISTANCE else []
-        places = [*wanted, *sorted(places, key=lambda place: math.dist(place, near))]
+        round_it = (
+            (near[0] + radius * math.cos(azimuth), near[1] + radius * math.sin(azimuth))
+            for radius in RADII
+            for azimuth in np.linspace(0.0, math.tau, 12, endpoint=False).tolist()
+        )
+        clear = [place for place in round_it if math.hypot(*place) >= MIN_DISTANCE]
+        places = [*clear, *sorted(places, key=lambda place: math.dist(place, near))]
     for place in places:
         gaps = (
             math.dist(each.T[:2, 3], place) - girth(each) - girth(scene_object) for each in others

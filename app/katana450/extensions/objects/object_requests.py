@@ -60,14 +60,14 @@ class ObjectRequests(RequestHandler):
                 return scene_object
             table = arm.environment.table_height
             T = free_place(scene_object, arm.state.objects, table, near=request.near)
-            return replace(scene_object, T=T)
-        T = se3.printed(request.T, f"The pose of {request.name!r}")
-        if request.frame is requests.Frame.SHOULDER:
-            T = arm.arm.T_base_shoulder @ T
+        else:
+            T = se3.printed(request.T, f"The pose of {request.name!r}")
+            if request.frame is requests.Frame.SHOULDER:
+                T = arm.arm.T_base_shoulder @ T
         if scene_object.fixed:
             T = arm.environment.into_hand(T, arm.state.x)
         placed = replace(scene_object, T=T)
-        if is_loose(placed):
+        if is_loose(placed) and (request.T is not None or request.near is not None):
             check_carried(arm.environment.table, arm.state.objects, placed)
         return placed
 

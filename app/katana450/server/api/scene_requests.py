@@ -31,8 +31,9 @@ class Place(Request, frozen=True, kw_only=True):
             object without ``T`` is placed where there is room in front of the arm. An object that
             can be held, the cup and the basin are refused where nothing carries them: they stand
             on the table or on another object.
-        near: (2,) Point of the table [m] in the base frame. A new object without ``T`` is placed as
-            near to it as there is room.
+        near: (2,) Point of the table [m] in the base frame. A new object without ``T`` is placed
+            there or near it, where there is room beside other objects and the arm in its ready
+            posture.
         frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
         shape: Shape that is checked for contacts.
         size: Size of the shape [m]: box (x, y, z), cylinder (radius, height), sphere (radius). The
