@@ -17,6 +17,7 @@
   const TRY_AFTER = 2000; // ms without a drawn scene after which the page checks whether it can be drawn
   const REST_AFTER = 100; // ms after the first frame in which the rest of the page waits
   const OFFLINE = "No connection to the arm.";
+  const ROUND_TRIP = "Round trip to the arm, and the age of the picture";
   const REPEATED = ["heartbeat", "jog", "servo", "query", "list_people"]; // requests that are sent without a press
   const SIMULATION =
     "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
@@ -358,6 +359,7 @@
     line.className = lost ? "lost" : bad || age >= 0.4 || trip > SLOW ? "slow" : "";
     const old = age >= 0.3 ? `, ${age.toFixed(1)} s old` : "";
     line.lastElementChild.textContent = lost ? "Offline" : trip === null ? "" : `${Math.round(trip)} ms${old}`;
+    line.title = `${ROUND_TRIP}: ${line.textContent.trim()}`;
     body.classList.toggle("stale", lost || bad);
     const banner = byId("banner");
     const missing = status?.stop_path;
@@ -378,7 +380,8 @@
   // Name the joints in a sentence that numbers them: "axis 2 (shoulder)".
   function named(words) {
     const labels = stage?.jointLabels ?? [];
-    return words.replace(/\baxis (\d+)\b/gi, (axis, number) => {
+    // An axis that is in the way is a line in space, not a joint.
+    return words.replace(/\baxis (\d+)\b(?! is in the way)/gi, (axis, number) => {
       const name = labels[number - 1]?.replace(/^\d+ /, "") ?? "";
       return /^[a-z]/i.test(name) && !words.includes(name) ? `${axis} (${name})` : axis;
     });
@@ -474,10 +477,11 @@
   }
   // Open a script, by its name, as text in the sheet of taught poses.
   async function editScript(name) {
-    if (byId("teach-button").hidden) return toast("You may watch, not drive.");
+    if (status?.role === "viewer") return toast("You may watch, not drive.");
+    if (byId("teach-button").hidden) return toast(OFFLINE);
     await loadTeach();
     open("teach", true);
-    teach.open(name);
+    teach.open(name, true);
   }
   const kept = storage();
   Pace.begin({ say, toast });

@@ -364,13 +364,13 @@ export class Teach {
     this.#open.value = "";
     if (!name) return;
     if (name === FILE) return this.#file.click();
-    await this.open(name);
+    await this.open(name, false);
   }
 
-  // Show the script of this name, of the library or of the folder of the server.
-  async open(name) {
+  // Show the script of this name, of the library or of the folder of the server: as text, or as poses if it has only these.
+  async open(name, asText) {
     const answer = await fetch(`api/v1/scripts/${encodeURIComponent(name)}`).catch(() => null);
-    if (answer?.ok) await this.#load(await answer.text(), name);
+    if (answer?.ok) await this.#load(await answer.text(), name, asText);
     else this.#say(answer ? await answer.text() : "There is no connection to the arm.", true);
   }
 
@@ -380,13 +380,14 @@ export class Teach {
     if (file) await this.#load(await file.text(), file.name.replace(/\.ya?ml$/i, ""));
   }
 
-  // Show a script as poses if it has only these, otherwise as text.
-  async #load(text, name) {
+  // Show a script as poses if it has only these, otherwise and with `asText` as text.
+  async #load(text, name, asText = false) {
     this.#editor.text = text;
     this.#content.change({ text, name: name.slice(0, 40) });
     const found = await this.#editor.check();
-    if (found?.taught) this.#takeTaught(found.taught);
-    else this.#say(found?.problems.length ? "The text has errors: see the lines below." : "It has steps that are no poses, so it is shown as text.");
+    if (found?.taught && !asText) this.#takeTaught(found.taught);
+    else if (found?.problems.length) this.#say("The text has errors: see the lines below.");
+    else this.#say(asText ? `${name} is shown as text.` : "It has steps that are no poses, so it is shown as text.");
   }
 
   // Display

@@ -40,7 +40,18 @@ def sheet(new_page: ViserPage) -> ViserPage:
 
 def test_chosen_script_of_the_panel_is_edited_as_text(new_page: ViserPage, artefacts: Path) -> None:
     page = new_page.page
+    # It has only poses, and is shown as text nevertheless.
+    saved = page.evaluate(
+        "async (body) => (await fetch('api/v1/scripts/Taught', { method: 'POST', body })).status",
+        "steps:\n  - joints: [0, -68, 85, 8, 0]\n",
+    )
+    assert saved == 204
     new_page.frame.get_by_role("tab", name="Programs").click()
+    page.wait_for_timeout(1000)
+    new_page.choose("Script", "Taught")
+    new_page.wait_until(
+        lambda: new_page.frame.locator("[data-script=Taught]").count() == 1, "the button"
+    )
     new_page.frame.get_by_role("button", name="Edit as text").click()
     area = page.locator("#teach-text")
     area.wait_for()
