@@ -28,6 +28,7 @@ const More = (() => {
   }
 
   function open() {
+    if (byId("phone").open) byId("phone").close();
     field.value = known;
     refuse("");
     dialog.show();

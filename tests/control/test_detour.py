@@ -66,6 +66,14 @@ def offered(shipped: Session, held: State) -> State:
     return state
 
 
+def test_plan_that_begins_elsewhere_keeps_the_offer(shipped: Session, offered: State) -> None:
+    start = shipped.begin(shipped.ready, 0.0, 0.0)
+    elsewhere = plan_to(shipped.require_arm(), None, start, shipped.ready + 0.1)
+    after = shipped.step(offered, [cmd.Follow(elsewhere)], offered.t + TICK)
+    assert after.outcomes[0].verdict is Verdict.REFUSED
+    assert after.detour is offered.detour
+
+
 def point(session: Session, state: State) -> FloatArray:
     return forward(session.require_arm().chain_to(state.tool), state.setpoint)[:3, 3]
 

@@ -1,4 +1,4 @@
-"""No module imports itself through others, not even where a function imports on use."""
+"""Imports form no cycle, also counting those inside functions."""
 
 from __future__ import annotations
 

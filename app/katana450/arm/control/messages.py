@@ -260,7 +260,10 @@ def finding_text(finding: Finding) -> str:
 
 
 def limit_text(number: int, name: str, angle: float) -> str:
-    """Return the distance ``angle`` [rad] of joint ``name``, from 0, to its nearer limit."""
+    """Return in words how far, ``angle`` [rad], a joint is from its nearer limit.
+
+    ``number`` counts from 0.
+    """
     return f"{number + 1} {name}: {degrees(angle)} left"
 
 

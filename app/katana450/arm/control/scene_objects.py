@@ -38,7 +38,7 @@ MAX_NAME_LENGTH = 40
 
 
 class Shape(Enum):
-    """Shape of an object in collision checks, with the meaning of its ``size`` [m]."""
+    """Shape that stands for an object in collision checks."""
 
     BOX = "box"
     """size: along x, y, z."""

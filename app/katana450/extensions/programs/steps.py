@@ -1,7 +1,7 @@
 """All program steps by name.
 
-To add a kind, write a class with `read` and `build` as in `Step`, and list it in `STEPS` of its
-module.
+To add a kind, write a class with `schema`, `read` and `build` as in `Step`, and list it in `STEPS`
+of its module.
 """
 
 from __future__ import annotations
