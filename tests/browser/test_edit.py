@@ -93,9 +93,21 @@ def test_file_lands_on_the_table_where_it_was_dropped(
         T: Any = np.array(found.T)
         np.testing.assert_allclose(T[:2, 3], place[:2], rtol=0, atol=0.002)
     page.keep(artefacts / "dropped.png")
-    for _ in range(2):
+    # The same pixel of a picture beside the scene is no point of the table.
+    page.page.click("#instruments-button")
+    page.page.wait_for_selector("#instruments canvas", state="attached")
+    x, y = page.project((0.45, 0.15, 0.0))
+    box = page.page.locator("#scene").bounding_box()
+    assert box is not None
+    page.page.evaluate(DROP, ["beside.stl", data, [x - box["x"], y - box["y"]]])
+    page.wait_until(lambda: "beside" in names(reader), "the object")
+    found = next(each for each in reader.query(answers.Objects).objects if each.name == "beside")
+    # Where an object is added that was chosen: straight ahead or aside, on a circle.
+    assert np.hypot(*np.array(found.T)[:2, 3]) == pytest.approx(0.36, abs=1e-6)
+    page.page.click("#instruments-button")
+    for _ in range(3):
         page.page.keyboard.press("Control+z")
-    page.wait_until(lambda: not {"left", "right"} & names(reader), "them to go")
+    page.wait_until(lambda: not {"left", "right", "beside"} & names(reader), "them to go")
     assert page.errors == []
 
 
