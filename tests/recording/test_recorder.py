@@ -24,6 +24,7 @@ import katana450
 from katana450.arm.control.lease import Role
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
+from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.live import record_end, ring, route
 from katana450.extensions.recording.live.record_end import RecordEnd, lost_records
@@ -227,7 +228,7 @@ def test_ring_keeps_the_newest_files(folder: Path, monkeypatch: pytest.MonkeyPat
     assert max(after - before for before, after in pairwise(ticks)) < 0.1
 
 
-def test_disk_that_takes_nothing_is_reported_in_the_next_file(
+def test_ticks_wait_in_memory_for_a_disk_that_takes_nothing(
     folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     # A file stands where the folder should be.
@@ -244,22 +245,26 @@ def test_disk_that_takes_nothing_is_reported_in_the_next_file(
     kept.put(records[20])
     assert not folder.exists()
     now[0] = ring.RETRY_SECONDS
-    for record in records[21:]:
-        kept.put(record)
+    # An arm at rest has no more ticks.
+    kept.sync()
+    assert not kept.problem
+    assert not kept.unsynced
+    kept.put_all(records[21:])
     kept.close()
     (path,) = recordings_in(folder)
-    with RecordingFile.open(path) as file:
-        first = next(iter(file.messages(COMMANDS)))
-    assert b'"missing"' in first.data
-    assert b'"ticks":21' in first.data
-    assert verified(path) > 0
+    assert tick_times(path) == pytest.approx([record.t for record in records], abs=1e-8)
+    assert verified(path) == len(records) - 1
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of a process")
-def test_ticks_that_a_full_disk_did_not_take_are_counted(folder: Path) -> None:
-    """They were given to the file, but the sync failed; so was the note of those before."""
+@pytest.mark.parametrize(("memory", "missing"), [(3000, 0), (70, 50)])
+def test_ticks_that_a_full_disk_did_not_take_are_written_later_or_counted(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, memory: int, missing: int
+) -> None:
+    """They were given to the file, but the sync failed; so did the next two files."""
     import resource  # noqa: PLC0415 - not on Windows
 
+    monkeypatch.setattr(ring, "MAX_UNSYNCED", memory)
     now = [0.0]
     kept = Ring(folder, header(), lambda: now[0])
     records: list[TickRecord] = []
@@ -271,10 +276,11 @@ def test_ticks_that_a_full_disk_did_not_take_are_counted(folder: Path) -> None:
         now[0] += ring.RETRY_SECONDS
         kept.put_all(records[place : place + 40])
         (*_, path) = recordings_in(folder)
-        size = path.stat().st_size
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size + 100, before[1]))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 100, before[1]))
         try:
             kept.sync()
+            # Before the next attempt.
+            kept.put_all([])
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
         assert "Nothing is recorded now" in kept.problem
@@ -282,12 +288,21 @@ def test_ticks_that_a_full_disk_did_not_take_are_counted(folder: Path) -> None:
     kept.put_all(records[220:260])
     kept.sync()
     kept.close()
-    (*_, path) = recordings_in(folder)
-    with RecordingFile.open(path) as file:
-        found = json.loads(next(iter(file.messages(COMMANDS))).data)
-    assert found["ticks"] == 120
-    assert "The disk took nothing: File too large" in found["missing"]
-    assert len(tick_times(path)) == 1 + 40
+    joined = folder.with_name("joined.mcap")
+    # Files that took nothing are gone, and no tick is there twice.
+    assert len(recordings_in(folder)) == 2
+    keep(folder, joined)
+    with RecordingFile.open(joined) as file:
+        ticks = [json.loads(message.data) for message in file.messages(COMMANDS)]
+    gaps = [tick for tick in ticks if "missing" in tick]
+    assert [tick["t"] for tick in ticks if "missing" not in tick] == [
+        record.t for record in (*records[1 : 220 - missing], *records[220:260])
+    ]
+    assert sum(gap["ticks"] for gap in gaps) == missing
+    assert all("The disk took nothing: File too large" in gap["missing"] for gap in gaps)
+    result = katana450.open(joined).verify()
+    assert result.identical
+    assert result.unknown == missing
 
 
 def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyPatch) -> None:

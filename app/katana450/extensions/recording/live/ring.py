@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -36,17 +37,53 @@ MAX_HELD_FILES = 80
 MAX_FILE_BYTES = 20_000_000
 """Size after which a file ends, whatever it contains, so that the ring is bounded."""
 
+MAX_UNSYNCED = 3000
+"""Number of ticks, 30 s of motion, that wait in memory for a disk that takes nothing."""
+
 RETRY_SECONDS = 5.0
 """[s] Time after an error of the disk until the next attempt to write."""
 
 log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class _Tick:
+    """The record of a tick, with its events: the kind of each and its further fields."""
+
+    record: TickRecord
+    events: list[tuple[str, Mapping[str, Any]]]
+    ticks: int = 1
+
+    @property
+    def t(self) -> float:
+        """Time of the tick [s]."""
+        return self.record.t
+
+    def write(self, writer: RecordingWriter) -> None:
+        """Write the tick and its events. Raises OSError."""
+        writer.put(self.record)
+        for kind, fields in self.events:
+            writer.event(self.t, kind, fields)
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """A number of lost ticks, until the time ``t`` [s], with the reason."""
+
+    t: float
+    ticks: int
+    why: str
+
+    def write(self, writer: RecordingWriter) -> None:
+        """Write that the ticks are missing. Raises OSError."""
+        writer.lost(self.t, self.ticks, self.why)
+
+
 class Ring:
     """Writes records into the newest file of a folder, and removes the oldest files.
 
-    No method raises OSError: while the disk takes nothing, records are lost, and the next file says
-    how many.
+    No method raises OSError. While the disk takes nothing, ``MAX_UNSYNCED`` ticks wait in memory;
+    further ones are lost, and the next file says how many.
     """
 
     def __init__(
@@ -63,12 +100,14 @@ class Ring:
         self._folder = folder
         self._header = header
         self._clock = clock
+        self._path = folder
         self._file: BinaryIO | None = None
         self._writer: RecordingWriter | None = None
         self._ticks = 0
-        self._lost, self._lost_why = 0, ""
-        # Ticks since the last sync, also those of which only the loss is noted.
-        self._unwritten = 0
+        # All that a failure of the disk would take from the present file, and the end of the rest.
+        self._unsynced: list[_Tick | _Gap] = []
+        self._synced_bytes = 0
+        self._disk_error = ""
         self._retry_at = float("-inf")
         self._before: State | None = None
         self._newest = ""
@@ -76,8 +115,6 @@ class Ring:
         self._scripts = scripts
         # Times of the first tick, and of the first one since the last sync [s].
         self._first_t, self._unsynced_t = math.inf, math.inf
-        self.unsynced = False
-        """Whether ``sync`` has anything to bring to the disk."""
         self.lock = threading.RLock()
         """Held by each thread that uses the ring."""
         self.held: str | None = None
@@ -88,38 +125,43 @@ class Ring:
         """Time of the newest tick [s]."""
         _repair(folder)
 
+    @property
+    def unsynced(self) -> bool:
+        """Whether ``sync`` has anything to bring to the disk."""
+        return bool(self._unsynced)
+
     def put_all(self, records: Sequence[TickRecord]) -> None:
         """Write the records of successive ticks, with less work than by ``put`` for each."""
-        if self._writer is not None:
-            self._writer.prepare(records)
-        for each in records:
-            self.put(each)
+        self._add([_Tick(record, self._events(record)) for record in records])
+        for record in records:
+            self.last_t = record.t
+            self._first_t = min(self._first_t, record.t)
+            self._unsynced_t = min(self._unsynced_t, record.t)
 
     def put(self, record: TickRecord) -> None:
         """Write the record of a tick."""
-        if not self._opened():
-            self._lost += 1
-            return
+        self.put_all([record])
+
+    def _add(self, entries: Sequence[_Tick | _Gap]) -> None:
+        """Write ``entries``, and keep them until they are on the disk."""
+        opened = self._opened()
+        self._unsynced.extend(entries)
+        if opened:
+            self._write(entries)
+        surplus = self._unsynced[MAX_UNSYNCED:]
+        if surplus and self._writer is None:
+            ticks = sum(entry.ticks for entry in surplus)
+            self._unsynced[MAX_UNSYNCED:] = [_Gap(surplus[-1].t, ticks, self._disk_error)]
+
+    def _write(self, entries: Sequence[_Tick | _Gap]) -> None:
         assert self._writer is not None
         try:
-            if self._lost:
-                self._writer.lost(record.t, self._lost, self._lost_why)
-                self._unwritten += self._lost
-                self._lost = 0
-            self._writer.put(record)
-            self._note_findings(record)
-            for kind, what in self._run_events.of(record):
-                self._writer.event(record.t, kind, what)
+            self._writer.prepare([entry.record for entry in entries if isinstance(entry, _Tick)])
+            for entry in entries:
+                entry.write(self._writer)
+                self._ticks += isinstance(entry, _Tick)
         except OSError as error:
             self._fail(error)
-            self._lost += 1
-            return
-        self._ticks += 1
-        self._unwritten += 1
-        self.unsynced = True
-        self.last_t = record.t
-        self._first_t = min(self._first_t, record.t)
-        self._unsynced_t = min(self._unsynced_t, record.t)
 
     def describe(self, t: float, episode: Mapping[str, Any]) -> None:
         """Write and sync the message ``episode`` about an episode at ``t`` [s]."""
@@ -146,25 +188,25 @@ class Ring:
                     found += path.stat().st_size
         return found
 
-    def _note_findings(self, record: TickRecord) -> None:
-        """Write an event for each finding that begins or ends with this tick."""
-        assert self._writer is not None
+    def _events(self, record: TickRecord) -> list[tuple[str, Mapping[str, Any]]]:
+        """Return the events of ``record``: also each finding that begins or ends with it."""
         if record.submissions:
             self._newest = type(record.submissions[-1].command).__name__
         before, self._before = self._before, record.state
-        if before is None or before.findings == record.state.findings:
-            return
-        for entry in entries_between(before, record.state, None, self._newest):
-            found = entry.finding
-            what = {
-                "reason": found.reason.value,
-                "began": entry.began,
-                "amount": found.amount,
-                "axis": None if found.axis is None else found.axis + 1,
-                "parts": None if found.parts is None else list(found.parts),
-                "command": entry.command,
-            }
-            self._writer.event(entry.t, "finding", what)
+        events: list[tuple[str, Mapping[str, Any]]] = []
+        if before is not None and before.findings != record.state.findings:
+            for entry in entries_between(before, record.state, None, self._newest):
+                finding = entry.finding
+                fields = {
+                    "reason": finding.reason.value,
+                    "began": entry.began,
+                    "amount": finding.amount,
+                    "axis": None if finding.axis is None else finding.axis + 1,
+                    "parts": None if finding.parts is None else list(finding.parts),
+                    "command": entry.command,
+                }
+                events.append(("finding", fields))
+        return [*events, *self._run_events.of(record)]
 
     def _note_scripts(self) -> None:
         """Attach the scripts that run, or have run since the last sync. Raises OSError."""
@@ -182,22 +224,25 @@ class Ring:
 
     def lost(self, t: float, ticks: int) -> None:
         """Note that ``ticks`` ticks until ``t`` [s] never came."""
-        self._lost += ticks
-        self._lost_why = "The process that records could not keep up."
-        log.error("%d ticks until %.1f s were not recorded: %s", ticks, t, self._lost_why)
+        why = "The process that records could not keep up."
+        log.error("%d ticks until %.1f s were not recorded: %s", ticks, t, why)
+        self._add([_Gap(t, ticks, why)])
 
     def sync(self) -> None:
         """Bring everything to the disk, and begin a new file if this one is full."""
-        self.unsynced = False
+        if self._unsynced:
+            # What waits for a disk that took nothing.
+            self._opened()
         if self._writer is None or self._file is None:
             return
         try:
             self._note_scripts()
             self._writer.flush()
             os.fsync(self._file.fileno())
-            full = self._file.tell() >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
+            self._synced_bytes = self._file.tell()
+            full = self._synced_bytes >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
             self.problem = ""
-            self._unwritten = 0
+            self._unsynced.clear()
         except OSError as error:
             self._fail(error)
             return
@@ -214,6 +259,7 @@ class Ring:
             self._note_scripts()
             writer.close()
             os.fsync(file.fileno())
+            self._unsynced.clear()
         except OSError as error:
             self._report(error)
         self._writer = None
@@ -221,7 +267,7 @@ class Ring:
             file.close()
 
     def _opened(self) -> bool:
-        """Begin a file if there is none; return whether there is one."""
+        """Begin a file, with all that waits, if there is none; return whether there is one."""
         if self._writer is not None:
             return True
         if self._clock() < self._retry_at:
@@ -232,8 +278,9 @@ class Ring:
             for old in files[: -(MAX_FILES - 1)]:
                 if self.held is None or old.name < self.held or old in files[:-MAX_HELD_FILES]:
                     old.unlink(missing_ok=True)
-            path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
-            self._file = open(create_file(path, 0o600), "wb")  # noqa: SIM115 - open for a minute
+            self._synced_bytes = 0
+            self._path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
+            self._file = open(create_file(self._path, 0o600), "wb")  # noqa: SIM115 - for a minute
             with suppress(OSError):
                 # So that nobody repairs it before its end. Some file systems have no claims.
                 claim_file(self._file.fileno())
@@ -242,20 +289,27 @@ class Ring:
             self._fail(error)
             return False
         self._ticks = 0
-        return True
+        self._write(self._unsynced)
+        return self._writer is not None
 
     def _fail(self, error: OSError) -> None:
-        """Give up the present file; what was synced of it can be recovered."""
+        """End the present file after what was synced of it, which can be recovered."""
         self._report(error)
-        self._lost += self._unwritten
-        self._unwritten = 0
-        self._lost_why = f"The disk took nothing: {error.strerror or error}."
+        self._disk_error = f"The disk took nothing: {error.strerror or error}."
         self.problem = f"Nothing is recorded now: {error.strerror or error}. Free some disk space."
         self._retry_at = self._clock() + RETRY_SECONDS
         file, self._file, self._writer = self._file, None, None
-        if file is not None:
-            with suppress(OSError):
-                file.close()
+        if file is None:
+            return
+        if not self._synced_bytes:
+            self._path.unlink(missing_ok=True)
+        # The rest is written again, into the next file, and must not be there twice.
+        descriptor = os.dup(file.fileno())
+        with suppress(OSError):
+            file.close()
+        with suppress(OSError):
+            os.ftruncate(descriptor, self._synced_bytes)
+        os.close(descriptor)
 
     def _report(self, error: OSError) -> None:
         log.error("The recording in %s is interrupted: %s.", self._folder, error.strerror or error)
