@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+import katana450
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.extensions.recording.files.recording_file import RecordingFile
@@ -74,6 +75,38 @@ def test_killed_writer_loses_a_second_at_most(number: int, given: Path, tmp_path
     content = path.read_bytes()
     assert main(["record", "recover", str(path)]) == 0
     assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("damaged", ["content", "head"])
+def test_recovery_continues_after_a_damaged_chunk(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], damaged: str
+) -> None:
+    path = tmp_path / "run.mcap"
+    record(path, 3000, 4)
+    with RecordingFile.open(path) as file:
+        ticks = file.counts()[COMMANDS]
+    with path.open("rb") as opened:
+        summary = make_reader(opened).get_summary()
+        assert summary is not None
+        chunks = sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
+    chunk = chunks[len(chunks) // 3]
+    content = bytearray(path.read_bytes())
+    # The length of its head is whole, the name of its compression or its content is not.
+    place = chunk.chunk_start_offset + (40 if damaged == "head" else chunk.chunk_length // 2)
+    content[place : place + 8] = bytes(255 - byte for byte in content[place : place + 8])
+    path.write_bytes(content)
+    assert main(["record", "recover", str(path)]) == 0
+    report = capsys.readouterr().out
+    with RecordingFile.open(path) as file:
+        forms = [json.loads(message.data) for message in file.messages(COMMANDS)]
+    (gap,) = [form for form in forms if "missing" in form]
+    assert f"with {gap['ticks']} ticks between others" in report
+    assert len(forms) - 1 + gap["ticks"] == ticks
+    # The end is there, and everything after the next complete state is simulated again.
+    assert forms[-1]["t"] - gap["t"] > 10.0
+    result = katana450.open(path).verify()
+    assert result.identical
+    assert gap["ticks"] < result.unknown < ticks / 2
 
 
 SCRIPT = """

@@ -1,8 +1,13 @@
-"""Repair of a recording whose writer was killed: the whole chunks of it become a whole file."""
+"""Repair of a recording that has no end, or is damaged: its whole chunks become a whole file.
+
+What a damaged chunk held is missing, and the new file says how many ticks that is.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,6 +17,7 @@ from mcap.records import Message as McapMessage
 
 from katana450.atomic import write_files
 from katana450.errors import InputError
+from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files.copying import RecordingCopy
 from katana450.extensions.recording.files.header import METADATA, Attachment
 from katana450.extensions.recording.files.recording_file import (
@@ -22,45 +28,44 @@ from katana450.extensions.recording.files.recording_file import (
     records_at,
     unpacked,
 )
-from katana450.extensions.recording.state_message import NANO
+from katana450.extensions.recording.files.trimming import KEY
+from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, PLANS, SOLIDS
 from katana450.platform_support import claim_file
 
+RECORD_HEAD = struct.Struct("<BQ")
+"""Kind and length of a record."""
 
-@dataclass(frozen=True)
+
+@dataclass
 class Recovered:
     """Content of a broken file.
 
     Attributes:
         messages: number of messages.
         start, end: times of the first and last of them [s].
-        lost_bytes: bytes after the last whole chunk, which are lost.
-        why: what is wrong with them.
+        lost_bytes: bytes of damaged records, and of what follows the last whole one.
+        why: what is wrong with the first of them.
+        missing_ticks: number of ticks between whole chunks that are lost.
     """
 
-    messages: int
-    start: float
-    end: float
-    lost_bytes: int
-    why: str
-
-    def __str__(self) -> str:
-        return (
-            f"{self.messages} messages over {self.end - self.start:.1f} s are kept; "
-            f"{self.lost_bytes} bytes at the end are lost ({self.why})"
-        )
-
-
-@dataclass
-class _Found:
-    """The valid beginning of a file."""
-
-    metadata: dict[str, str] = field(default_factory=dict)
-    attachments: list[Attachment] = field(default_factory=list)
-    valid_bytes: int = 0
-    why: str = "nothing"
-    count: int = 0
+    messages: int = 0
     start: float = 0.0
     end: float = 0.0
+    lost_bytes: int = 0
+    why: str = ""
+    missing_ticks: int = 0
+
+    def __str__(self) -> str:
+        ticks = f", with {self.missing_ticks} ticks between others" if self.missing_ticks else ""
+        return (
+            f"{self.messages} messages over {self.end - self.start:.1f} s are kept; "
+            f"{self.lost_bytes} bytes are lost{ticks} ({self.why})"
+        )
+
+    def lose(self, count: int, why: str) -> None:
+        """Count lost bytes."""
+        self.lost_bytes += count
+        self.why = self.why or why
 
 
 def is_whole(path: Path) -> bool:
@@ -89,18 +94,22 @@ def recover(path: Path, out: Path) -> Recovered | None:
     try:
         with path.open("rb") as file:
             _check_unclaimed(path, file)
-            found = _scan(file)
-            if not found.metadata:
+            metadata, attachments, why = _header(file)
+            if metadata is None:
                 raise InputError(
-                    f"{path} cannot be recovered: its beginning is not that of a recording "
-                    f"({found.why})."
+                    f"{path} cannot be recovered: its beginning is not that of a recording ({why})."
                 )
-            write_files({out: lambda target: _write(file, found, target)})
-            size = BoundedStream(file).size
+            recovered = Recovered()
+            write_files(
+                {
+                    out: lambda target: _write(
+                        file, RecordingCopy(target, metadata, attachments), recovered
+                    )
+                }
+            )
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-    lost = size - found.valid_bytes
-    return Recovered(found.count, found.start, found.end, lost, found.why)
+    return recovered
 
 
 def _check_unclaimed(path: Path, file: BinaryIO) -> None:
@@ -116,53 +125,91 @@ def _check_unclaimed(path: Path, file: BinaryIO) -> None:
         return
 
 
-def _scan(file: BinaryIO) -> _Found:
-    """Return what the valid beginning of ``file`` holds."""
-    found, stream = _Found(), BoundedStream(file)
-    try:
-        for record in records_at(stream, 0):
-            match record:
-                case Metadata(name=name, metadata=metadata) if name == METADATA:
-                    found.metadata = dict(metadata)
-                case McapAttachment():
-                    name, kind = record.name, record.media_type
-                    found.attachments.append(Attachment(name, kind, record.data, record.log_time))
-                case Chunk():
-                    times = [
-                        each.log_time / NANO
-                        for each in unpacked(record)
-                        if isinstance(each, McapMessage)
-                    ]
-                    if times:
-                        found.start = min(times) if not found.count else found.start
-                        found.end = max(found.end, *times)
-                        found.count += len(times)
-                case Footer():
-                    found.why = "its index is wrong"
-            found.valid_bytes = stream.tell()
-    except FAULTS as error:
-        found.why = str(error) or type(error).__name__
-    return found
+def _header(file: BinaryIO) -> tuple[dict[str, str] | None, list[Attachment], str]:
+    """Return the metadata and the attachments of ``file``, and why there are no metadata."""
+    recovered = Recovered()
+    metadata: dict[str, str] | None = None
+    attachments = []
+    for record in _records(BoundedStream(file), recovered):
+        match record:
+            case Metadata(name=name, metadata=texts) if name == METADATA:
+                metadata = dict(texts)
+            case McapAttachment():
+                kind = record.media_type
+                attachments.append(Attachment(record.name, kind, record.data, record.log_time))
+    return metadata, attachments, recovered.why or "nothing"
 
 
-def _write(file: BinaryIO, found: _Found, target: BinaryIO) -> None:
-    """Write the valid part of ``file`` to ``target``."""
-    copy = RecordingCopy(target, found.metadata, found.attachments)
-    stream = BoundedStream(file)
+def _records(stream: BoundedStream, recovered: Recovered) -> Iterator[Any]:
+    """Yield the whole records of ``stream``, and count the bytes of the others."""
+    offset = 0
+    while True:
+        try:
+            for record in records_at(stream, offset):
+                if isinstance(record, Footer):
+                    recovered.why = recovered.why or "its index is wrong"
+                yield record
+                offset = stream.tell()
+            return
+        except FAULTS as error:
+            # A record that says how long it is can be left out.
+            length = _length_at(stream, offset)
+            recovered.lose(length, str(error) or type(error).__name__)
+            offset += length
+            if offset >= stream.size:
+                return
+
+
+def _length_at(stream: BoundedStream, offset: int) -> int:
+    """Return the length of the record at ``offset``, or of all from there on if it is unknown."""
+    left = stream.size - offset
+    if offset == 0 or left < RECORD_HEAD.size:
+        return left
+    stream.seek(offset)
+    length = RECORD_HEAD.size + RECORD_HEAD.unpack(stream.read(RECORD_HEAD.size))[1]
+    return int(min(length, left))
+
+
+def _write(file: BinaryIO, copy: RecordingCopy, recovered: Recovered) -> None:
+    """Write the whole chunks of ``file`` to ``copy``, and count them in ``recovered``."""
     topics: dict[int, str] = {}
-    for record in records_at(stream, 0):
-        if isinstance(record, Chunk):
-            for each in unpacked(record):
-                _copy(copy, topics, each)
-            copy.flush()
-        if stream.tell() >= found.valid_bytes:
-            break
+    # Values that other messages name by their keys, and the number of the newest tick.
+    keys: set[bytes] = set()
+    newest: int | None = None
+    for record in _records(BoundedStream(file), recovered):
+        if not isinstance(record, Chunk):
+            continue
+        try:
+            content = unpacked(record)
+        except FAULTS as error:
+            recovered.lose(len(record.data), str(error) or type(error).__name__)
+            continue
+        for part in content:
+            if isinstance(part, Channel):
+                topics[part.id] = part.topic
+            elif isinstance(part, McapMessage) and (topic := topics.get(part.channel_id)):
+                message = Message(topic, part.sequence, part.log_time, part.data)
+                if topic in (PLANS, SOLIDS):
+                    keys.update(KEY.findall(message.data)[:1])
+                elif topic in (COMMANDS, CHECKPOINTS) and recovered.lost_bytes:
+                    if not keys.issuperset(KEY.findall(message.data)):
+                        continue
+                    lost = 0 if newest is None else message.number - newest - 1
+                    if topic == COMMANDS and lost > 0:
+                        recovered.missing_ticks += lost
+                        copy.add(_gap(message, lost))
+                if topic == COMMANDS:
+                    newest = message.number
+                recovered.start = recovered.start if recovered.messages else message.t
+                recovered.start = min(recovered.start, message.t)
+                recovered.end = max(recovered.end, message.t)
+                recovered.messages += 1
+                copy.add(message)
+        copy.flush()
     copy.close()
 
 
-def _copy(copy: RecordingCopy, topics: dict[int, str], record: Any) -> None:
-    if isinstance(record, Channel):
-        topics[record.id] = record.topic
-    elif isinstance(record, McapMessage):
-        topic = topics.get(record.channel_id, "")
-        copy.add(Message(topic, record.sequence, record.log_time, record.data))
+def _gap(message: Message, ticks: int) -> Message:
+    """Return the note that ``ticks`` are missing before ``message``."""
+    form = {"t": message.t, "missing": "This part of the file was damaged.", "ticks": ticks}
+    return Message(COMMANDS, message.number, message.log_time, json_text(form))
