@@ -9,6 +9,8 @@ const button = document.getElementById("episodes-button");
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 const size = (bytes) => (bytes < MEGA ? `${Math.round(bytes / 1000)} kB` : `${(bytes / MEGA).toFixed(1)} MB`);
 const touch = matchMedia("(any-pointer: coarse)").matches;
+// A length with what the disk did not take of it: ticks of 10 ms.
+const extent = (seconds, ticks) => `${seconds.toFixed(1)} s${ticks ? `, ${(ticks / 100).toFixed(1)} s of it missing` : ""}`;
 // The name of a key, where there may be one.
 const by = (words, letter) => (touch ? words : `${words}${letter}`);
 const key = (letter) => html("kbd", { "aria-hidden": true }, letter);
@@ -73,7 +75,7 @@ export class Episodes {
     const asks = running || saving || last;
     for (const each of this.#acts.children) each.hidden = each.dataset.act === "undo" ? !undo : !asks;
     const left = running?.left != null ? ` It ends by itself in ${clock(running.left)}: an episode has at most an hour.` : "";
-    const one = last && `Episode ${last.number}, ${last.seconds.toFixed(1)} s: `;
+    const one = last && `Episode ${last.number}, ${extent(last.seconds, last.missing_ticks)}: `;
     const now = saving ? "Saving…" : running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
     write(this.#says, problem || now);
     this.#says.classList.toggle("bad", Boolean(problem));
@@ -120,13 +122,13 @@ export class Episodes {
     const done = await this.#ask(request);
     if (!done) return;
     // The next key may come before the next state.
-    const { number, outcome, start, end } = done;
-    const last = { number, outcome, seconds: end - start };
+    const { number, outcome, start, end, missing_ticks } = done;
+    const last = { number, outcome, seconds: end - start, missing_ticks };
     const judged = act in OUTCOMES && (running || saving || before?.outcome !== act);
     const undoable = act === "undo" ? null : judged || act === "discard" || act === "rerecord" ? { number } : this.#state?.undo;
     this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: undoable };
     const name = `Episode ${number}`;
-    if (act === "rec" && running) this.toast(by(`${name} has ended.`, " Y: success, N: failure, X: discard"));
+    if (act === "rec" && running) this.toast(by(`${name} has ended${missing_ticks ? `: ${extent(end - start, missing_ticks)}` : ""}.`, " Y: success, N: failure, X: discard"));
     else if (act in OUTCOMES) this.toast(by(`${name}: ${act}.`, " U: undo"));
     else if (act === "discard") this.toast(by(`${name} is discarded.`, " U: undo"));
     else if (act === "undo") this.toast(end ? `${name} is as before.` : "Both attempts are kept.");
@@ -167,7 +169,7 @@ export class Episodes {
 
   #row(each) {
     const { number, outcome, start, end, recorded, bytes, task, note, file } = each;
-    const length = `${(end - start).toFixed(1)} s`;
+    const length = extent(end - start, each.missing_ticks);
     const summary = html("summary", { "data-key": number }, html("b", {}, `${number}`), html("span", {}, length), html("i", { class: outcome }, OUTCOMES[outcome]), html("span", {}, task));
     const row = html("details", this.#open.has(number) ? { open: "" } : {}, summary);
     row.addEventListener("toggle", () => this.#open[row.open ? "add" : "delete"](number));

@@ -54,15 +54,9 @@ def server(command: tuple[str, ...]) -> Iterator[AppServer]:
 
 
 def started(server: AppServer, task: str) -> EpisodeClient:
-    """Begin an episode as soon as the process that records is there."""
+    """Begin an episode, for which the server waits until the process that records is there."""
     client = EpisodeClient(Site(server.url, name="Ada"))
-
-    def start() -> bool:
-        with suppress(RefusedError):
-            return client.start(task) > 0
-        return False
-
-    waited_for(start, "the process that records")
+    client.start(task)
     return client
 
 

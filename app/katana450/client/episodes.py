@@ -29,6 +29,7 @@ class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
         recorded: Length of its file [s], which bounds both.
         bytes: Length of its file [bytes].
         file: Name of its file.
+        missing_ticks: Number of its ticks, of 10 ms each, that could not be recorded.
     """
 
     number: int
@@ -40,6 +41,7 @@ class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
     recorded: float
     bytes: int
     file: str
+    missing_ticks: int = 0
 
 
 class _List(msgspec.Struct):

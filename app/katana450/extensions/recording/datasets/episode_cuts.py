@@ -9,7 +9,7 @@ from pathlib import Path
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_file import episodes_in
-from katana450.extensions.recording.files.checking import first_gap
+from katana450.extensions.recording.files.checking import gaps_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 
 DEFAULT_OUTCOMES = tuple(each.value for each in JUDGED)
@@ -110,7 +110,7 @@ def _task(task: str, file: RecordingFile, number: int | None = None) -> str:
 
 def check_without_gaps(file: RecordingFile, cut: EpisodeCut) -> None:
     """Raise InputError if the recording of ``cut`` lacks ticks."""
-    found = first_gap(file, cut.start, cut.end)
+    found = next(gaps_in(file, cut.start, cut.end), None)
     if found is not None:
         t, gap = found
         raise InputError(

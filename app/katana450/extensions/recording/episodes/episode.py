@@ -63,6 +63,7 @@ class Episode:
         outcome: the result.
         note: remarks; may be empty.
         by: the person who began it.
+        missing_ticks: number of its ticks that could not be recorded.
     """
 
     number: int
@@ -72,6 +73,7 @@ class Episode:
     outcome: EpisodeOutcome
     note: str
     by: EpisodeGiver
+    missing_ticks: int = 0
 
     @property
     def length(self) -> float:
@@ -99,6 +101,7 @@ def message_of(episode: Episode, t: float, kind: str) -> dict[str, Any]:
         "outcome": episode.outcome.value,
         "note": episode.note,
         "by": {"name": by.name, "role": by.role, "key": by.key},
+        "missing_ticks": episode.missing_ticks,
     }
 
 
@@ -128,6 +131,10 @@ def episode_of(data: bytes | str) -> Episode:
         raise InputError(f"Episode {number} has the outcome {outcome.value} and no end.")
     if end is not None and end < start:
         raise InputError(f"Episode {number} ends at {end:g} s, before its start at {start:g} s.")
+    # Descriptions of earlier versions lack it.
+    missing = found.get("missing_ticks", 0)
+    if not isinstance(missing, int) or isinstance(missing, bool) or missing < 0:
+        raise InputError(f"The missing ticks of episode {number} are {missing!r}, not a number.")
     giver = EpisodeGiver(
         _text(by, "name", number), _text(by, "role", number), _text(by, "key", number)
     )
@@ -139,6 +146,7 @@ def episode_of(data: bytes | str) -> Episode:
         outcome,
         _text(found, "note", number),
         giver,
+        missing,
     )
 
 

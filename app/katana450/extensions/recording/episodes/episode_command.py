@@ -32,12 +32,17 @@ def _ask(options: Namespace, server: EpisodeClient) -> int:
         case "list":
             for each in server.list():
                 length = each.end - each.start
-                _show(each.number, length, each.outcome, each.task, each.note)
+                remark = _remark(each.missing_ticks, each.note)
+                _show(each.number, length, each.outcome, each.task, remark)
             return 0
         case "start":
             print(f"Episode {server.start(options.task)} is recorded.")
         case "stop":
-            print(f"Episode {server.stop(options.outcome)} has ended: {options.outcome}.")
+            number = server.stop(options.outcome)
+            print(f"Episode {number} has ended: {options.outcome}.")
+            for each in server.list():
+                if each.number == number and each.missing_ticks:
+                    print(f"Its recording is incomplete: {_remark(each.missing_ticks)}.")
         case "judge":
             print(f"Episode {server.judge(options.outcome, options.number)}: {options.outcome}.")
         case "discard":
@@ -57,8 +62,14 @@ def _ask(options: Namespace, server: EpisodeClient) -> int:
     return 0
 
 
-def _show(number: int, length: float, outcome: str, task: str, note: str) -> None:
-    remark = f"  ({note})" if note else ""
+def _remark(missing_ticks: int, note: str = "") -> str:
+    """Return the note of an episode, after what is missing of it."""
+    missing = f"{missing_ticks} ticks of 10 ms are missing" if missing_ticks else ""
+    return "; ".join(filter(None, (missing, note)))
+
+
+def _show(number: int, length: float, outcome: str, task: str, remark: str) -> None:
+    remark = f"  ({remark})" if remark else ""
     print(printable(f"{number:4}  {length:7.1f} s  {outcome:10}  {task}{remark}"))
 
 
@@ -69,7 +80,8 @@ def _list_folder(path: Path) -> int:
     folder = EpisodeFolder(path)
     for each in folder.kept():
         found = each.episode
-        _show(found.number, found.length, found.outcome.value, found.task, found.note)
+        remark = _remark(found.missing_ticks, found.note)
+        _show(found.number, found.length, found.outcome.value, found.task, remark)
     for why in folder.unreadable():
         print(printable(why))
     gone = len(folder.discarded())

@@ -13,6 +13,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_file import write_episode
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, EpisodeMarker
+from katana450.extensions.recording.files.checking import gaps_in
 from katana450.extensions.recording.files.keeping import whole_copy
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.places import recordings_in
@@ -46,6 +47,7 @@ def cut_out(folder: EpisodeFolder, marker: EpisodeMarker, kind: str) -> Episode:
             outcome = EpisodeOutcome.UNFINISHED
             episode = replace(episode, end=max(end, episode.start), outcome=outcome)
         episode = replace(episode, start=min(max(episode.start, start), episode.end or end))
+        episode = replace(episode, missing_ticks=_missing_ticks(sources, episode))
         write_episode(sources, folder.path(episode.number), episode, kind)
     return episode
 
@@ -108,6 +110,16 @@ def _run_of(path: Path) -> str | None:
             return file.metadata.get("utc_offset_ns", "") if any(file.counts().values()) else ""
     except InputError:
         return None
+
+
+def _missing_ticks(sources: list[Path], episode: Episode) -> int:
+    """Return the number of ticks of ``episode`` that ``sources`` state as lost."""
+    assert episode.end is not None
+    ticks = 0
+    for path in sources:
+        with RecordingFile.open(path) as file:
+            ticks += sum(gap.ticks for _, gap in gaps_in(file, episode.start, episode.end))
+    return ticks
 
 
 def _extent(sources: list[Path]) -> tuple[float, float, int]:

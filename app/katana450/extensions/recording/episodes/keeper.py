@@ -138,6 +138,7 @@ class EpisodeKeeper:
             "number": episode.number,
             "outcome": episode.outcome.value,
             "seconds": round(episode.length, 1),
+            "missing_ticks": episode.missing_ticks,
         }
 
     def _without_paths(self, text: str) -> str:

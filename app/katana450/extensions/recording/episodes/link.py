@@ -49,11 +49,18 @@ ANSWER_SECONDS = 300.0
 
 MAX_MESSAGE_BYTES = 64_000
 
+READY_SECONDS = 15.0
+"""[s] Maximum time for which the first episode waits for the process that records."""
+
 NOT_READY = (
     "The process that records is not ready. It starts a few seconds after the arm; try it again."
 )
 
 log = logging.getLogger(__name__)
+
+
+class NotReadyError(InputError):
+    """Raised while no process records episodes."""
 
 
 class EpisodeListener:
@@ -157,7 +164,7 @@ def connect_to_episodes(folder: Path, port: int) -> Any:
             )
         return _greeted(found["address"], bytes.fromhex(found["key"]))
     except (OSError, EOFError, ValueError, KeyError, TypeError, AuthenticationError) as error:
-        raise InputError(NOT_READY) from error
+        raise NotReadyError(NOT_READY) from error
 
 
 def _greeted(address: str, key: bytes) -> Any:

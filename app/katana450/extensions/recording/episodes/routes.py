@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import time
 from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
@@ -24,10 +25,15 @@ from katana450.extensions.recording.episodes.episode import (
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode
 from katana450.extensions.recording.episodes.episode_requests import (
     MAX_REQUEST_BYTES,
+    StartEpisode,
     episode_request,
 )
 from katana450.extensions.recording.episodes.follower import ENTRY
-from katana450.extensions.recording.episodes.link import request_episode
+from katana450.extensions.recording.episodes.link import (
+    READY_SECONDS,
+    NotReadyError,
+    request_episode,
+)
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.identity import PAGE
@@ -40,6 +46,10 @@ MAX_WAITING = 3
 
 Each has one of the few threads of the event loop, which others need too.
 """
+
+
+READY_CHECK_SECONDS = 0.1
+"""[s] Time between two attempts to reach the process that records."""
 
 
 class EpisodeRoutes:
@@ -111,10 +121,19 @@ class EpisodeRoutes:
         if self._waiting >= MAX_WAITING:
             raise HTTPException(TOO_MANY, "Too many requests at once. Wait a moment.")
         self._waiting += 1
+        waits = isinstance(decoded, StartEpisode)
+        ready_by = time.monotonic() + READY_SECONDS
         try:
-            done = await asyncio.to_thread(
-                request_episode, self._folder, self._port, body.decode(), giver_of(actor)
-            )
+            while True:
+                try:
+                    done = await asyncio.to_thread(
+                        request_episode, self._folder, self._port, body.decode(), giver_of(actor)
+                    )
+                    break
+                except NotReadyError:
+                    if not waits or time.monotonic() >= ready_by:
+                        raise
+                    await asyncio.sleep(READY_CHECK_SECONDS)
         except InputError as error:
             self._context.hub.recorder.refuse("episode", actor, error)
             return as_json(answers.Refused(why=str(error)), NOT_NOW)
@@ -138,7 +157,7 @@ def described(kept: KeptEpisode) -> dict[str, Any]:
         **{
             name: value
             for name, value in message_of(episode, kept.end, "").items()
-            if name in ("number", "task", "outcome", "note", "by")
+            if name in ("number", "task", "outcome", "note", "by", "missing_ticks")
         },
         "start": round(episode.start - kept.start, 3),
         "end": round(end - kept.start, 3),

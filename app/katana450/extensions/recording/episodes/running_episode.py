@@ -177,6 +177,11 @@ class RunningEpisode:
         assert marker is not None
         number = marker.episode.number
         try:
+            with self._ring.lock:
+                # What waits for the disk belongs to it.
+                self._ring.sync()
+                if self._ring.problem:
+                    raise InputError(self._ring.problem)
             episode = cut_out(self._folder, marker, "ended")
         except NothingRecordedError:
             self._forget(number)

@@ -140,8 +140,10 @@ def _setpoint(message: Message) -> np.ndarray[Any, np.dtype[np.float64]]:
             raise FormError("the setpoint is not a row of numbers") from None
 
 
-def first_gap(file: RecordingFile, start: float, end: float) -> tuple[float, MissingMessage] | None:
-    """Return the first gap from ``start`` to ``end`` [s] with its time [s]; None without one.
+def gaps_in(
+    file: RecordingFile, start: float, end: float
+) -> Iterator[tuple[float, MissingMessage]]:
+    """Yield the gaps from ``start`` to ``end`` [s], each with its time [s].
 
     Raises InputError for a damaged recording.
     """
@@ -151,8 +153,7 @@ def first_gap(file: RecordingFile, start: float, end: float) -> tuple[float, Mis
         with _placed(message):
             gap = msgspec.json.decode(message.data, type=MissingMessage)
         if gap.missing is not None:
-            return message.t, gap
-    return None
+            yield message.t, gap
 
 
 def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from katana450.arm.control.state import Status
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import first_gap
+from katana450.extensions.recording.files.checking import gaps_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import rows, state_at
 from katana450.maths.geometry.arrays import FloatArray, IntArray, finite_array
@@ -98,7 +98,7 @@ def read_part(
 
 def check_whole(file: RecordingFile, first: float, last: float) -> None:
     """Raise InputError with the time of the first gap from ``first`` to ``last`` [s]."""
-    found = first_gap(file, first, last)
+    found = next(gaps_in(file, first, last), None)
     if found is not None:
         t, gap = found
         raise InputError(
