@@ -302,7 +302,7 @@
     else head(status.headline, status.end);
     const at = status.stopped_at ? `${time(status.stopped_at)}:` : "";
     const cause = status.stopped ? [at, status.stopped] : [proven];
-    text("why", named([status.taken, status.why, ...cause, status.until].filter(Boolean).join(" ")));
+    text("why", named([status.taken, status.why, ...cause, status.until, status.cautions].filter(Boolean).join(" ")));
     byId("objects-button").hidden = status.role === "viewer";
     byId("teach-button").hidden = status.role === "viewer" || !status.scripts;
     const clear = byId("clear-stop");

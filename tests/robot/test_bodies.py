@@ -10,10 +10,11 @@ import trimesh
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import find_arm
+from katana450.assembly.robot_session import find_arm, find_robot
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld, Part
+from katana450.settings import Settings
 from tests.exchange.trees import tree
 from tests.robot.hands import hand, rail
 
@@ -59,10 +60,11 @@ def test_drawn_shapes_count_only_where_no_link_has_collision_shapes(tmp_path: Pa
     assert [part.name for part in own(world)] == ["left", "right", "follower"]
     assert notes == ()
     mixed = rail().replace("collision>", "visual>", 2)
-    world, notes = robot_world(read(tmp_path, mixed))
-    assert world is not None
-    assert [part.name for part in own(world)] == ["right", "follower"]
-    assert notes == ("Not checked, because they have no collision shapes: left.",)
+    read(tmp_path, mixed)
+    robot, session, _ = find_robot(Settings(), tmp_path / "robot.urdf", None)
+    assert session.world is not None
+    assert [part.name for part in own(session.world)] == ["right", "follower"]
+    assert robot.cautions == ("Not checked for contacts: left.",)
 
 
 def test_rods_that_stand_for_missing_shapes_are_no_bodies(tmp_path: Path) -> None:

@@ -120,6 +120,7 @@ class Gateway:
 
         def attach() -> None:
             self.hub.gate.arm = arm
+            self.hub.shown = {**self.hub.shown, "cautions": " ".join(arm.robot.cautions)}
             # Before any request sees the arm.
             self.hub.follow_stop()
 

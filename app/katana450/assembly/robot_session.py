@@ -6,11 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from katana450.arm.control.messages import UNCHECKED
+import numpy as np
+
 from katana450.arm.control.scene_objects import Hand, SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare
+from katana450.arm.robot.cautions import cautions
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -64,7 +66,8 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
     joints = robot.joint_group
     world, left_out = _world(robot)
     session = Session(joints, joints.ready, world, travel=robot.distance)
-    notes = (*robot.notes, *robot.joint_notes, *left_out)
+    robot = replace(robot, cautions=cautions(robot, world, np.append(session.ready, 0.0)))
+    notes = (*robot.notes, *robot.joint_notes, *left_out, *robot.cautions)
     return DescribedRobot(robot, session, (*notes, f"Joints only. {robot.why}"))
 
 
@@ -74,7 +77,6 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         robot = bare(robot)
     arm = robot.require_arm()
     world, left_out = _world(robot)
-    notes = (*arm.notes, *robot.notes, *robot.joint_notes, *left_out)
     props = load_props()
     hand: Hand | None = None
     objects: tuple[SceneObject, ...] = ()
@@ -85,9 +87,13 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         if hand.gripper != arm.gripper:
             robot = replace(robot, arm=replace(arm, gripper=hand.gripper))
         world = world.with_obstacles((table(),))
+    ready = arm.ready(settings.ready)
+    x = np.append(ready, robot.require_arm().gripper.clamp(0.0))
+    robot = replace(robot, cautions=cautions(robot, world, x))
+    notes = (*arm.notes, *robot.notes, *robot.joint_notes, *left_out, *robot.cautions)
     session = Session(
         robot.require_arm(),
-        arm.ready(settings.ready),
+        ready,
         world,
         hand=hand,
         objects=objects,
@@ -100,7 +106,5 @@ def _world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
     """Return the world that an extension makes, and notes; without one, only arms are checked."""
     make = next((each.world for each in extensions() if each.world is not None), None)
     if make is not None:
-        world, notes = make(robot)
-    else:
-        world, notes = (None, ()) if robot.arm is None else world_of(robot)
-    return world, notes if world is not None else (*notes, UNCHECKED)
+        return make(robot)
+    return (None, ()) if robot.arm is None else world_of(robot)

@@ -62,6 +62,7 @@ class Link:
         collisions: the shapes that represent it in collision checks.
         mass: [kg], 0 if the file states none.
         center: (3,) centre of mass in its own frame [m].
+        visuals_missing, collisions_missing: whether the file names such shapes that do not exist.
     """
 
     name: str
@@ -72,6 +73,13 @@ class Link:
     collisions: tuple[Visual, ...]
     mass: float
     center: FloatArray
+    visuals_missing: bool = False
+    collisions_missing: bool = False
+
+    @property
+    def drawn(self) -> tuple[Visual, ...]:
+        """Its visuals without the rods that represent missing ones."""
+        return tuple(visual for visual in self.visuals if not visual.is_rod)
 
     def at_rest(self, resting: Mapping[str, float]) -> FloatArray:
         """Return the link's pose (4, 4) in its parent with its joint at the value in ``resting``.

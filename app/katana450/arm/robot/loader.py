@@ -57,7 +57,11 @@ def load(
         if tool is not None:
             raise
         why = str(error)
-    missing = [mesh for link in urdf.links.values() for mesh in link.missing]
+    missing = [
+        mesh
+        for link in urdf.links.values()
+        for mesh in (*link.missing_visuals, *link.missing_collisions)
+    ]
     notes = tuple(f"There is no mesh at {mesh}." for mesh in dict.fromkeys(missing))
     return Robot(urdf.name, links, arm, why, notes, faults, path)
 
@@ -95,6 +99,8 @@ def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]
                 collisions=link.collisions,
                 mass=link.mass,
                 center=link.center,
+                visuals_missing=bool(link.missing_visuals),
+                collisions_missing=bool(link.missing_collisions),
             )
         )
     return tuple(links), tuple(faults)

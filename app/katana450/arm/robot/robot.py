@@ -38,6 +38,7 @@ class Robot:
         notes: sentences for a person on what is missing in its files.
         faults: sentences on joints that stay at zero because they cannot be moved.
         path: its URDF file.
+        cautions: sentences for its driver on links that are not checked, or that look wrong.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Robot:
     notes: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     path: Path | None = None
+    cautions: tuple[str, ...] = ()
 
     def require_arm(self) -> MountedArm:
         """Return the arm. Raises RobotDescriptionError with the reason if there is none."""
@@ -175,11 +177,23 @@ class Robot:
     def bodies(self, link: Link) -> tuple[Visual, ...]:
         """Return the shapes of ``link`` that are checked for contacts.
 
-        These are its collision shapes, or what is drawn if no link of the robot has any.
+        These are its collision shapes, or what is drawn if no link of the robot has any. A link
+        of which collision shapes are missing has both.
         """
-        if self.collides:
+        if self.collides and not link.collisions_missing:
             return link.collisions
-        return tuple(visual for visual in link.visuals if not visual.is_rod)
+        return (*link.collisions, *link.drawn)
+
+    def names_shapes(self, link: Link) -> bool:
+        """Return whether the file names shapes of ``link`` for contacts, which may be missing."""
+        missing = link.collisions_missing or (link.visuals_missing and not self.collides)
+        return missing or bool(self.bodies(link))
+
+    def lacks_shapes(self, link: Link) -> bool:
+        """Return whether shapes of ``link`` for contacts are missing, and not drawn either."""
+        if link.collisions_missing:
+            return link.visuals_missing or not link.drawn
+        return link.visuals_missing and not self.collides
 
     @cached_property
     def moving(self) -> frozenset[str]:

@@ -64,7 +64,7 @@ class UrdfLink:
         visuals, collisions: its shapes.
         mass: [kg], 0 if not stated.
         center: (3,) centre of mass in the frame of the link [m].
-        missing: the mesh files of its shapes that do not exist.
+        missing_visuals, missing_collisions: the mesh files of its shapes that do not exist.
     """
 
     name: str
@@ -72,7 +72,8 @@ class UrdfLink:
     collisions: tuple[Visual, ...]
     mass: float
     center: FloatArray
-    missing: tuple[Path, ...]
+    missing_visuals: tuple[Path, ...]
+    missing_collisions: tuple[Path, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,19 +150,20 @@ def _read(data: bytes, folder: Path) -> Urdf:
 
 
 def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> UrdfLink:
-    missing: list[Path] = []
+    missing: tuple[list[Path], list[Path]] = ([], [])
     visuals, collisions = (
         tuple(
             visual
             for shape in shapes
-            if (visual := _visual(shape, colors, folder, missing)) is not None
+            if (visual := _visual(shape, colors, folder, files)) is not None
         )
-        for shapes in (link.visuals, link.collisions)
+        for shapes, files in zip((link.visuals, link.collisions), missing, strict=True)
     )
     mass, center = 0.0, np.zeros(3)
     if link.inertial is not None and link.inertial.mass is not None:
         mass, center = max(link.inertial.mass, 0.0), _origin(link.inertial)[:3, 3]
-    return UrdfLink(link.name, visuals, collisions, mass, frozen(center), tuple(missing))
+    lost = tuple(tuple(files) for files in missing)
+    return UrdfLink(link.name, visuals, collisions, mass, frozen(center), *lost)
 
 
 def _joint(joint: Any) -> UrdfJoint:

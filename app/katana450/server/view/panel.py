@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import UNCHECKED, degrees, millimetres
+from katana450.arm.control.messages import degrees, millimetres
 from katana450.arm.control.state import State
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
@@ -49,8 +49,8 @@ class Panel:
         self._on_person = listener(gestures)
         self._gui = server.gui
         self._shown_at = -math.inf
-        if not robot.collides:
-            self._gui.add_markdown(UNCHECKED)
+        for caution in robot.cautions:
+            self._gui.add_markdown(caution)
         labels = joint_labels(robot)
         self._sliders = [self._joint(axis, labels[axis], state) for axis in range(len(labels))]
         self._gripper = self._finger(state) if self._arm.gripper.moves else None
